@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The subcommands of `bole`. Each adds itself to the command line with its options and its callback; a
+/// callback throws vpException for a user's mistake, which main() prints as one line.
+
+#include <CLI/CLI.hpp>
+
+namespace bole::apps
+{
+} // namespace bole::apps

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The command `bole`: one subcommand a file, see commands.h.
+#include "commands.h"
+
+#include <cstdio>
+#include <visp3/core/vpException.h>
+
+int main(int argc, char **argv)
+{
+  CLI::App app("bole: tree trunks as vertical cylinders, tracked and mapped from a small drone's video", "bole");
+  app.set_version_flag("--version", "bole " BOLE_VERSION);
+  app.require_subcommand(1);
+  try {
+    app.parse(argc, argv);
+  }
+  catch (const CLI::ParseError &error) {
+    return app.exit(error);
+  }
+  catch (const vpException &error) {
+    std::fprintf(stderr, "bole: %s\n", error.what());
+    return 1;
+  }
+  catch (const std::exception &error) {
+    std::fprintf(stderr, "bole: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Rotations: the exponential map of SO(3) and its derivatives.
+///
+/// A rotation aRb takes coordinates in frame b to frame a; adjacent letters cancel (aRc = aRb * bRc).
+/// Perturbations stand on the right: R * Exp(phi), phi in radians, in the frame named last.
+///
+/// Laws (each a test): Exp(Log(R)) == R; Log(Exp(phi)) == phi for |phi| < pi;
+/// Log(Exp(phi) * Exp(d)) - phi == Jr(phi)^-1 d to first order.
+
+#include <Eigen/Core>
+
+namespace bole
+{
+/// Skew-symmetric matrix with skew(a) * b == a x b.
+Eigen::Matrix3d skew(const Eigen::Vector3d &a);
+
+/// Rotation matrix of the rotation vector \p phi [rad].
+Eigen::Matrix3d expSo3(const Eigen::Vector3d &phi);
+
+/// Rotation vector [rad] of \p R, |result| <= pi. \p R must be a rotation to 1e-6.
+Eigen::Vector3d logSo3(const Eigen::Matrix3d &R);
+
+/// Right Jacobian: Exp(phi + d) == Exp(phi) * Exp(Jr(phi) d) to first order.
+Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d &phi);
+
+/// Inverse of rightJacobianSo3(phi), |phi| < 2 pi.
+Eigen::Matrix3d inverseRightJacobianSo3(const Eigen::Vector3d &phi);
+
+/// The rotation nearest to \p R (Frobenius norm); removes the drift of long products.
+Eigen::Matrix3d orthonormalized(const Eigen::Matrix3d &R);
+} // namespace bole
