@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/gradient/border_line.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+using Eigen::Vector3d;
+
+BorderLine BorderLine::moved(double top, double bottom) const
+{
+  BorderLine line = *this;
+  line.x_top += top;
+  if (rows() > 1)
+    line.slope += (bottom - top) / (rows() - 1);
+  return line;
+}
+
+namespace
+{
+constexpr double kMinDepth = 1e-3;
+
+/// Keeps the part of the segment of directions low..high that lies in front of the camera.
+bool clipToFront(Vector3d &low, Vector3d &high)
+{
+  if (low.z() < kMinDepth && high.z() < kMinDepth)
+    return false;
+  const auto cut = [](Vector3d &behind, const Vector3d &front) {
+    const double k = (kMinDepth - behind.z()) / (front.z() - behind.z());
+    behind += k * (front - behind);
+  };
+  if (low.z() < kMinDepth)
+    cut(low, high);
+  if (high.z() < kMinDepth)
+    cut(high, low);
+  return true;
+}
+} // namespace
+
+BorderLine clippedLine(const PinholeCamera &camera, const Vector3d &cn, const Vector3d &low, const Vector3d &high,
+                       double margin_px)
+{
+  BorderLine line;
+  Vector3d foot = low, top = high;
+  const double slope = -camera.fx * cn.y() / (camera.fy * cn.x());
+  if (!clipToFront(foot, top) || !(std::abs(slope) < 1))
+    return line;
+
+  double v0 = camera.project(top).y(), v1 = camera.project(foot).y();
+  if (v0 > v1)
+    std::swap(v0, v1);
+  const double x_origin = camera.cx - camera.fx / cn.x() * (cn.z() - cn.y() * camera.cy / camera.fy); // x at v = 0
+  v0 = std::max(v0, 1.0);
+  v1 = std::min(v1, camera.height - 2.0);
+  const double x_low = margin_px, x_high = camera.width - 1 - margin_px;
+  if (std::abs(slope) > 1e-9) {
+    const double va = (x_low - x_origin) / slope, vb = (x_high - x_origin) / slope;
+    v0 = std::max(v0, std::min(va, vb));
+    v1 = std::min(v1, std::max(va, vb));
+  }
+  else if (x_origin < x_low || x_origin > x_high)
+    return line;
+  if (!(v1 > v0))
+    return line;
+  line.row_begin = static_cast<int>(std::ceil(v0));
+  line.row_end = static_cast<int>(std::floor(v1)) + 1;
+  line.slope = slope;
+  line.x_top = x_origin + slope * line.row_begin;
+  return line;
+}
+
+BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,
+                      const ElevationRange &range, double margin_px)
+{
+  return clippedLine(camera, relative.borderNormal(border), relative.borderDirection(border, range.low),
+                     relative.borderDirection(border, range.high), margin_px);
+}
+
+Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,
+                                           const BorderLine &line)
+{
+  const double s = std::min(relative.ratio(), 0.999), c = std::sqrt(1 - s * s);
+  const double side = border == Border::left ? 1 : -1;
+  const Vector3d tn(-s, side * c, 0), tn_by_log_s(-s, -side * s * s / c, 0);
+
+  Eigen::Matrix<double, 3, 4> cn_by_theta; // of the normal: cRt (phi x n) and cRt dn/dlog s
+  for (int i = 0; i < 3; ++i)
+    cn_by_theta.col(i) = relative.cRt * Vector3d::Unit(i).cross(tn);
+  cn_by_theta.col(3) = relative.cRt * tn_by_log_s;
+  const Vector3d cn = relative.cRt * tn;
+
+  // n . (x, y, 1) = 0 stays zero on a fixed row: dx = -(dn . (x, y, 1)) / n_x
+  Eigen::Matrix<double, 2, 4> J;
+  const double ends[2] = {static_cast<double>(line.row_begin), static_cast<double>(line.row_end - 1)};
+  for (int i = 0; i < 2; ++i)
+    J.row(i) = -camera.fx / cn.x() * camera.ray({line.xAt(ends[i]), ends[i]}).transpose() * cn_by_theta;
+  return J;
+}
+
+MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line)
+{
+  MeanGradient sum;
+  const int rows = line.rows();
+  if (rows == 0)
+    return sum;
+  const int cols = static_cast<int>(g.getCols());
+  const double step = rows > 1 ? 1.0 / (rows - 1) : 0;
+  for (int i = 0; i < rows; ++i) {
+    const double x = line.x_top + line.slope * i;
+    if (!(x >= 0 && x < cols - 1))
+      continue;
+    const int column = static_cast<int>(x);
+    const float *pixel = g[line.row_begin + i] + column;
+    const double slope = pixel[1] - pixel[0];
+    const double weight = i * step;
+    sum.mean += pixel[0] + (x - column) * slope;
+    sum.by_top += (1 - weight) * slope;
+    sum.by_bottom += weight * slope;
+  }
+  sum.mean /= rows;
+  sum.by_top /= rows;
+  sum.by_bottom /= rows;
+  return sum;
+}
+
+double meanAlongOnly(const vpImage<float> &g, const BorderLine &line)
+{
+  const int rows = line.rows();
+  const int cols = static_cast<int>(g.getCols());
+  double sum = 0;
+  for (int i = 0; i < rows; ++i) {
+    const double x = line.x_top + line.slope * i;
+    if (!(x >= 0 && x < cols - 1))
+      continue;
+    const int column = static_cast<int>(x);
+    const float *pixel = g[line.row_begin + i] + column;
+    sum += pixel[0] + (x - column) * (pixel[1] - pixel[0]);
+  }
+  return rows ? sum / rows : 0;
+}
+} // namespace bole

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/tracking/trunk_tracker.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlopt.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+void requireRange(const char *name, double value, double low, double high)
+{
+  if (!(value >= low && value <= high))
+    throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+}
+
+/// Step in each direction of the tangent that moves a border by about a pixel.
+Vector4d pixelScale(const PinholeCamera &camera, const RelativeTrunk &relative, int rows)
+{
+  return {2.0 / rows, 0.02, 1 / camera.fx, 1 / (camera.fx * relative.ratio())};
+}
+
+/// The image energy plus the prior on the tilt, in pixel-scaled coordinates round the start.
+struct Problem
+{
+  const TrunkEnergy &energy;
+  RelativeTrunk start;
+  Vector4d scale;
+  Vector4d tilt_at_start; ///< start (-) prediction; only the first two are held
+  double tilt_information;
+
+  double operator()(const Vector4d &xi, Vector4d *by_xi) const
+  {
+    const Vector4d step = scale.cwiseProduct(xi);
+    Vector4d f;
+    double e = energy.evaluate(start.plus(step), by_xi ? &f : nullptr);
+    const Eigen::Vector2d tilt = tilt_at_start.head<2>() + step.head<2>();
+    e += 0.5 * tilt_information * tilt.squaredNorm();
+    if (by_xi) {
+      f.head<2>() += tilt_information * tilt;
+      *by_xi = f.cwiseProduct(scale);
+    }
+    return e;
+  }
+};
+
+double evaluateProblem(unsigned, const double *x, double *gradient, void *data)
+{
+  const auto &problem = *static_cast<const Problem *>(data);
+  Vector4d by_xi;
+  const double e = problem(Vector4d(x), gradient ? &by_xi : nullptr);
+  if (gradient)
+    Vector4d::Map(gradient) = by_xi;
+  return e;
+}
+
+/// Minimum of the problem within +-bound pixels; false where NLopt gives up.
+bool minimise(Problem &problem, double bound_px, Vector4d &xi)
+{
+  const Vector4d upper = Vector4d::Constant(bound_px), lower = -upper;
+  nlopt_opt optimiser = nlopt_create(NLOPT_LD_SLSQP, 4);
+  nlopt_set_min_objective(optimiser, evaluateProblem, &problem);
+  nlopt_set_lower_bounds(optimiser, lower.data());
+  nlopt_set_upper_bounds(optimiser, upper.data());
+  nlopt_set_xtol_abs1(optimiser, 2e-3);
+  nlopt_set_maxeval(optimiser, 40);
+  double e = 0;
+  xi.setZero();
+  const nlopt_result result = nlopt_optimize(optimiser, xi.data(), &e);
+  nlopt_destroy(optimiser);
+  return (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && xi.allFinite() && std::isfinite(e);
+}
+
+struct VisibleBorder
+{
+  BorderLine line;
+  Eigen::Matrix<double, 1, 4> J_mid = Eigen::Matrix<double, 1, 4>::Zero(); ///< sideways move of its middle by theta^r
+  bool visible = false;
+};
+
+VisibleBorder look(const PinholeCamera &camera, const TrackingPrediction &prediction, Border border, int rows_min)
+{
+  VisibleBorder seen;
+  seen.line = borderLine(camera, prediction.relative, border, prediction.range);
+  const bool hidden = border == Border::left ? prediction.left_hidden : prediction.right_hidden;
+  seen.visible = !hidden && seen.line.rows() >= rows_min;
+  if (seen.line.rows() > 0)
+    seen.J_mid = borderJacobian(camera, prediction.relative, border, seen.line).colwise().mean();
+  return seen;
+}
+
+/// The relative trunk whose borders lie where the pair was found: bearing and r/d from two borders, the bearing
+/// alone from one.
+RelativeTrunk startFrom(const PeakPair &pair, const VisibleBorder &left, const VisibleBorder &right,
+                        const RelativeTrunk &predicted)
+{
+  Vector4d step = Vector4d::Zero();
+  if (left.visible && right.visible) {
+    Eigen::Matrix2d J;
+    J << left.J_mid.tail<2>(), right.J_mid.tail<2>();
+    step.tail<2>() = J.inverse() * Eigen::Vector2d(pair.left.offset_px, pair.right.offset_px);
+  }
+  else
+    step(2) = left.visible ? pair.left.offset_px / left.J_mid(2) : pair.right.offset_px / right.J_mid(2);
+  step(3) = std::clamp(step(3), -1.0, 1.0);
+  return predicted.plus(step);
+}
+
+Eigen::Matrix2d offsetCovariance(const VisibleBorder &left, const VisibleBorder &right, const Matrix4d &covariance)
+{
+  Eigen::Matrix<double, 2, 4> J;
+  J << left.J_mid, right.J_mid;
+  return J * covariance * J.transpose() + 0.5 * Eigen::Matrix2d::Identity(); // bow and noise: 0.7 px
+}
+} // namespace
+
+void TrackingOptions::validate() const
+{
+  energy.validate();
+  requireRange("tracking.scan_min_px", scan_min_px, 0.5, 20);
+  requireRange("tracking.scan_max_px", scan_max_px, 1, 60);
+  requireRange("tracking.scan_sigmas", scan_sigmas, 1, 10);
+  requireRange("tracking.contrast_min", contrast_min, 0, 0.5);
+  requireRange("tracking.rows_min", rows_min, 4, 1000);
+  requireRange("tracking.tilt_sigma", tilt_sigma, 0.001, 0.5);
+  requireRange("tracking.polish_max_px", polish_max_px, 0.5, 20);
+}
+
+const char *toString(TrackingStatus status)
+{
+  switch (status) {
+  case TrackingStatus::tracked:
+    return "tracked";
+  case TrackingStatus::not_visible:
+    return "not visible";
+  case TrackingStatus::occluded:
+    return "occluded";
+  case TrackingStatus::no_border:
+    return "no border";
+  case TrackingStatus::diverged:
+    return "diverged";
+  case TrackingStatus::negative_curvature:
+    return "negative curvature";
+  case TrackingStatus::sign_changed:
+    return "sign changed";
+  }
+  return "unknown";
+}
+
+TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera, const TrackingPrediction &prediction,
+                          const TrackingOptions &options)
+{
+  TrackingResult result;
+  result.optimum = prediction.relative;
+  const auto finish = [&result](TrackingStatus status) {
+    result.status = status;
+    return result;
+  };
+  if (!prediction.relative.isFinite() || !prediction.covariance.allFinite())
+    return finish(TrackingStatus::not_visible);
+  const VisibleBorder left = look(camera, prediction, Border::left, options.rows_min);
+  const VisibleBorder right = look(camera, prediction, Border::right, options.rows_min);
+  if (!left.visible && !right.visible)
+    return finish(prediction.left_hidden || prediction.right_hidden ? TrackingStatus::occluded
+                                                                  : TrackingStatus::not_visible);
+
+  // where the borders may be, and which pair of maxima they are
+  RelativeTrunk start = prediction.relative;
+  PeakPair pair;
+  if (options.scan) {
+    const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance);
+    const auto scan = [&](const VisibleBorder &border, double variance) {
+      const double width =
+          std::clamp(options.scan_sigmas * std::sqrt(variance), options.scan_min_px, options.scan_max_px);
+      return border.visible ? scanBorder(gradient.signed_x, border.line, width, options.contrast_min)
+                            : std::vector<ScanPeak>();
+    };
+    const auto left_peaks = scan(left, S(0, 0)), right_peaks = scan(right, S(1, 1));
+    if ((left.visible && left_peaks.empty()) || (right.visible && right_peaks.empty()))
+      return finish(TrackingStatus::no_border);
+    pair = pairPeaks(left_peaks, right_peaks, {S, prediction.left_contrast, prediction.right_contrast}, 1).front();
+    start = startFrom(pair, left, right, prediction.relative);
+    result.scan_cost = pair.cost;
+  }
+  else {
+    pair.left.contrast = meanAlongOnly(gradient.signed_x, left.line);
+    pair.right.contrast = meanAlongOnly(gradient.signed_x, right.line);
+  }
+  if (!start.isFinite())
+    return finish(TrackingStatus::diverged);
+
+  // polish
+  const TrunkEnergy energy(gradient, camera, prediction.range, {left.visible, std::abs(pair.left.contrast)},
+                           {right.visible, std::abs(pair.right.contrast)}, options.energy);
+  const double tilt_variance = options.tilt_sigma * options.tilt_sigma + prediction.covariance.diagonal()(0);
+  Problem problem{energy, start, pixelScale(camera, start, std::max(left.line.rows(), right.line.rows())),
+                  start.minus(prediction.relative), 1 / tilt_variance};
+  if (!left.visible || !right.visible)
+    problem.scale(3) = 1e-9; // one border says nothing of r/d beside the bearing
+  Vector4d xi;
+  if (!minimise(problem, 2 * options.polish_max_px, xi) || xi.tail<2>().norm() > options.polish_max_px)
+    return finish(TrackingStatus::diverged);
+
+  result.optimum = start.plus(problem.scale.cwiseProduct(xi));
+  result.left_used = left.visible;
+  result.right_used = right.visible;
+  result.left_contrast = left.visible ? energy.contrastAt(result.optimum, Border::left) : 0;
+  result.right_contrast = right.visible ? energy.contrastAt(result.optimum, Border::right) : 0;
+  result.energy = energy.evaluate(result.optimum, &result.f);
+  const auto curvature = energy.curvature(result.optimum);
+  result.F = curvature.F;
+  if (curvature.negative || !result.F.allFinite() || !result.optimum.isFinite())
+    return finish(TrackingStatus::negative_curvature);
+  const auto flipped = [](double now, const std::optional<double> &before) { return before && now * *before < 0; };
+  if (flipped(result.left_contrast, prediction.left_contrast) ||
+      flipped(result.right_contrast, prediction.right_contrast))
+    return finish(TrackingStatus::sign_changed);
+  return finish(TrackingStatus::tracked);
+}
+} // namespace bole
