@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What enters the pipeline: frames with a timestamp, a status, and the motion sensors' word on them.
+/// What enters the pipeline: frames with a timestamp, a status, and the motion sensors' word on
+/// them.
 
 #include <bole/geometry/camera.h>
 #include <bole/geometry/pose.h>
@@ -16,7 +17,8 @@
 namespace bole
 {
 /// What is known of a frame before anyone looks at its pixels.
-enum class FrameStatus {
+enum class FrameStatus
+{
   ok,
   stale,   ///< the same image again: a frozen camera or a decoder that repeats its last picture
   corrupt, ///< could not be decoded (whole or part): do not trust the pixels
@@ -37,12 +39,13 @@ struct Frame
   std::int64_t stamp_ns = 0;
   std::size_t index = 0; ///< position in the source, counted with missing frames
   FrameStatus status = FrameStatus::ok;
-  std::string message;               ///< why the status is not ok
-  vpImage<unsigned char> image;      ///< grey, rectified: the pinhole of FrameSource::camera() applies
-  std::optional<Pose> wMb_odometry;  ///< pose filter at this frame, where there is one
-  std::vector<GyroSample> gyro;      ///< samples since the frame before, oldest first
-  std::optional<double> height;      ///< of the body over the ground [m] (sonar), where there is one
-  std::optional<Pose> wMb_truth;     ///< ground truth, for pictures and evaluation only: no stage may read it
+  std::string message;          ///< why the status is not ok
+  vpImage<unsigned char> image; ///< grey, rectified: the pinhole of FrameSource::camera() applies
+  std::optional<Pose> wMb_odometry; ///< pose filter at this frame, where there is one
+  std::vector<GyroSample> gyro;     ///< samples since the frame before, oldest first
+  std::optional<double> height;     ///< of the body over the ground [m] (sonar), where there is one
+  std::optional<Pose>
+      wMb_truth; ///< ground truth, for pictures and evaluation only: no stage may read it
 };
 
 /// A stream of frames: a folder, a video, a live drone.
@@ -50,8 +53,9 @@ class FrameSource
 {
 public:
   virtual ~FrameSource() = default;
-  /// The next frame; false at the end. Broken frames come with a status, never as an exception; a user's
-  /// mistake (a missing folder, a bad calendar of stamps) throws vpException naming file and line.
+  /// The next frame; false at the end. Broken frames come with a status, never as an exception; a
+  /// user's mistake (a missing folder, a bad calendar of stamps) throws vpException naming file and
+  /// line.
   virtual bool next(Frame &frame) = 0;
   /// Pinhole of the rectified images.
   virtual PinholeCamera camera() const = 0;

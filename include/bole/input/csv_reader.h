@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Text tables: CSV and the blank-separated lines of TUM trajectories, read strictly.
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bole
+{
+/// What a table must look like.
+struct CsvFormat
+{
+  std::size_t min_columns = 1; ///< rows with fewer columns are an error
+  char separator = ',';        ///< ',' or ' ' (any run of blanks)
+  std::string header = {};     ///< the first line must be this; empty: no header but comments
+};
+
+/// Reads a table row by row. Lines that start with '#' and empty lines are skipped; every row has
+/// the number of columns of the first one.
+///
+/// Errors: every fault throws vpException "file:line: what, must be ...": a missing file, a wrong
+/// header, a wrong number of columns, a field that is not a whole or finite number, a stamp that
+/// goes back.
+///
+/// \code
+/// CsvReader csv("odom0/data.csv", {8});
+/// while (csv.next())
+///   use(csv.risingStampNs(0), csv.number(1, "x"));
+/// \endcode
+class CsvReader
+{
+public:
+  CsvReader(const std::string &path, CsvFormat format);
+
+  /// The next row; false at the end of the file.
+  bool next();
+  std::size_t columns() const { return m_fields.size(); }
+
+  const std::string &text(std::size_t column) const { return m_fields.at(column); }
+  /// A finite number; \p name is used in the error only.
+  double number(std::size_t column, std::string_view name) const;
+  std::int64_t integer(std::size_t column, std::string_view name) const;
+  /// Whole nanoseconds, later than those of the row before.
+  std::int64_t risingStampNs(std::size_t column);
+  /// Seconds with up to nine decimals as nanoseconds (exact), later than those of the row before.
+  std::int64_t risingStampFromSeconds(std::size_t column);
+
+  /// Throws vpException "file:line: message" at the current row.
+  [[noreturn]] void fail(const std::string &message) const;
+
+private:
+  void split(const std::string &line);
+  std::int64_t rising(std::int64_t stamp_ns);
+
+  std::string m_path;
+  CsvFormat m_format;
+  std::ifstream m_file;
+  std::size_t m_line = 0;
+  std::size_t m_rows = 0;
+  std::size_t m_columns = 0;
+  std::int64_t m_last_stamp_ns = 0;
+  std::vector<std::string> m_fields;
+};
+} // namespace bole

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "frame_builder.h"
+
+#include <bole/input/asl_source.h>
+#include <bole/input/csv_reader.h>
+
+#include <filesystem>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace fs = std::filesystem;
+namespace
+{
+struct Row
+{
+  std::int64_t stamp_ns;
+  std::string image_path;
+};
+
+fs::path sensorRoot(const std::string &folder)
+{
+  const fs::path path(folder);
+  return fs::is_directory(path / "mav0") ? path / "mav0" : path;
+}
+
+std::vector<Row> readImageRows(const fs::path &cam0)
+{
+  std::vector<Row> rows;
+  const std::string path = (cam0 / "data.csv").string();
+  CsvReader csv(path, {2});
+  while (csv.next()) {
+    const std::int64_t stamp_ns = csv.risingStampNs(0);
+    if (csv.text(1).empty())
+      csv.fail("filename is empty");
+    rows.push_back({stamp_ns, (cam0 / "data" / csv.text(1)).string()});
+  }
+  if (rows.empty())
+    throw vpException(vpException::ioError, fmt::format("{}: no image in it", path));
+  return rows;
+}
+
+std::vector<GyroSample> readGyro(const fs::path &imu0)
+{
+  std::vector<GyroSample> gyro;
+  if (!fs::exists(imu0 / "data.csv"))
+    return gyro;
+  const Eigen::Matrix3d bRs = readSensorPose((imu0 / "sensor.yaml").string()).R;
+  CsvReader csv((imu0 / "data.csv").string(), {4});
+  while (csv.next()) {
+    const std::int64_t stamp_ns = csv.risingStampNs(0);
+    gyro.push_back({stamp_ns, bRs * Eigen::Vector3d(csv.number(1, "w_x"), csv.number(2, "w_y"),
+                                                    csv.number(3, "w_z"))});
+  }
+  return gyro;
+}
+
+Trajectory readPoses(const fs::path &sensor)
+{
+  if (!fs::exists(sensor / "data.csv"))
+    return {};
+  const Pose sMb = readSensorPose((sensor / "sensor.yaml").string()).inverse();
+  Trajectory poses = readAslTrajectory((sensor / "data.csv").string());
+  for (StampedPose &pose : poses)
+    pose.wMb = pose.wMb * sMb;
+  return poses;
+}
+
+/// Size of the images: that of the first one that can be read, which must be the camera's.
+void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model,
+                       const std::string &camera_path)
+{
+  std::string first_fault;
+  for (const Row &row : rows) {
+    const ImageFile file = readImageFile(row.image_path);
+    if (file.status != FrameStatus::ok) {
+      first_fault = first_fault.empty() ? file.message : first_fault;
+      continue;
+    }
+    const int width = static_cast<int>(file.image.getWidth()),
+              height = static_cast<int>(file.image.getHeight());
+    if (width != model.pinhole.width || height != model.pinhole.height)
+      throw vpException(vpException::dimensionError,
+                        fmt::format("{}: image of {}x{} px, must be {}x{} as {} says",
+                                    row.image_path, width, height, model.pinhole.width,
+                                    model.pinhole.height, camera_path));
+    return;
+  }
+  throw vpException(vpException::ioError,
+                    fmt::format("none of the {} images can be read; {}", rows.size(), first_fault));
+}
+} // namespace
+
+struct AslSource::State
+{
+  std::string name;
+  std::vector<Row> rows;
+  std::size_t at = 0;
+  std::unique_ptr<FrameBuilder> builder;
+};
+
+AslSource::AslSource(const std::string &folder, const SourceOptions &options)
+    : m_state(std::make_unique<State>())
+{
+  options.validate();
+  if (!accepts(folder))
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: no ASL folder (cam0/data.csv is missing)", folder));
+  const fs::path root = sensorRoot(folder);
+  m_state->name = folder;
+  m_state->rows = readImageRows(root / "cam0");
+  const std::string camera_path =
+      options.camera_path.empty() ? (root / "cam0" / "sensor.yaml").string() : options.camera_path;
+  const MountedCamera camera = readCamera(camera_path);
+  requireCameraSize(m_state->rows, camera.model, camera_path);
+
+  Recording recording;
+  recording.odometry =
+      options.odometry_path.empty() ? readPoses(root / "odom0") : readOdometry(options);
+  requireOverlap(recording.odometry, m_state->rows.front().stamp_ns, m_state->rows.back().stamp_ns,
+                 options.odometry_path.empty() ? (root / "odom0" / "data.csv").string()
+                                               : options.odometry_path,
+                 folder);
+  recording.truth = readPoses(root / "state_groundtruth_estimate0");
+  recording.gyro = readGyro(root / "imu0");
+  m_state->builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
+}
+
+AslSource::~AslSource() = default;
+
+bool AslSource::next(Frame &frame)
+{
+  if (m_state->at >= m_state->rows.size())
+    return false;
+  const Row &row = m_state->rows[m_state->at++];
+  m_state->builder->build(row.stamp_ns, readImageFile(row.image_path), frame);
+  return true;
+}
+
+PinholeCamera AslSource::camera() const { return m_state->builder->camera(); }
+Pose AslSource::bMc() const { return m_state->builder->bMc(); }
+std::size_t AslSource::size() const { return m_state->rows.size(); }
+std::string AslSource::name() const { return m_state->name; }
+bool AslSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
+bool AslSource::hasGyro() const { return !m_state->builder->recording().gyro.empty(); }
+
+bool AslSource::accepts(const std::string &path)
+{
+  return fs::is_directory(path) && fs::is_regular_file(sensorRoot(path) / "cam0" / "data.csv");
+}
+} // namespace bole

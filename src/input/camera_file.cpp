@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "sensor_yaml.h"
+
+#include <bole/input/camera_file.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <visp3/core/vpException.h>
+#include <visp3/core/vpXmlParserCamera.h>
+
+namespace bole
+{
+namespace
+{
+const std::set<std::string> kCameraKeys = {
+    "sensor_type", "comment",      "T_BS",       "rate_hz",          "resolution",
+    "intrinsics",  "camera_model", "camera_fov", "distortion_model", "distortion_coefficients"};
+const std::set<std::string> kSensorKeys = {"sensor_type",
+                                           "comment",
+                                           "T_BS",
+                                           "rate_hz",
+                                           "gyroscope_noise_density",
+                                           "gyroscope_random_walk",
+                                           "accelerometer_noise_density",
+                                           "accelerometer_random_walk"};
+
+PinholeCamera readPinhole(const SensorYaml &yaml)
+{
+  if (yaml.has("camera_model") && yaml.text("camera_model") != "pinhole")
+    yaml.fail("camera_model", "pinhole");
+  const auto size = yaml.numbers("resolution");
+  const auto is_size = [](double v) { return v >= 8 && v <= 16384 && v == std::floor(v); };
+  if (size.size() != 2 || !is_size(size[0]) || !is_size(size[1]))
+    yaml.fail("resolution", "width and height in pixels, 8 to 16384");
+  const auto k = yaml.numbers("intrinsics");
+  if (k.size() != 4 || !(k[0] > 0) || !(k[1] > 0))
+    yaml.fail("intrinsics", "fx, fy, cx, cy in pixels with fx, fy > 0");
+  if (k[2] < -size[0] || k[2] > 2 * size[0] || k[3] < -size[1] || k[3] > 2 * size[1])
+    yaml.fail("intrinsics", "fx, fy, cx, cy with the principal point near the image");
+  return {k[0], k[1], k[2], k[3], static_cast<int>(size[0]), static_cast<int>(size[1])};
+}
+
+void readDistortion(const SensorYaml &yaml, CameraModel &model)
+{
+  const std::string name = yaml.has("distortion_model") ? yaml.text("distortion_model") : "none";
+  if (name == "none")
+    return;
+  std::size_t needed = 4;
+  if (name == "radial-tangential" || name == "radtan")
+    model.distortion = Distortion::radial_tangential;
+  else if (name == "equidistant")
+    model.distortion = Distortion::equidistant;
+  else if (name == "fov") {
+    model.distortion = Distortion::fov;
+    needed = 1;
+  }
+  else
+    yaml.fail("distortion_model", "none, radial-tangential, equidistant or fov");
+
+  auto k = yaml.numbers("distortion_coefficients");
+  if (needed == 4 && k.size() == 5 && k[4] == 0)
+    k.pop_back();
+  if (k.size() != needed)
+    yaml.fail("distortion_coefficients", fmt::format("{} numbers for {}", needed, name));
+  if (model.distortion == Distortion::fov && (k[0] < 0 || k[0] > 3))
+    yaml.fail("distortion_coefficients", "0 to 3 rad");
+  std::copy(k.begin(), k.end(), model.coefficients.begin());
+  if (std::all_of(k.begin(), k.end(), [](double v) { return v == 0; }))
+    model.distortion = Distortion::none;
+}
+
+MountedCamera readYaml(const std::string &path)
+{
+  const SensorYaml yaml(path, kCameraKeys);
+  MountedCamera camera;
+  camera.model.pinhole = readPinhole(yaml);
+  readDistortion(yaml, camera.model);
+  camera.bMc = yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : forwardCamera();
+  return camera;
+}
+
+/// Names of the cameras in ViSP's XML: its parser wants to be told the one it is to read.
+std::set<std::string> cameraNames(const std::string &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const std::regex pattern("<name>\\s*([^<]*?)\\s*</name>");
+  std::set<std::string> names;
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), pattern);
+       it != std::sregex_iterator(); ++it)
+    names.insert((*it)[1]);
+  return names;
+}
+
+bool readXmlModel(const std::string &path, const std::string &name, int width, int height,
+                  CameraModel &model)
+{
+  for (const auto type : {vpCameraParameters::perspectiveProjWithDistortion,
+                          vpCameraParameters::perspectiveProjWithoutDistortion}) {
+    vpXmlParserCamera parser;
+    vpCameraParameters cam;
+    if (parser.parse(cam, path, name, type, static_cast<unsigned>(width),
+                     static_cast<unsigned>(height)) != vpXmlParserCamera::SEQUENCE_OK)
+      continue;
+    model.pinhole = PinholeCamera::fromVisp(cam, static_cast<int>(parser.getWidth()),
+                                            static_cast<int>(parser.getHeight()));
+    if (type == vpCameraParameters::perspectiveProjWithDistortion && cam.get_kud() != 0) {
+      model.distortion = Distortion::radial_tangential;
+      model.coefficients = {{cam.get_kud(), 0, 0, 0}};
+    }
+    return true;
+  }
+  return false;
+}
+
+MountedCamera readXml(const std::string &path, int width, int height)
+{
+  MountedCamera camera{{}, forwardCamera()};
+  int found = 0;
+  for (const std::string &name : cameraNames(path))
+    found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
+  const std::string size = width > 0 ? fmt::format(" for {}x{} images", width, height) : "";
+  if (found != 1)
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: {} ViSP cameras{} in it, must be one", path, found, size));
+  PinholeCamera &pinhole = camera.model.pinhole;
+  if (pinhole.width == 0 || pinhole.height == 0) {
+    pinhole.width = width;
+    pinhole.height = height;
+  }
+  if (!(pinhole.fx > 0) || !(pinhole.fy > 0) || pinhole.width <= 0 || pinhole.height <= 0)
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: px, py, image_width and image_height must be > 0", path));
+  return camera;
+}
+} // namespace
+
+Pose forwardCamera()
+{
+  Eigen::Matrix3d bRc;
+  bRc << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return Pose(bRc, Eigen::Vector3d::Zero());
+}
+
+MountedCamera readCamera(const std::string &path, int width, int height)
+{
+  if (!std::filesystem::is_regular_file(path))
+    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension == ".xml")
+    return readXml(path, width, height);
+  if (extension == ".yaml" || extension == ".yml")
+    return readYaml(path);
+  throw vpException(vpException::ioError,
+                    fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
+}
+
+Pose readSensorPose(const std::string &path)
+{
+  if (!std::filesystem::exists(path))
+    return Pose();
+  const SensorYaml yaml(path, kSensorKeys);
+  return yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : Pose();
+}
+} // namespace bole

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/input/csv_reader.h>
+
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+std::string_view trimmed(std::string_view text)
+{
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos)
+    return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+/// Seconds in decimal notation as nanoseconds, without a detour through floating point.
+bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
+{
+  const auto point = text.find('.');
+  const std::string_view whole = text.substr(0, point);
+  std::string fraction(point == std::string_view::npos ? "" : text.substr(point + 1));
+  if (whole.empty() || fraction.find_first_not_of("0123456789") != std::string::npos)
+    return false;
+  fraction = (fraction + "000000000").substr(0, 9);
+  std::int64_t seconds = 0, nanoseconds = 0;
+  const auto end = whole.data() + whole.size();
+  if (std::from_chars(whole.data(), end, seconds).ptr != end || std::abs(seconds) > 9'000'000'000)
+    return false;
+  std::from_chars(fraction.data(), fraction.data() + fraction.size(), nanoseconds);
+  stamp_ns = seconds * 1'000'000'000 + (whole.front() == '-' ? -nanoseconds : nanoseconds);
+  return true;
+}
+} // namespace
+
+CsvReader::CsvReader(const std::string &path, CsvFormat format)
+    : m_path(path), m_format(std::move(format))
+{
+  if (!std::filesystem::is_regular_file(path))
+    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+  m_file.open(path, std::ios::binary);
+  if (!m_file)
+    throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
+  if (m_format.header.empty())
+    return;
+  std::string line;
+  std::getline(m_file, line);
+  m_line = 1;
+  if (trimmed(line) != m_format.header)
+    fail(fmt::format("the header is \"{}\", must be \"{}\"", trimmed(line).substr(0, 120),
+                     m_format.header));
+}
+
+void CsvReader::fail(const std::string &message) const
+{
+  throw vpException(vpException::ioError, fmt::format("{}:{}: {}", m_path, m_line, message));
+}
+
+void CsvReader::split(const std::string &line)
+{
+  m_fields.clear();
+  std::size_t begin = 0;
+  while (begin <= line.size()) {
+    if (m_format.separator == ' ') {
+      begin = line.find_first_not_of(" \t", begin);
+      if (begin == std::string::npos)
+        break;
+    }
+    const std::size_t end =
+        std::min(m_format.separator == ' ' ? line.find_first_of(" \t", begin)
+                                           : line.find(m_format.separator, begin),
+                 line.size());
+    m_fields.emplace_back(trimmed(std::string_view(line).substr(begin, end - begin)));
+    begin = end + 1;
+  }
+}
+
+bool CsvReader::next()
+{
+  std::string line;
+  while (std::getline(m_file, line)) {
+    ++m_line;
+    const std::string_view content = trimmed(line);
+    if (content.empty() || content.front() == '#')
+      continue;
+    split(std::string(content));
+    if (m_fields.size() < m_format.min_columns)
+      fail(fmt::format("{} columns, must be {}", m_fields.size(), m_format.min_columns));
+    if (m_rows > 0 && m_fields.size() != m_columns)
+      fail(fmt::format("{} columns, must be {} as in the rows before", m_fields.size(), m_columns));
+    m_columns = m_fields.size();
+    ++m_rows;
+    return true;
+  }
+  if (m_file.bad())
+    fail("cannot be read");
+  return false;
+}
+
+double CsvReader::number(std::size_t column, std::string_view name) const
+{
+  const std::string &field = m_fields.at(column);
+  const char *begin = field.data() + (!field.empty() && field.front() == '+' ? 1 : 0);
+  const char *end = field.data() + field.size();
+  double value = 0;
+  const auto result = std::from_chars(begin, end, value);
+  if (begin == end || result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
+    fail(fmt::format("{} = \"{}\", must be a finite number", name, field));
+  return value;
+}
+
+std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
+{
+  const std::string &field = m_fields.at(column);
+  std::int64_t value = 0;
+  const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (field.empty() || result.ec != std::errc() || result.ptr != field.data() + field.size())
+    fail(fmt::format("{} = \"{}\", must be a whole number", name, field));
+  return value;
+}
+
+std::int64_t CsvReader::rising(std::int64_t stamp_ns)
+{
+  if (m_rows > 1 && stamp_ns <= m_last_stamp_ns)
+    fail(fmt::format("timestamp = {} ns, must be later than the {} ns of the row before", stamp_ns,
+                     m_last_stamp_ns));
+  m_last_stamp_ns = stamp_ns;
+  return stamp_ns;
+}
+
+std::int64_t CsvReader::risingStampNs(std::size_t column)
+{
+  return rising(integer(column, "timestamp"));
+}
+
+std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
+{
+  std::int64_t stamp_ns = 0;
+  if (!parseSeconds(m_fields.at(column), stamp_ns))
+    // Scientific notation, as numpy.savetxt writes it: exact enough after rounding for stamps below
+    // 2^53 ns.
+    stamp_ns = std::llround(number(column, "timestamp") * 1e9);
+  return rising(stamp_ns);
+}
+} // namespace bole

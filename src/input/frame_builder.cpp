@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "frame_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+bool samePixels(const vpImage<unsigned char> &a, const vpImage<unsigned char> &b)
+{
+  return a.getSize() == b.getSize() && a.getWidth() == b.getWidth() && a.getSize() > 0 &&
+         std::memcmp(a.bitmap, b.bitmap, a.getSize()) == 0;
+}
+} // namespace
+
+FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options,
+                           Recording recording)
+    : m_rectifier(camera.model, options.max_width_px),
+      m_bMc(camera.bMc),
+      m_recording(std::move(recording)),
+      m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9))
+{
+}
+
+void FrameBuilder::judge(ImageFile &file)
+{
+  if (file.image.getSize() == 0)
+    return;
+  const int width = static_cast<int>(file.image.getWidth()),
+            height = static_cast<int>(file.image.getHeight());
+  if (width != m_rectifier.inputWidth() || height != m_rectifier.inputHeight()) {
+    file.status = FrameStatus::resized;
+    file.message = fmt::format("image of {}x{} px, must be {}x{}", width, height,
+                               m_rectifier.inputWidth(), m_rectifier.inputHeight());
+    file.image.resize(0, 0);
+    return;
+  }
+  if (file.status == FrameStatus::ok && samePixels(file.image, m_last_image)) {
+    file.status = FrameStatus::stale;
+    file.message = "the same image as before";
+  }
+  if (file.status == FrameStatus::ok)
+    m_last_image = file.image;
+}
+
+void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
+{
+  judge(file);
+  frame = Frame();
+  frame.stamp_ns = stamp_ns;
+  frame.index = m_index++;
+  frame.status = file.status;
+  frame.message = std::move(file.message);
+  frame.image = std::move(file.image);
+  if (frame.image.getSize() > 0)
+    m_rectifier.apply(frame.image);
+  frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns, m_max_gap_ns);
+  frame.wMb_truth = interpolate(m_recording.truth, stamp_ns, m_max_gap_ns);
+
+  const auto &gyro = m_recording.gyro;
+  for (; m_gyro_at < gyro.size() && gyro[m_gyro_at].stamp_ns <= stamp_ns; ++m_gyro_at)
+    if (m_last_stamp_ns && gyro[m_gyro_at].stamp_ns > *m_last_stamp_ns)
+      frame.gyro.push_back(gyro[m_gyro_at]);
+  m_last_stamp_ns = stamp_ns;
+}
+
+Trajectory readOdometry(const SourceOptions &options)
+{
+  if (options.odometry_path.empty())
+    return {};
+  Trajectory odometry = readTrajectory(options.odometry_path);
+  for (StampedPose &pose : odometry)
+    pose.stamp_ns += std::llround(options.odometry_offset_s * 1e9);
+  return odometry;
+}
+
+void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int64_t last_ns,
+                    const std::string &odometry_path, const std::string &source)
+{
+  if (odometry.empty() ||
+      (odometry.front().stamp_ns <= last_ns && odometry.back().stamp_ns >= first_ns))
+    return;
+  throw vpException(
+      vpException::badValue,
+      fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s "
+                  "(odometry_offset_s shifts them)",
+                  odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9,
+                  source, first_ns * 1e-9, last_ns * 1e-9));
+}
+
+MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note)
+{
+  if (options.camera_path.empty()) {
+    const double f = 0.5 * width / std::tan(0.5 * options.field_of_view_deg * M_PI / 180);
+    note = fmt::format("no camera file: assuming a field of view of {:g} degrees (f = {:.0f} px)",
+                       options.field_of_view_deg, f);
+    CameraModel model;
+    model.pinhole = {f, f, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
+    return {model, forwardCamera()};
+  }
+  const MountedCamera camera = readCamera(options.camera_path, width, height);
+  const PinholeCamera &pinhole = camera.model.pinhole;
+  if (pinhole.width != width || pinhole.height != height)
+    throw vpException(vpException::dimensionError,
+                      fmt::format("{}: resolution = {}x{}, must be {}x{} as the images are",
+                                  options.camera_path, pinhole.width, pinhole.height, width,
+                                  height));
+  return camera;
+}
+} // namespace bole

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
+
+#include "image_file.h"
+
+#include <bole/input/camera_file.h>
+#include <bole/input/frame.h>
+#include <bole/input/rectifier.h>
+#include <bole/input/source_options.h>
+#include <bole/input/trajectory.h>
+
+#include <optional>
+
+namespace bole
+{
+/// Motion sensors of a recording; each may be empty.
+struct Recording
+{
+  Trajectory odometry;
+  Trajectory truth;
+  std::vector<GyroSample> gyro;
+};
+
+/// Judges images (stale, resized), rectifies them and adds what the motion sensors said.
+class FrameBuilder
+{
+public:
+  FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording);
+
+  /// Fills \p frame from the raw image \p file taken at \p stamp_ns. Stamps must rise from call to
+  /// call.
+  void build(std::int64_t stamp_ns, ImageFile file, Frame &frame);
+
+  const PinholeCamera &camera() const { return m_rectifier.camera(); }
+  const Pose &bMc() const { return m_bMc; }
+  const Recording &recording() const { return m_recording; }
+
+private:
+  void judge(ImageFile &file);
+
+  Rectifier m_rectifier;
+  Pose m_bMc;
+  Recording m_recording;
+  std::int64_t m_max_gap_ns;
+  vpImage<unsigned char> m_last_image; ///< raw pixels of the last readable image
+  std::optional<std::int64_t> m_last_stamp_ns;
+  std::size_t m_gyro_at = 0;
+  std::size_t m_index = 0;
+};
+
+/// Reads the odometry file of \p options, shifted by its offset; empty when none is given.
+Trajectory readOdometry(const SourceOptions &options);
+
+/// Throws vpException when no pose of \p odometry falls in [\p first_ns, \p last_ns].
+void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int64_t last_ns,
+                    const std::string &odometry_path, const std::string &source);
+
+/// The camera of \p options for images of this size, checked against it; without a camera file one
+/// that looks straight ahead with the assumed field of view, which \p note then says.
+MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note);
+} // namespace bole

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Strict reading of the keys of an EuRoC sensor.yaml.
+
+#include <bole/geometry/pose.h>
+
+#include <set>
+#include <string>
+#include <vector>
+#include <yaml-cpp/yaml.h>
+
+namespace bole
+{
+/// A YAML map of which every key is known. Errors are "file:line: key = value, must be ...".
+class SensorYaml
+{
+public:
+  SensorYaml(const std::string &path, const std::set<std::string> &known_keys);
+
+  bool has(const std::string &key) const { return static_cast<bool>(m_root[key]); }
+  std::string text(const std::string &key) const;
+  std::vector<double> numbers(const std::string &key) const;
+  /// 4x4 rigid motion under \p key, as {cols, rows, data: [16 numbers]} or a list of four rows.
+  Pose rigidMotion(const std::string &key) const;
+  [[noreturn]] void fail(const std::string &key, const std::string &must_be) const;
+
+private:
+  YAML::Node at(const std::string &key) const;
+
+  std::string m_path;
+  YAML::Node m_root;
+};
+} // namespace bole

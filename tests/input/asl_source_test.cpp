@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "flight_folder.h"
+
+#include <bole/input/asl_source.h>
+
+#include <gmock/gmock.h>
+#include <visp3/core/vpException.h>
+
+using namespace bole;
+using bole::test::FlightFolder;
+using testing::HasSubstr;
+
+namespace
+{
+std::string messageOf(const std::function<void()> &action)
+{
+  try {
+    action();
+  }
+  catch (const vpException &error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::vector<Frame> readAll(FrameSource &source)
+{
+  std::vector<Frame> frames;
+  for (Frame frame; source.next(frame);)
+    frames.push_back(frame);
+  return frames;
+}
+} // namespace
+
+TEST(AslSource, DeliversEveryFrameWithStampPixelsOdometryAndGyro)
+{
+  const FlightFolder flight(5);
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_EQ(source.size(), 5u);
+  EXPECT_TRUE(source.hasOdometry());
+  EXPECT_TRUE(source.hasGyro());
+  EXPECT_EQ(source.camera().width, 64);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].status, FrameStatus::ok) << frames[i].message;
+    EXPECT_EQ(frames[i].index, i);
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 100000000);
+    EXPECT_EQ(frames[i].image.getWidth(), 64u);
+    EXPECT_EQ(frames[i].image[3][5], FlightFolder::pixel(i, 3, 5));
+    ASSERT_TRUE(frames[i].wMb_odometry);
+    EXPECT_NEAR(frames[i].wMb_odometry->t.x(), 0.1 * static_cast<double>(i), 1e-9);
+    EXPECT_EQ(frames[i].gyro.size(), i == 0 ? 0u : 10u);
+  }
+  EXPECT_EQ(frames[2].gyro.front().stamp_ns, 110000000);
+  EXPECT_EQ(frames[2].gyro.back().stamp_ns, 200000000);
+}
+
+TEST(AslSource, TakesTheSequenceOrItsMav0)
+{
+  const FlightFolder flight(2);
+  AslSource source(flight.path() + "/mav0");
+  EXPECT_EQ(readAll(source).size(), 2u);
+}
+
+TEST(AslSource, TurnsBrokenImagesIntoStatuses)
+{
+  FlightFolder flight(6);
+  flight.removeImage(1);
+  flight.truncateImage(2, 100);
+  flight.writeImage(3, 32, 24);
+  flight.copyImage(4, 5);
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+
+  ASSERT_EQ(frames.size(), 6u);
+  const FrameStatus expected[] = {FrameStatus::ok,      FrameStatus::missing, FrameStatus::corrupt,
+                                  FrameStatus::resized, FrameStatus::ok,      FrameStatus::stale};
+  for (std::size_t i = 0; i < 6; ++i)
+    EXPECT_EQ(frames[i].status, expected[i]) << i << " " << frames[i].message;
+  for (std::size_t i = 1; i <= 3; ++i) {
+    EXPECT_EQ(frames[i].image.getSize(), 0u);
+    EXPECT_FALSE(frames[i].message.empty());
+    EXPECT_TRUE(frames[i].wMb_odometry);
+  }
+}
+
+TEST(AslSource, EveryTruncationOfAPngIsCorrupt)
+{
+  for (const std::size_t size : {0u, 1u, 8u, 20u, 33u, 60u, 200u, 400u}) {
+    FlightFolder flight(2);
+    flight.truncateImage(1, size);
+    AslSource source(flight.path());
+    EXPECT_EQ(readAll(source)[1].status, FrameStatus::corrupt) << size;
+  }
+}
+
+TEST(AslSource, AFlippedByteInAPngIsCorrupt)
+{
+  FlightFolder flight(2);
+  flight.flipByte(1, 300);
+  AslSource source(flight.path());
+  EXPECT_EQ(readAll(source)[1].status, FrameStatus::corrupt);
+}
+
+TEST(AslSource, LeavesOdometryAbsentOutsideItsRangeAndInterpolatesWithin)
+{
+  FlightFolder flight(5);
+  flight.write("mav0/odom0/data.csv", "150000000,0.15,0,1,1,0,0,0\n350000000,0.35,0,1,1,0,0,0\n");
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+
+  EXPECT_FALSE(frames[0].wMb_odometry);
+  EXPECT_FALSE(frames[1].wMb_odometry);
+  ASSERT_TRUE(frames[2].wMb_odometry);
+  EXPECT_NEAR(frames[2].wMb_odometry->t.x(), 0.2, 1e-12);
+  EXPECT_FALSE(frames[4].wMb_odometry);
+}
+
+TEST(AslSource, NamesFileAndLineOfAFaultyRow)
+{
+  struct Case
+  {
+    const char *file, *text, *message;
+  };
+  const Case cases[] = {
+      {"mav0/odom0/data.csv", "#h\n0,0,0,1,1,0,0,0\n100000000,nan,0,1,1,0,0,0\n",
+       "odom0/data.csv:3: x = \"nan\""},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n0,0,0,1,1,0,0,0\n",
+       "odom0/data.csv:2: timestamp = 0 ns"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,1,0,0\n", "odom0/data.csv:1: norm of the quaternion"},
+      {"mav0/odom0/data.csv", "0,0,0,1\n", "odom0/data.csv:1: 4 columns, must be 8"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0,7\n100000000,0,0,1,1,0,0,0\n",
+       "odom0/data.csv:2: 8 columns, must be 9"},
+      {"mav0/odom0/data.csv", "", "odom0/data.csv: no pose"},
+      {"mav0/odom0/data.csv", "900000000000,0,0,1,1,0,0,0\n", "never meet"},
+      {"mav0/imu0/data.csv", "0,0,0,inf\n", "imu0/data.csv:1: w_z = \"inf\""},
+      {"mav0/imu0/data.csv", "0.5,0,0,0\n", "imu0/data.csv:1: timestamp = \"0.5\""},
+      {"mav0/cam0/data.csv", "100,a.png\n50,b.png\n", "cam0/data.csv:2: timestamp = 50 ns"},
+      {"mav0/cam0/data.csv", "#nothing\n", "cam0/data.csv: no image"},
+      {"mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\nfoo: 1\n",
+       "sensor.yaml:3: unknown key \"foo\""},
+      {"mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 50, 31.5]\n",
+       "sensor.yaml:2: intrinsics = [50, 50, 31.5], must be"},
+      {"mav0/cam0/sensor.yaml", "resolution: [65, 48]\nintrinsics: [50, 50, 31.5, 23.5]\n",
+       "image of 64x48 px, must be 65x48"},
+      {"mav0/cam0/sensor.yaml", "resolution: [64, 48\n", "sensor.yaml:2:"},
+  };
+  for (const Case &c : cases) {
+    FlightFolder flight(3);
+    flight.write(c.file, c.text);
+    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message))
+        << c.text;
+  }
+}
+
+TEST(AslSource, RefusesFoldersThatAreNoFlight)
+{
+  const FlightFolder flight(1);
+  EXPECT_THAT(messageOf([&] { AslSource source(flight.path() + "/none"); }),
+              HasSubstr("no ASL folder"));
+  FlightFolder blind(2);
+  blind.removeImage(0);
+  blind.removeImage(1);
+  EXPECT_THAT(messageOf([&] { AslSource source(blind.path()); }),
+              HasSubstr("none of the 2 images"));
+}
+
+TEST(AslSource, ReadsTheRenderedFlight)
+{
+  const std::string folder = BOLE_SHARED_DATA_DIR "/rendered/park-forward";
+  if (!AslSource::accepts(folder))
+    GTEST_SKIP() << folder << " is absent";
+  AslSource source(folder);
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 120u);
+  for (const Frame &frame : frames) {
+    EXPECT_EQ(frame.status, FrameStatus::ok);
+    ASSERT_TRUE(frame.wMb_odometry && frame.wMb_truth);
+    EXPECT_LT((frame.wMb_odometry->t - frame.wMb_truth->t).norm(), 2);
+    EXPECT_EQ(frame.gyro.size(), frame.index == 0 ? 0u : 20u);
+  }
+}
