@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The drone's clocks: unwrapped, and fitted to the host's.
+
+#include <cstdint>
+#include <optional>
+
+namespace bole
+{
+/// Turns a counter that wraps into one that does not.
+///
+/// A stamp is taken as the nearest to the one before: up to half the period ahead or behind, so packets out
+/// of order are no wrap. Law (a test): differences of stamps less than half a period apart are exact.
+class ClockUnwrapper
+{
+public:
+  /// \param period of the counter, in its unit.
+  explicit ClockUnwrapper(std::int64_t period) : m_period(period) {}
+  std::int64_t unwrap(std::int64_t stamp);
+  void reset() { m_last.reset(); }
+
+private:
+  std::int64_t m_period;
+  std::optional<std::int64_t> m_last;
+};
+
+/// Microseconds in the navdata's time word: 11 bits of seconds, 21 bits of microseconds.
+std::int64_t navdataTimeMicroseconds(std::uint32_t time);
+/// The inverse, for the emulator: \p microseconds since any start, reduced to the 2048 s that the word holds.
+std::uint32_t navdataTimeWord(std::int64_t microseconds);
+constexpr std::int64_t kNavdataTimePeriod_us = 2048LL * 1'000'000;
+constexpr std::int64_t kPaveTimePeriod_ms = std::int64_t{1} << 32;
+
+/// Offset between a drone's clock and the host's, from packets that arrive late by an unknown, varying time.
+///
+/// Idea: arrival minus stamp is the offset plus a delay that is never negative, so its running minimum is
+/// the offset plus the shortest delay. The minimum is let rise by the largest drift between two quartz
+/// clocks, so that it follows one that falls behind. A jump beyond \p jump_s is a reboot: it starts anew.
+class ClockFit
+{
+public:
+  struct Options
+  {
+    double drift = 200e-6; ///< [s/s] largest drift of two cheap quartz clocks, (1e-6, 1e-2)
+    double jump_s = 5;     ///< [s] beyond any delay of a link that still works, (0.1, 100)
+    void validate() const;
+  };
+  ClockFit();
+  explicit ClockFit(const Options &options);
+
+  /// \return false when the drone's clock jumped and the fit began anew.
+  bool add(std::int64_t drone_ns, std::int64_t host_ns);
+  bool isReady() const { return m_offset_ns.has_value(); }
+  std::int64_t toHost(std::int64_t drone_ns) const { return drone_ns + m_offset_ns.value_or(0); }
+  std::int64_t toDrone(std::int64_t host_ns) const { return host_ns - m_offset_ns.value_or(0); }
+  void reset() { m_offset_ns.reset(); }
+
+private:
+  Options m_options;
+  std::optional<std::int64_t> m_offset_ns;
+  std::int64_t m_last_host_ns = 0;
+};
+} // namespace bole

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/drone_clock.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+std::int64_t ClockUnwrapper::unwrap(std::int64_t stamp)
+{
+  if (!m_last) {
+    m_last = stamp;
+    return stamp;
+  }
+  std::int64_t step = (stamp - *m_last) % m_period;
+  if (step > m_period / 2)
+    step -= m_period;
+  if (step < -(m_period / 2))
+    step += m_period;
+  m_last = *m_last + step;
+  return *m_last;
+}
+
+std::int64_t navdataTimeMicroseconds(std::uint32_t time)
+{
+  return std::int64_t{time >> 21} * 1'000'000 + (time & 0x1fffff);
+}
+
+std::uint32_t navdataTimeWord(std::int64_t microseconds)
+{
+  std::int64_t reduced = microseconds % kNavdataTimePeriod_us;
+  if (reduced < 0)
+    reduced += kNavdataTimePeriod_us;
+  return static_cast<std::uint32_t>(reduced / 1'000'000) << 21 | static_cast<std::uint32_t>(reduced % 1'000'000);
+}
+
+void ClockFit::Options::validate() const
+{
+  if (!(drift > 1e-6 && drift < 1e-2))
+    throw vpException(vpException::badValue, "drift = %g, must be in (1e-6, 1e-2) s/s", drift);
+  if (!(jump_s > 0.1 && jump_s < 100))
+    throw vpException(vpException::badValue, "jump_s = %g, must be in (0.1, 100) s", jump_s);
+}
+
+ClockFit::ClockFit() : ClockFit(Options{}) {}
+ClockFit::ClockFit(const Options &options) : m_options(options) { m_options.validate(); }
+
+bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
+{
+  const std::int64_t offset = host_ns - drone_ns;
+  const bool first = !m_offset_ns;
+  const bool jump = !first && std::abs(static_cast<double>(offset - *m_offset_ns)) > m_options.jump_s * 1e9;
+  if (first || jump) {
+    m_offset_ns = offset;
+  }
+  else {
+    const double elapsed_ns = static_cast<double>(std::max<std::int64_t>(0, host_ns - m_last_host_ns));
+    *m_offset_ns = std::min(offset, *m_offset_ns + static_cast<std::int64_t>(m_options.drift * elapsed_ns));
+  }
+  m_last_host_ns = host_ns;
+  return !jump;
+}
+} // namespace bole

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/drone_clock.h>
+
+#include <gtest/gtest.h>
+#include <random>
+
+using namespace bole;
+
+TEST(ClockUnwrapper, CountsOnWhereTheCounterWraps)
+{
+  ClockUnwrapper clock(kPaveTimePeriod_ms);
+  const std::int64_t start = 4294967290;
+  EXPECT_EQ(clock.unwrap(start), start);
+  EXPECT_EQ(clock.unwrap(4), start + 10);
+  EXPECT_EQ(clock.unwrap(4294967295), start + 5); // out of order across the wrap
+  EXPECT_EQ(clock.unwrap(100), start + 106);
+}
+
+TEST(ClockUnwrapper, KeepsNavdataTimeGoingForThreeHours)
+{
+  ClockUnwrapper clock(kNavdataTimePeriod_us);
+  std::int64_t first = 0;
+  for (std::int64_t time_us = 0; time_us < 3LL * 3600 * 1'000'000; time_us += 777'777) {
+    const std::int64_t seen = clock.unwrap(navdataTimeMicroseconds(navdataTimeWord(2'000'000'000 + time_us)));
+    if (time_us == 0)
+      first = seen;
+    ASSERT_EQ(seen - first, time_us);
+  }
+}
+
+TEST(ClockFit, FindsTheOffsetUnderJitterAndDrift)
+{
+  std::mt19937 random(3);
+  std::exponential_distribution<double> delay(1 / 0.01);
+  for (const double drift : {-50e-6, 0.0, 50e-6}) {
+    ClockFit fit;
+    double largest = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const double host = i * 0.005;
+      const auto drone_ns = static_cast<std::int64_t>(1e9 * (host * (1 + drift) - 123));
+      fit.add(drone_ns, static_cast<std::int64_t>(1e9 * (host + 0.002 + delay(random))));
+      if (i > 2000)
+        largest = std::max(largest, std::abs(static_cast<double>(fit.toHost(drone_ns)) * 1e-9 - host - 0.002));
+    }
+    EXPECT_LT(largest, 0.002) << "drift " << drift;
+  }
+}
+
+TEST(ClockFit, StartsAnewAfterAReboot)
+{
+  ClockFit fit;
+  EXPECT_TRUE(fit.add(1'000'000'000'000, 5'000'000'000));
+  EXPECT_FALSE(fit.add(0, 6'000'000'000));
+  EXPECT_EQ(fit.toHost(1'000'000), 6'001'000'000);
+  EXPECT_EQ(fit.toDrone(6'001'000'000), 1'000'000);
+}
