@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/so3.h>
+#include <bole/saliency/saliency.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr double kLeastTexture = 0.002; // share of textured pixels that a rotation needs
+constexpr double kMaxTurnOffGyro = 0.05; // [rad]; further than any gyro errs within a frame
+
+const SaliencyOptions &validated(const SaliencyOptions &options)
+{
+  options.validate();
+  return options;
+}
+
+int workingLevel(const PinholeCamera &camera, const SaliencyOptions &options)
+{
+  int level = 0;
+  for (int size = std::min(camera.width, camera.height); level < options.finest_level && size >= 32; size /= 2)
+    ++level;
+  return level;
+}
+
+PinholeCamera workingCamera(const PinholeCamera &camera, int level)
+{
+  PinholeCamera result = camera;
+  for (int i = 0; i < level; ++i) {
+    const int width = result.width / 2, height = result.height / 2;
+    result = result.scaled(0.5);
+    result.width = width;
+    result.height = height;
+  }
+  return result;
+}
+
+/// \p small at the size of the full image, bilinear; pixel centres respected.
+vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCamera &camera)
+{
+  if (level == 0)
+    return small;
+  vpImage<float> result(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width));
+  const float scale = std::ldexp(1.f, -level);
+  const int rows = static_cast<int>(small.getHeight()), columns = static_cast<int>(small.getWidth());
+  std::vector<int> column(static_cast<std::size_t>(camera.width));
+  std::vector<float> share(column.size());
+  for (int j = 0; j < camera.width; ++j) {
+    const float x = std::clamp((j + 0.5f) * scale - 0.5f, 0.f, columns - 1.001f);
+    column[static_cast<std::size_t>(j)] = static_cast<int>(x);
+    share[static_cast<std::size_t>(j)] = x - std::floor(x);
+  }
+  for (int i = 0; i < camera.height; ++i) {
+    const float y = std::clamp((i + 0.5f) * scale - 0.5f, 0.f, rows - 1.001f);
+    const int row = static_cast<int>(y);
+    const float b = y - row, *p = small[row], *q = small[row + 1];
+    float *out = result[i];
+    for (std::size_t j = 0; j < column.size(); ++j) {
+      const int c = column[j];
+      const float upper = p[c] + share[j] * (p[c + 1] - p[c]), lower = q[c] + share[j] * (q[c + 1] - q[c]);
+      out[j] = upper + b * (lower - upper);
+    }
+  }
+  return result;
+}
+
+double meanDeviation(const Eigen::Matrix3d &covariance)
+{
+  return std::sqrt(std::max(covariance.trace(), 0.0) / 3);
+}
+} // namespace
+
+const char *toString(SaliencyStatus status)
+{
+  switch (status) {
+  case SaliencyStatus::first_frame:
+    return "first frame";
+  case SaliencyStatus::with_gyro:
+    return "with gyro";
+  case SaliencyStatus::without_gyro:
+    return "without gyro";
+  case SaliencyStatus::no_texture:
+    return "no texture";
+  case SaliencyStatus::stale:
+    return "stale";
+  case SaliencyStatus::not_converged:
+    return "not converged";
+  }
+  return "unknown";
+}
+
+SaliencyEstimator::SaliencyEstimator(const PinholeCamera &camera, const SaliencyOptions &options)
+  : m_camera(camera), m_options(validated(options)),
+    m_evidence(workingCamera(camera, workingLevel(camera, options)), workingLevel(camera, options), options)
+{}
+
+void SaliencyEstimator::reset()
+{
+  m_views.clear();
+  m_evidence.clear();
+  m_last_image.resize(0, 0);
+  m_last = {};
+  m_last_turn.setIdentity();
+  m_has_pending_motion = false;
+}
+
+Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const std::optional<RotationPrior> &gyro,
+                                   const std::optional<TranslationPrior> &translation)
+{
+  if (static_cast<int>(image.getWidth()) != m_camera.width || static_cast<int>(image.getHeight()) != m_camera.height)
+    throw vpException(vpException::dimensionError,
+                      fmt::format("saliency: image of {} x {} pixels, must be {} x {}", image.getWidth(),
+                                  image.getHeight(), m_camera.width, m_camera.height)
+                          .c_str());
+  addMotion(gyro, translation);
+  if (isStale(image)) {
+    Saliency result = m_last;
+    result.status = SaliencyStatus::stale;
+    result.pRc.setIdentity();
+    result.covariance.setZero();
+    return result;
+  }
+  Saliency result;
+  result.unknown_below = static_cast<float>(m_options.unknown_below);
+  View view{ImagePyramid(image, m_camera, m_options.levels, m_options.finest_level), {}};
+  if (m_views.empty()) {
+    vpImage<float> none(static_cast<unsigned>(m_camera.height), static_cast<unsigned>(m_camera.width));
+    none = m_evidence.priorLogOdds();
+    result.confidence = none;
+    fill(none, m_evidence.priorLogOdds(), result);
+  }
+  else {
+    const RotationEm rotation = refineRotation(view.pyramid, result);
+    if (m_options.use_translation && m_translation) {
+      view.vMc = m_views.front().vMc * Pose(result.pRc, m_translation->pt);
+      m_views.push_front(std::move(view));
+      labelByRange(m_views.front().pyramid, result);
+    }
+    else {
+      labelByMotion(rotation, result);
+      m_views.clear();
+      m_evidence.clear();
+    }
+    m_last_turn = result.pRc;
+  }
+  if (m_views.empty())
+    m_views.push_front(std::move(view));
+  while (static_cast<int>(m_views.size()) > m_options.max_frames_apart + 1)
+    m_views.pop_back();
+  m_last_image = image;
+  m_last = result;
+  m_has_pending_motion = false;
+  return result;
+}
+
+bool SaliencyEstimator::isStale(const vpImage<unsigned char> &image) const
+{
+  return m_last_image.getSize() == image.getSize() &&
+         std::memcmp(m_last_image.bitmap, image.bitmap, image.getSize()) == 0;
+}
+
+void SaliencyEstimator::addMotion(const std::optional<RotationPrior> &gyro,
+                                  const std::optional<TranslationPrior> &translation)
+{
+  const bool usable_gyro = gyro && gyro->pRc.allFinite() && gyro->covariance.allFinite();
+  const bool usable_translation = translation && translation->pt.allFinite() && translation->covariance.allFinite();
+  if (!m_has_pending_motion) {
+    m_gyro = usable_gyro ? gyro : std::nullopt;
+    m_translation = usable_translation ? translation : std::nullopt;
+  }
+  else {
+    if (m_translation && usable_translation) {
+      // Images were stale in between: the way goes on from where the last rotation ended.
+      const Eigen::Matrix3d turned = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
+      m_translation->pt += turned * translation->pt;
+      m_translation->covariance += turned * translation->covariance * turned.transpose();
+    }
+    else
+      m_translation.reset();
+    if (m_gyro && usable_gyro) {
+      m_gyro->covariance = gyro->pRc.transpose() * m_gyro->covariance * gyro->pRc + gyro->covariance;
+      m_gyro->pRc = m_gyro->pRc * gyro->pRc;
+    }
+    else
+      m_gyro.reset();
+  }
+  m_has_pending_motion = true;
+}
+
+RotationEm SaliencyEstimator::refineRotation(const ImagePyramid &current, Saliency &result) const
+{
+  const RotationEm rotation = estimateRotation(m_views.front().pyramid, current, m_gyro, m_last_turn, m_options);
+  const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
+  result.iterations = rotation.iterations;
+  result.pRc = rotation.pRc;
+  result.covariance = rotation.covariance;
+  result.status = m_gyro ? SaliencyStatus::with_gyro : SaliencyStatus::without_gyro;
+  const bool off_gyro = m_gyro && logSo3(fallback.transpose() * rotation.pRc).norm() > kMaxTurnOffGyro;
+  if (rotation.texture < kLeastTexture)
+    result.status = SaliencyStatus::no_texture;
+  else if (!rotation.pRc.allFinite() || !rotation.covariance.allFinite() || off_gyro)
+    result.status = SaliencyStatus::not_converged;
+  if (result.status == SaliencyStatus::no_texture || result.status == SaliencyStatus::not_converged) {
+    result.pRc = fallback;
+    result.covariance = m_gyro ? m_gyro->covariance : Eigen::Matrix3d(Eigen::Matrix3d::Identity() * 0.1);
+  }
+  return rotation;
+}
+
+void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &result)
+{
+  const int level = workingLevel(m_camera, m_options);
+  const PyramidLevel &now = current[level];
+  m_evidence.predict(m_views[1].vMc.inverse() * m_views[0].vMc);
+  const double enough = m_options.min_parallax_px;
+  for (std::size_t apart = 1; apart < m_views.size(); ++apart) {
+    const Pose oMc = m_views[apart].vMc.inverse() * m_views[0].vMc;
+    result.frames_apart = static_cast<int>(apart);
+    result.parallax_px = medianParallax(m_camera, oMc, m_options.near_range);
+    if (result.parallax_px < enough && apart + 1 < m_views.size())
+      continue;
+    const MotionNoise noise{meanDeviation(result.covariance) * std::sqrt(static_cast<double>(apart)),
+                            meanDeviation(m_translation->covariance)};
+    m_evidence.add(m_views[apart].pyramid[level], now, oMc, noise);
+    break;
+  }
+  result.asks_for_range = true;
+  result.inverse_depth = enlarged(m_evidence.inverseDepth(), level, m_camera);
+  fill(enlarged(m_evidence.logOddsNear(), level, m_camera), m_evidence.priorLogOdds(), result);
+}
+
+void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &result) const
+{
+  const double prior = m_options.background_prior;
+  const float prior_log_odds = static_cast<float>(std::log((1 - prior) / prior));
+  vpImage<float> log_odds = enlarged(rotation.log_ratio, workingLevel(m_camera, m_options), m_camera);
+  for (unsigned p = 0; p < log_odds.getSize(); ++p)
+    log_odds.bitmap[p] = prior_log_odds - log_odds.bitmap[p];
+  fill(log_odds, prior_log_odds, result);
+}
+
+void SaliencyEstimator::fill(const vpImage<float> &log_odds_near, float prior_log_odds, Saliency &result) const
+{
+  result.p_background.resize(log_odds_near.getHeight(), log_odds_near.getWidth());
+  result.confidence.resize(log_odds_near.getHeight(), log_odds_near.getWidth());
+  unsigned unknown = 0;
+  for (unsigned p = 0; p < log_odds_near.getSize(); ++p) {
+    const float odds = log_odds_near.bitmap[p];
+    result.p_background.bitmap[p] = 1.f / (1.f + std::exp(std::clamp(odds, -80.f, 80.f)));
+    result.confidence.bitmap[p] = std::abs(odds - prior_log_odds);
+    unknown += result.confidence.bitmap[p] < result.unknown_below;
+  }
+  result.unknown_share = static_cast<double>(unknown) / std::max(1u, log_odds_near.getSize());
+}
+} // namespace bole

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "synthetic.h"
+
+#include <bole/geometry/so3.h>
+#include <bole/saliency/saliency.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+using support::paint;
+using support::WallAndPost;
+
+const PinholeCamera kCamera{200, 200, 159.5, 119.5, 320, 240};
+const Pose kStill;
+
+TranslationPrior moved(const Eigen::Vector3d &pt, double sigma = 0.005)
+{
+  return {pt, Eigen::Matrix3d::Identity() * sigma * sigma};
+}
+
+RotationPrior turned(const Eigen::Matrix3d &pRc, double sigma = 1e-3)
+{
+  return {pRc, Eigen::Matrix3d::Identity() * sigma * sigma};
+}
+
+double errorDegrees(const Eigen::Matrix3d &A, const Eigen::Matrix3d &B)
+{
+  return logSo3(A.transpose() * B).norm() * 180 / M_PI;
+}
+
+void expectSound(const Saliency &saliency)
+{
+  ASSERT_EQ(saliency.p_background.getSize(), 320u * 240u);
+  for (unsigned p = 0; p < saliency.p_background.getSize(); ++p) {
+    ASSERT_GE(saliency.p_background.bitmap[p], 0.f); // false for NaN
+    ASSERT_LE(saliency.p_background.bitmap[p], 1.f);
+    ASSERT_TRUE(std::isfinite(saliency.confidence.bitmap[p]));
+  }
+  EXPECT_TRUE(saliency.pRc.allFinite());
+  EXPECT_TRUE(saliency.covariance.allFinite());
+}
+
+TEST(Saliency, FindsARenderedRotationWithoutGyro)
+{
+  const WallAndPost scene;
+  const Eigen::Matrix3d turn = expSo3({0.01, -0.04, 0.02});
+  SaliencyEstimator estimator(kCamera);
+  estimator.update(scene.view(kStill));
+
+  const Saliency saliency = estimator.update(scene.view(Pose(turn, {0, 0, 0})));
+
+  EXPECT_EQ(saliency.status, SaliencyStatus::without_gyro);
+  EXPECT_LT(errorDegrees(turn, saliency.pRc), 0.03);
+}
+
+TEST(Saliency, LabelsAPatchThatMovesOtherwiseThanTheBackground)
+{
+  WallAndPost scene;
+  scene.post_width = 0.6;
+  const Eigen::Matrix3d turn = expSo3({0, 0.01, 0});
+  SaliencyEstimator estimator(kCamera);
+  estimator.update(scene.view(kStill), turned(Eigen::Matrix3d::Identity()));
+  const Pose now(turn, {0.06, 0, 0}); // the post moves by 4 px, the wall by 0.3
+
+  const Saliency saliency = estimator.update(scene.view(now), turned(turn));
+
+  double post = 0, wall = 0, posts = 0, walls = 0;
+  for (int v = 20; v < 220; ++v)
+    for (int u = 20; u < 300; ++u) {
+      const bool on = scene.onPost(now, u, v);
+      (on ? post : wall) += saliency.p_background[v][u];
+      ++(on ? posts : walls);
+    }
+  EXPECT_LT(post / posts, 0.55);
+  EXPECT_GT(wall / walls, 0.75);
+}
+
+TEST(Saliency, LabelsANearPostByItsRangeWhereTheTranslationIsGiven)
+{
+  WallAndPost scene;
+  scene.post_width = 0.6;
+  SaliencyEstimator estimator(kCamera);
+  Saliency saliency;
+  Pose wMc;
+  for (int frame = 0; frame < 6; ++frame) {
+    const Eigen::Vector3d step(frame > 0 ? 0.08 : 0, 0, 0);
+    wMc.t += step;
+    saliency = estimator.update(scene.view(wMc), turned(Eigen::Matrix3d::Identity()), moved(step));
+  }
+
+  EXPECT_TRUE(saliency.asks_for_range);
+  double post = 0, wall = 0, posts = 0, walls = 0, rho = 0;
+  for (int v = 20; v < 220; ++v)
+    for (int u = 20; u < 300; ++u) {
+      const bool on = scene.onPost(wMc, u, v);
+      (on ? post : wall) += saliency.p_background[v][u];
+      rho += on ? saliency.inverse_depth[v][u] : 0;
+      ++(on ? posts : walls);
+    }
+  EXPECT_LT(post / posts, 0.1);
+  EXPECT_GT(wall / walls, 0.9);
+  EXPECT_NEAR(rho / posts, 1 / scene.post_depth, 0.05);
+}
+
+TEST(Saliency, NeverLeavesZeroToOneOnExtremeImages)
+{
+  SaliencyEstimator estimator(kCamera);
+  SaliencyEstimator paper(kCamera, SaliencyOptions::paper());
+  std::mt19937 random(3);
+  const auto noise = [&](int, int) { return random() % 2 ? 1.0 : 0.0; };
+  const auto black = [](int, int) { return 0.0; };
+  const auto white = [](int, int) { return 1.0; };
+  const auto checks = [](int u, int v) { return (u / 8 + v / 8) % 2 ? 1.0 : 0.0; };
+  const auto inverted = [](int u, int v) { return (u / 8 + v / 8) % 2 ? 0.0 : 1.0; };
+  for (const std::function<double(int, int)> &value :
+       std::vector<std::function<double(int, int)>>{black, white, noise, noise, checks, inverted, black}) {
+    const auto image = paint(kCamera, value);
+    expectSound(estimator.update(image, turned(expSo3({0, 0.05, 0})), moved({0.1, 0, 0.2})));
+    expectSound(paper.update(image, turned(expSo3({0, 0.05, 0}))));
+  }
+}
+
+TEST(Saliency, KnowsNothingOfABlankImage)
+{
+  SaliencyEstimator estimator(kCamera);
+  const Eigen::Matrix3d turn = expSo3({0, 0.02, 0});
+  estimator.update(paint(kCamera, [](int, int) { return 0.5; }));
+
+  const Saliency saliency =
+      estimator.update(paint(kCamera, [](int, int) { return 0.51; }), turned(turn), moved({0.1, 0, 0}));
+
+  EXPECT_EQ(saliency.status, SaliencyStatus::no_texture);
+  EXPECT_EQ(saliency.unknown_share, 1);
+  EXPECT_LT(errorDegrees(turn, saliency.pRc), 1e-6);
+}
+
+TEST(Saliency, KeepsItsLabelsOnAFrozenFrameAndItsMotionForTheNext)
+{
+  const WallAndPost scene;
+  SaliencyEstimator estimator(kCamera);
+  const Eigen::Matrix3d turn = expSo3({0, 0.01, 0}), I = Eigen::Matrix3d::Identity();
+  estimator.update(scene.view(kStill), turned(I), moved({0, 0, 0}));
+  const auto image = scene.view(Pose(I, {0.05, 0, 0}));
+  const Saliency before = estimator.update(image, turned(I), moved({0.05, 0, 0}));
+
+  const Saliency frozen = estimator.update(image, turned(turn), moved({0.05, 0, 0}));
+  const Saliency after =
+      estimator.update(scene.view(Pose(turn * turn, {0.15, 0, 0})), turned(turn), moved(turn.transpose() * Eigen::Vector3d(0.05, 0, 0)));
+
+  EXPECT_EQ(frozen.status, SaliencyStatus::stale);
+  EXPECT_TRUE(std::equal(before.p_background.bitmap, before.p_background.bitmap + before.p_background.getSize(),
+                         frozen.p_background.bitmap));
+  EXPECT_LT(errorDegrees(turn * turn, after.pRc), 0.05);
+}
+
+TEST(Saliency, RefusesAnImageOfAnotherSize)
+{
+  SaliencyEstimator estimator(kCamera);
+  EXPECT_THROW(estimator.update(vpImage<unsigned char>(10, 10)), vpException);
+}
+
+TEST(SaliencyOptions, AnOptionOutOfRangeIsNamed)
+{
+  SaliencyOptions options;
+  options.evidence_decay = 1.5;
+  try {
+    SaliencyEstimator estimator(kCamera, options);
+    FAIL() << "accepted";
+  }
+  catch (const vpException &error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("saliency.evidence_decay = 1.5, must be within [0, 1]"));
+  }
+}
+
+TEST(SaliencyOptions, ThePaperPresetIsValid)
+{
+  EXPECT_NO_THROW(SaliencyOptions::paper().validate());
+}
+} // namespace
+} // namespace bole
