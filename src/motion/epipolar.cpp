@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "epipolar.h"
+
+#include <bole/geometry/so3.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace bole
+{
+double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
+                       const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J)
+{
+  const Eigen::Vector3d p = aRb * x_b;
+  const Eigen::Vector3d line_a = direction.cross(p);                        // E x_b
+  const Eigen::Vector3d line_b = aRb.transpose() * x_a.cross(direction);    // E^T x_a
+  const double algebraic = x_a.dot(line_a);
+  const double S = line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24;
+  const double inverse_root = 1 / std::sqrt(S);
+  if (J != nullptr) {
+    const Matrix32d B = directionBasis(direction);
+    Eigen::Matrix<double, 3, 5> d_line_a, d_line_b;
+    const Eigen::Matrix3d d_p = -aRb * skew(x_b);
+    d_line_a << skew(direction) * d_p, -skew(p) * B;
+    d_line_b << skew(line_b), aRb.transpose() * skew(x_a) * B;
+    const Eigen::Matrix<double, 1, 5> d_S = line_a.head<2>().transpose() * d_line_a.topRows<2>() +
+                                            line_b.head<2>().transpose() * d_line_b.topRows<2>();
+    *J = inverse_root * (x_a.transpose() * d_line_a - (algebraic / S) * d_S);
+  }
+  return algebraic * inverse_root;
+}
+} // namespace bole
+
+namespace bole::motion
+{
+Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
+{
+  a.reserve(matches.size());
+  b.reserve(matches.size());
+  for (const PointMatch &match : matches) {
+    a.push_back(camera.ray(match.a_px));
+    b.push_back(camera.ray(match.b_px));
+  }
+}
+
+MotionPrior::MotionPrior(const RelativePosePrior &prior)
+{
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  if (prior.aRb) {
+    aRb = *prior.aRb;
+    has_rotation = true;
+    rotation_information = (prior.rotation_covariance + 1e-14 * I).ldlt().solve(I);
+  }
+  if (prior.translation && prior.translation->norm() > 1e-9) {
+    const double length = prior.translation->norm();
+    direction = *prior.translation / length;
+    const Matrix32d B = directionBasis(direction);
+    // The larger of the two tangent variances; beyond 0.6 rad a Gaussian on the sphere says nothing.
+    const Eigen::Matrix2d tangent = B.transpose() * prior.translation_covariance * B / (length * length);
+    const double variance = 0.5 * tangent.trace() + 1e-10;
+    has_direction = true;
+    direction_information = variance < 0.36 ? 1 / variance : 0;
+  }
+}
+
+double bulkSigma(std::vector<double> residuals)
+{
+  if (residuals.empty()) {
+    return 0;
+  }
+  for (double &r : residuals) {
+    r = std::abs(r);
+  }
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  double sigma = 1.4826 * *middle;
+  for (int round = 0; round < 3; ++round) {
+    double sum = 0;
+    int n = 0;
+    for (double r : residuals) {
+      if (r <= 2.5 * sigma) {
+        sum += r * r;
+        ++n;
+      }
+    }
+    if (n > 0) {
+      sigma = std::sqrt(sum / n) / 0.9546; // a normal distribution cut at 2.5 sigma
+    }
+  }
+  return sigma;
+}
+
+namespace
+{
+/// Flow of one match that a rotation leaves, in the image of a, and its derivative by the rotation.
+Eigen::Vector2d transferResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
+                                 Eigen::Matrix<double, 2, 3> *J)
+{
+  const Eigen::Vector3d p = aRb * x_b;
+  const double z = std::max(p.z(), 1e-3);
+  const Eigen::Vector2d at = p.head<2>() / z;
+  if (J != nullptr) {
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << 1 / z, 0, -at.x() / z, 0, 1 / z, -at.y() / z;
+    *J = projection * aRb * skew(x_b);
+  }
+  return x_a.head<2>() - at;
+}
+} // namespace
+
+RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma, const RelativePoseOptions &options)
+{
+  RotationFit fit;
+  fit.aRb = prior.aRb;
+  fit.weights.assign(rays.size(), 0);
+  std::vector<double> residuals(2 * rays.size());
+  for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const Eigen::Vector2d e = transferResidual(rays.a[i], rays.b[i], fit.aRb, nullptr);
+      residuals[2 * i] = e.x();
+      residuals[2 * i + 1] = e.y();
+    }
+    fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
+    const double variance = 2 * fit.sigma * fit.sigma;
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      Eigen::Matrix<double, 2, 3> J;
+      const Eigen::Vector2d e = transferResidual(rays.a[i], rays.b[i], fit.aRb, &J);
+      const double w = weightOf(e.norm() / std::sqrt(variance), options.kernel);
+      fit.weights[i] = w;
+      H += (w / variance / options.inflation) * J.transpose() * J;
+      g += (w / variance / options.inflation) * J.transpose() * e;
+    }
+    fit.information = H + prior.rotation_information;
+    g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
+    const Eigen::Vector3d step = -(fit.information + 1e-9 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
+    fit.aRb = orthonormalized(fit.aRb * expSo3(step));
+    if (step.norm() < 1e-7) {
+      break;
+    }
+  }
+  return fit;
+}
+
+namespace
+{
+Motion moved(const Motion &motion, const Vector5d &xi)
+{
+  return {orthonormalized(motion.aRb * expSo3(xi.head<3>())), directionPlus(motion.direction, xi.tail<2>())};
+}
+
+double priorCost(const Motion &motion, const MotionPrior &prior)
+{
+  const Eigen::Vector3d phi = logSo3(prior.aRb.transpose() * motion.aRb);
+  const Eigen::Vector2d tau = directionMinus(prior.direction, motion.direction);
+  return 0.5 * phi.dot(prior.rotation_information * phi) + 0.5 * prior.direction_information * tau.squaredNorm();
+}
+
+double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
+              const RelativePoseOptions &options)
+{
+  double cost = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    cost += costOf(sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction) / sigma, options.kernel);
+  }
+  return cost / options.inflation + priorCost(motion, prior);
+}
+
+/// Information and gradient of the matches at \p motion, inflation not applied.
+void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H, Vector5d &g)
+{
+  H.setZero();
+  g.setZero();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    Eigen::Matrix<double, 1, 5> J;
+    const double r = sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction, &J) / sigma;
+    const double w = weightOf(r, kernel);
+    J /= sigma;
+    H += w * J.transpose() * J;
+    g += (w * r) * J.transpose();
+  }
+}
+
+/// Levenberg-Marquardt with a fixed sigma.
+void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const RelativePoseOptions &options)
+{
+  double damping = 1e-4;
+  fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
+  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+    Vector5d g;
+    linearize(rays, fit.motion, fit.sigma, options.kernel, fit.information, g);
+    Matrix5d H = fit.information / options.inflation;
+    g /= options.inflation;
+    H.topLeftCorner<3, 3>() += prior.rotation_information;
+    H(3, 3) += prior.direction_information;
+    H(4, 4) += prior.direction_information;
+    g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
+    g.tail<2>() -= prior.direction_information * directionMinus(prior.direction, fit.motion.direction);
+    bool better = false;
+    Vector5d step = Vector5d::Zero();
+    for (int attempt = 0; attempt < 4 && !better; ++attempt) {
+      Matrix5d damped = H;
+      damped.diagonal() += damping * H.diagonal() + Vector5d::Constant(1e-9);
+      step = -damped.ldlt().solve(g);
+      if (step.tail<2>().norm() > 0.5) {
+        step *= 0.5 / step.tail<2>().norm();
+      }
+      const Motion tried = moved(fit.motion, step);
+      const double cost = costAt(rays, tried, prior, fit.sigma, options);
+      better = cost <= fit.cost;
+      damping = better ? std::max(1e-7, damping * 0.2) : std::max(1e-3, damping * 10);
+      if (better) {
+        fit.motion = tried;
+        fit.cost = cost;
+      }
+    }
+    if (!better || step.norm() < 1e-6) {
+      break;
+    }
+  }
+}
+} // namespace
+
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
+                   const RelativePoseOptions &options)
+{
+  JointFit fit;
+  fit.motion = start;
+  fit.sigma = sigma;
+  std::vector<double> residuals(rays.size());
+  for (int round = 0; round < 3; ++round) {
+    descend(rays, fit, prior, options);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      residuals[i] = sampsonResidual(rays.a[i], rays.b[i], fit.motion.aRb, fit.motion.direction);
+    }
+    const double before = fit.sigma;
+    fit.sigma = std::max(min_sigma, bulkSigma(residuals));
+    if (std::abs(fit.sigma - before) < 0.02 * before) {
+      break;
+    }
+  }
+  fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
+  Vector5d g;
+  linearize(rays, fit.motion, fit.sigma, options.kernel, fit.information, g);
+  return fit;
+}
+
+Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel)
+{
+  double along = 0, across = 0, sum = 0, agreement = 0, squares = 0;
+  std::vector<double> lengths;
+  lengths.reserve(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Eigen::Vector3d p = motion.aRb * rays.b[i];
+    if (p.z() < 0.05) {
+      continue;
+    }
+    const Eigen::Vector2d at = p.head<2>() / p.z();
+    const Eigen::Vector2d flow = rays.a[i].head<2>() - at;
+    lengths.push_back(flow.norm());
+    // A point of positive depth is seen from a further along the direction than from b.
+    const Eigen::Vector2d line = (motion.direction.head<2>() - at * motion.direction.z()).normalized();
+    const double w = weightOf(sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction) / sigma, kernel);
+    const double u = flow.dot(line) / sigma, v = (flow.x() * line.y() - flow.y() * line.x()) / sigma;
+    along += w * std::min(u * u, 400.0);
+    across += w * v * v;
+    sum += w;
+    const double vote = std::clamp(0.5 * u, -1.0, 1.0);
+    agreement += w * vote;
+    squares += w * w * vote * vote;
+  }
+  Parallax parallax;
+  if (lengths.empty() || sum <= 0) {
+    return parallax;
+  }
+  parallax.ratio = along / std::max(across, 1e-3 * sum);
+  parallax.score = agreement / std::sqrt(std::max(squares, 1e-12));
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  parallax.median = *middle;
+  return parallax;
+}
+
+namespace
+{
+/// Direction that two matches allow once the rotation is known: both epipolar planes contain it.
+std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i, std::size_t j,
+                                                 const Eigen::Matrix3d &aRb)
+{
+  const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]), normal_j = rays.a[j].cross(aRb * rays.b[j]);
+  const Eigen::Vector3d d = normal_i.cross(normal_j);
+  if (d.norm() < 1e-12) {
+    return std::nullopt;
+  }
+  return d.normalized();
+}
+
+Rays drawn(const Rays &rays, std::mt19937 &random, std::size_t n)
+{
+  Rays sample;
+  std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = draw(random);
+    sample.a.push_back(rays.a[k]);
+    sample.b.push_back(rays.b[k]);
+  }
+  return sample;
+}
+} // namespace
+
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
+                                 const RelativePoseOptions &options)
+{
+  std::mt19937 random(options.seed);
+  std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
+  const bool rotation_known = prior.has_rotation;
+  RelativePoseOptions few = options;
+  few.iterations = 5;
+  MotionPrior free = prior;
+  free.direction_information = 0;
+  std::vector<std::pair<double, Motion>> scored;
+  for (int hypothesis = 0; hypothesis < options.hypotheses; ++hypothesis) {
+    Motion motion{aRb, prior.direction};
+    if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
+      motion.direction = *d;
+    }
+    if (!rotation_known) {
+      JointFit fit;
+      fit.motion = motion;
+      fit.sigma = 3 * sigma;
+      descend(drawn(rays, random, 6), fit, free, few);
+      motion = fit.motion;
+    }
+    scored.emplace_back(costAt(rays, motion, free, sigma, options), motion);
+  }
+  if (prior.has_direction) {
+    scored.emplace_back(costAt(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
+  }
+  std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
+  std::vector<Motion> starts;
+  for (const auto &[cost, motion] : scored) {
+    const bool seen = std::any_of(starts.begin(), starts.end(), [&motion = motion](const Motion &other) {
+      return std::abs(other.direction.dot(motion.direction)) > 0.95;
+    });
+    if (!seen) {
+      starts.push_back(motion);
+    }
+    if (starts.size() == (rotation_known ? 3u : 5u)) {
+      break;
+    }
+  }
+  return starts;
+}
+} // namespace bole::motion
