@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// The pieces of estimateRelativePose(): matches as rays, robust weights, the rotation-only fit, the joint
-/// fit and the statistics of parallax.
+/// The pieces of estimateRelativePose(): matches as rays, robust weights, the rotation-only fit,
+/// the joint fit and the statistics of parallax.
 
 #include <bole/motion/relative_pose.h>
 
@@ -46,7 +46,8 @@ inline double weightOf(double u, double c)
 }
 inline double costOf(double u, double c) { return 0.5 * u * u / (1 + u * u / (c * c)); }
 
-/// Standard deviation of the bulk of \p residuals: median, then the spread of those within 2.5 sigmas.
+/// Standard deviation of the bulk of \p residuals: median, then the spread of those within 2.5
+/// sigmas.
 double bulkSigma(std::vector<double> residuals);
 
 /// Rotation alone, all points taken as infinitely far.
@@ -54,10 +55,11 @@ struct RotationFit
 {
   Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< with the prior [1/rad^2]
-  double sigma = 0;                                      ///< of one coordinate of one image [normalised]
+  double sigma = 0; ///< of one coordinate of one image [normalised]
   std::vector<double> weights;
 };
-RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma, const RelativePoseOptions &options);
+RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
+                        const RelativePoseOptions &options);
 
 /// Rotation and direction together. \p sigma is refined on the way.
 struct JointFit
@@ -66,10 +68,11 @@ struct JointFit
   Matrix5d information = Matrix5d::Zero(); ///< of the matches alone, inflation not applied
   double sigma = 0, cost = 0;
 };
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
-                   const RelativePoseOptions &options);
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma,
+                   double min_sigma, const RelativePoseOptions &options);
 
-/// Flow that is left when the rotation is taken out, along and across the epipolar lines [normalised].
+/// Flow that is left when the rotation is taken out, along and across the epipolar lines
+/// [normalised].
 struct Parallax
 {
   double ratio = 0;  ///< mean square along / across
@@ -79,6 +82,7 @@ struct Parallax
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel);
 
 /// Starts for fitMotion(): the prior's direction and the best of two-point directions.
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
+                                 const MotionPrior &prior, double sigma,
                                  const RelativePoseOptions &options);
 } // namespace bole::motion

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/motion/point_motion.h>
+
+#include "require.h"
+
+#include <algorithm>
+
+namespace bole
+{
+void PointMotionOptions::validate() const
+{
+  points.validate();
+  relative_pose.validate();
+  gyro.validate();
+  for (int back : frames_back) {
+    motion::require(back >= 1 && back < points.history, "motion.frames_back", back,
+                    "in 1 .. points.history - 1");
+  }
+  motion::require(odometry_sigma.minCoeff() > 0, "motion.odometry_sigma", odometry_sigma.minCoeff(),
+                  "above 0");
+  motion::require(odometry_relative_sigma > 0, "motion.odometry_relative_sigma",
+                  odometry_relative_sigma, "above 0");
+}
+
+PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc,
+                         const PointMotionOptions &options)
+    : m_camera(camera), m_bMc(bMc), m_options(options), m_tracker(camera, options.points)
+{
+  options.validate();
+  m_bias = GyroBias::unknown(options.gyro);
+}
+
+std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
+{
+  if (m_options.use_gyro) {
+    m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
+  }
+  std::vector<RelativeMotion> motions;
+  if (frame.status != FrameStatus::ok) {
+    return motions;
+  }
+  Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
+  if (!m_seen.empty()) {
+    if (const auto turned = gyroSince(m_seen.back().stamp_ns, frame.stamp_ns)) {
+      expected = m_bMc.R.transpose() * turned->R * m_bMc.R;
+    }
+  }
+  m_tracker.track(frame.image, expected);
+  m_seen.push_back(
+      {frame.stamp_ns, frame.index, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
+  if (m_seen.size() > static_cast<std::size_t>(m_options.points.history)) {
+    m_seen.pop_front();
+  }
+  const auto recent = std::find_if(m_gyro.begin(), m_gyro.end(), [this](const GyroSample &sample) {
+    return sample.stamp_ns >= m_seen.front().stamp_ns;
+  });
+  if (recent - m_gyro.begin() > 1) { // one sample before the oldest frame helps its rate
+    m_gyro.erase(m_gyro.begin(), recent - 1);
+  }
+  for (int back : m_options.frames_back) {
+    if (static_cast<std::size_t>(back) < m_seen.size()) {
+      motions.push_back(relativeTo(back));
+    }
+  }
+  if (!motions.empty()) {
+    learnBias(*std::max_element(motions.begin(), motions.end(),
+                                [](const RelativeMotion &x, const RelativeMotion &y) {
+                                  return x.frames_back < y.frames_back;
+                                }));
+  }
+  return motions;
+}
+
+std::optional<GyroRotation> PointMotion::gyroSince(std::int64_t from_ns, std::int64_t to_ns) const
+{
+  if (m_gyro.empty() || m_gyro.back().stamp_ns <= from_ns) {
+    return std::nullopt;
+  }
+  return integrateGyro(m_gyro, from_ns, to_ns, m_bias, m_options.gyro);
+}
+
+RelativeMotion PointMotion::relativeTo(int frames_back) const
+{
+  const Seen &a = *(m_seen.rbegin() + frames_back), &b = m_seen.back();
+  RelativeMotion step;
+  step.frames_back = frames_back;
+  step.a_ns = a.stamp_ns;
+  step.b_ns = b.stamp_ns;
+  step.a_index = a.index;
+  step.b_index = b.index;
+  RelativePosePrior prior;
+  step.gyro = gyroSince(a.stamp_ns, b.stamp_ns);
+  if (step.gyro) {
+    prior.aRb = m_bMc.R.transpose() * step.gyro->R * m_bMc.R;
+    prior.rotation_covariance = m_bMc.R.transpose() * step.gyro->covariance() * m_bMc.R;
+  }
+  if (a.wMb && b.wMb) {
+    const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
+    step.odometry = (wMa.inverse() * wMb).t;
+    prior.translation = step.odometry;
+    const Eigen::Matrix3d world = m_options.odometry_sigma.cwiseAbs2().asDiagonal();
+    const double relative = m_options.odometry_relative_sigma * step.odometry->norm();
+    prior.translation_covariance =
+        wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
+  }
+  step.estimate = estimateRelativePose(m_tracker.matches(frames_back), m_camera, prior,
+                                       m_options.relative_pose);
+  return step;
+}
+
+void PointMotion::learnBias(const RelativeMotion &step)
+{
+  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() ||
+      step.a_ns < m_bias_until_ns) {
+    return;
+  }
+  m_bias =
+      refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
+                 m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(),
+                 m_options.gyro);
+  m_bias_until_ns = step.b_ns;
+}
+} // namespace bole

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "synthetic.h"
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+namespace
+{
+using namespace bole;
+using namespace bole::test;
+
+const PinholeCamera kCamera;
+
+/// Largest difference between the analytic and the central-difference Jacobian of one match.
+double jacobianError(double step)
+{
+  const Pose aMb = typicalMotion();
+  const Eigen::Vector3d d = aMb.t.normalized(), x_a = kCamera.ray({200, 80}),
+                        x_b = kCamera.ray({190, 85});
+  Eigen::Matrix<double, 1, 5> J;
+  sampsonResidual(x_a, x_b, aMb.R, d, &J);
+  double worst = 0;
+  for (int i = 0; i < 5; ++i) {
+    Vector5d xi = Vector5d::Zero();
+    xi[i] = step;
+    const auto at = [&](const Vector5d &x) {
+      return sampsonResidual(x_a, x_b, aMb.R * expSo3(x.head<3>()), directionPlus(d, x.tail<2>()));
+    };
+    worst = std::max(worst, std::abs((at(xi) - at(-xi)) / (2 * step) - J[i]));
+  }
+  return worst;
+}
+
+TEST(SampsonResidual, JacobianAgreesWithCentralDifferencesAtTwoSteps)
+{
+  const double coarse = jacobianError(2e-3), fine = jacobianError(1e-3);
+  EXPECT_LT(fine, 1e-5);
+  EXPECT_NEAR(coarse / fine, 4, 0.4);
+}
+
+TEST(SampsonResidual, IsTheNoiseOfOneImageCoordinate)
+{
+  CloudOptions options;
+  options.points = 4000;
+  options.noise_px = 0.2;
+  const Pose aMb = typicalMotion();
+  double sum = 0;
+  const auto matches = cloudMatches(kCamera, aMb, options);
+  for (const auto &match : matches) {
+    const double r = sampsonResidual(kCamera.ray(match.a_px), kCamera.ray(match.b_px), aMb.R,
+                                     aMb.t.normalized());
+    sum += r * r;
+  }
+  EXPECT_NEAR(std::sqrt(sum / double(matches.size())) * kCamera.fx, 0.2, 0.01);
+}
+
+TEST(RelativePose, ExactMatchesGiveTheExactMotionWithoutAPrior)
+{
+  const Pose aMb = typicalMotion();
+  const auto estimate = estimateRelativePose(cloudMatches(kCamera, aMb, {}), kCamera);
+  EXPECT_EQ(estimate.status, RelativePoseStatus::ok);
+  EXPECT_LT(rotationErrorDeg(estimate.aRb, aMb.R), 1e-4);
+  EXPECT_LT(directionErrorDeg(estimate.direction, aMb.t), 1e-3);
+}
+
+TEST(RelativePose, SwappingTheFramesInvertsTheMotion)
+{
+  const Pose aMb = typicalMotion(), bMa = aMb.inverse();
+  auto matches = cloudMatches(kCamera, aMb, {});
+  for (auto &match : matches) {
+    std::swap(match.a_px, match.b_px);
+  }
+  const auto estimate = estimateRelativePose(matches, kCamera);
+  EXPECT_EQ(estimate.status, RelativePoseStatus::ok);
+  EXPECT_LT(rotationErrorDeg(estimate.aRb, bMa.R), 1e-4);
+  EXPECT_LT(directionErrorDeg(estimate.direction, bMa.t), 1e-3);
+}
+
+TEST(RelativePose, KeepsOffFortyPercentOfOutliers)
+{
+  const Pose aMb = typicalMotion();
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CloudOptions options;
+    options.noise_px = 0.15;
+    options.outliers = 0.4;
+    options.seed = seed;
+    const auto estimate = estimateRelativePose(cloudMatches(kCamera, aMb, options), kCamera);
+    EXPECT_EQ(estimate.status, RelativePoseStatus::ok) << seed;
+    EXPECT_LT(rotationErrorDeg(estimate.aRb, aMb.R), 0.2) << seed;
+    EXPECT_LT(directionErrorDeg(estimate.direction, aMb.t), 2) << seed;
+    EXPECT_LT(estimate.sigma_px, 0.4) << seed;
+  }
+}
+
+TEST(RelativePose, FindsTheSignOfTheDirectionFromTheDepths)
+{
+  for (const Eigen::Vector3d &t :
+       {Eigen::Vector3d(0, 0, 0.4), Eigen::Vector3d(0, 0, -0.4), Eigen::Vector3d(0.3, 0, 0),
+        Eigen::Vector3d(-0.3, 0, 0), Eigen::Vector3d(0, 0.3, 0.05)}) {
+    CloudOptions options;
+    options.noise_px = 0.1;
+    const auto estimate =
+        estimateRelativePose(cloudMatches(kCamera, {expSo3({0, 0.02, 0}), t}, options), kCamera);
+    EXPECT_LT(directionErrorDeg(estimate.direction, t), 5) << t.transpose();
+  }
+}
+
+TEST(RelativePose, CovarianceIsHonestForIndependentNoise)
+{
+  RelativePoseOptions independent;
+  independent.inflation = 1;
+  double sum = 0;
+  int n = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    CloudOptions options;
+    options.noise_px = 0.15;
+    options.seed = seed;
+    const Pose aMb = typicalMotion();
+    const auto estimate =
+        estimateRelativePose(cloudMatches(kCamera, aMb, options), kCamera, {}, independent);
+    ASSERT_TRUE(estimate.hasDirection());
+    Vector5d error;
+    error << logSo3(estimate.aRb.transpose() * aMb.R),
+        directionMinus(aMb.t.normalized(), estimate.direction);
+    sum += error.dot(estimate.covariance.ldlt().solve(error));
+    ++n;
+  }
+  EXPECT_GT(sum / (5 * n), 0.6);
+  EXPECT_LT(sum / (5 * n), 1.6);
+}
+
+TEST(RelativePose, ACameraThatOnlyTurnsGetsItsRotationAndNoDirection)
+{
+  const Pose aMb{expSo3({0.02, 0.08, -0.01}), Eigen::Vector3d::Zero()};
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CloudOptions options;
+    options.noise_px = 0.15;
+    options.seed = seed;
+    const auto estimate = estimateRelativePose(cloudMatches(kCamera, aMb, options), kCamera);
+    EXPECT_EQ(estimate.status, RelativePoseStatus::no_parallax) << seed;
+    EXPECT_LT(rotationErrorDeg(estimate.aRb, aMb.R), 0.05) << seed;
+    EXPECT_GT(estimate.covariance(3, 3), 1);
+  }
+}
+
+TEST(RelativePose, FrozenFramesAreARestingCamera)
+{
+  CloudOptions options;
+  auto matches = cloudMatches(kCamera, typicalMotion(), options);
+  for (auto &match : matches) {
+    match.b_px = match.a_px;
+  }
+  const auto estimate = estimateRelativePose(matches, kCamera);
+  EXPECT_EQ(estimate.status, RelativePoseStatus::no_parallax);
+  EXPECT_LT(rotationErrorDeg(estimate.aRb, Eigen::Matrix3d::Identity()), 1e-3);
+}
+
+TEST(RelativePose, WithoutPointsReturnsThePrior)
+{
+  RelativePosePrior prior;
+  prior.aRb = expSo3({0, 0.1, 0});
+  prior.rotation_covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  prior.translation = Eigen::Vector3d(0, 0, 2);
+  prior.translation_covariance = 0.04 * Eigen::Matrix3d::Identity();
+  const auto estimate = estimateRelativePose({}, kCamera, prior);
+  EXPECT_EQ(estimate.status, RelativePoseStatus::too_few_points);
+  EXPECT_LT(rotationErrorDeg(estimate.aRb, *prior.aRb), 1e-9);
+  EXPECT_LT(directionErrorDeg(estimate.direction, *prior.translation), 1e-9);
+  EXPECT_NEAR(estimate.covariance(0, 0), 1e-6, 1e-12);
+  EXPECT_NEAR(estimate.covariance(3, 3), 0.01, 1e-6);
+}
+
+TEST(RelativePose, MatchesWithoutACommonMotionAreSaidToBeInconsistent)
+{
+  CloudOptions options;
+  options.outliers = 1;
+  const auto estimate =
+      estimateRelativePose(cloudMatches(kCamera, typicalMotion(), options), kCamera);
+  EXPECT_EQ(estimate.status, RelativePoseStatus::inconsistent);
+}
+
+TEST(RelativePose, APlaneInViewNeedsTheGyro)
+{
+  CloudOptions options;
+  options.planar = true;
+  options.far = 4;
+  options.noise_px = 0.1;
+  const Pose aMb = typicalMotion();
+  RelativePosePrior prior;
+  prior.aRb = aMb.R * expSo3({3e-4, -2e-4, 3e-4});
+  prior.rotation_covariance = 1e-7 * Eigen::Matrix3d::Identity();
+  const auto matches = cloudMatches(kCamera, aMb, options);
+  const auto with = estimateRelativePose(matches, kCamera, prior);
+  EXPECT_EQ(with.status, RelativePoseStatus::ok);
+  EXPECT_LT(directionErrorDeg(with.direction, aMb.t), 3);
+  // Without it one of the plane's two motions, and if both fit, the status says so.
+  const auto without = estimateRelativePose(matches, kCamera);
+  EXPECT_TRUE(without.status == RelativePoseStatus::ambiguous ||
+              directionErrorDeg(without.direction, aMb.t) < 8)
+      << toString(without.status) << " " << without.direction.transpose();
+}
+
+TEST(RelativePose, OptionsNameTheFault)
+{
+  RelativePoseOptions options;
+  options.inflation = 0.5;
+  try {
+    options.validate();
+    FAIL();
+  }
+  catch (const vpException &e) {
+    EXPECT_NE(std::string(e.what()).find("relative_pose.inflation = 0.5, must be 1 or more"),
+              std::string::npos);
+  }
+}
+} // namespace
