@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/gradient/border_line.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tracking/trunk_tracker.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <nlopt.h>

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/detection/detector.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+void DetectorOptions::validate() const
+{
+  const auto require = [](const char *name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+  };
+  require("detection.window", window, 4, 100);
+  require("detection.range_min", range_min, 0.3, 5);
+  require("detection.range_max", range_max, 2, 50);
+  require("detection.radius_min", radius_min, 0.005, 2);
+  require("detection.radius_max", radius_max, radius_min, 5);
+  require("detection.agreement_min", agreement_min, 0, 1);
+  require("detection.inliers_min", inliers_min, 0, 1);
+  require("detection.inlier_px", inlier_px, 0.5, 20);
+  require("detection.rms_max_px", rms_max_px, 0.1, 20);
+  require("detection.parallax_min", parallax_min, 0, 1);
+  require("detection.range_sigma_max", range_sigma_max, 0.01, 1);
+  require("detection.views_min", views_min, 2, 100);
+  require("detection.foreground_min", foreground_min, 0, 1);
+}
+
+namespace
+{
+/// A view reduced to the ground plane.
+struct PlaneView
+{
+  const LevelProfile *profile;
+  Vector2d position, forward, left; ///< of the level camera in the world
+};
+
+struct Columns
+{
+  double q_left, q_right;
+};
+
+/// Columns of the borders of the circle (xy, r); nothing when it is not in front of the view.
+std::optional<Columns> bordersOf(const PlaneView &view, const Vector2d &xy, double r)
+{
+  const Vector2d w = xy - view.position;
+  const double ahead = view.forward.dot(w), d2 = w.squaredNorm();
+  if (ahead < 0.2 || d2 <= 1.2 * r * r)
+    return std::nullopt;
+  const double q = view.left.dot(w) / ahead, t = r / std::sqrt(d2 - r * r);
+  if (q * t > 0.9 || q * t < -0.9)
+    return std::nullopt;
+  return Columns{(q + t) / (1 - q * t), (q - t) / (1 + q * t)};
+}
+
+/// How well a profile value continues a contrast: 1 the same, 0 nothing there, negative the other polarity.
+double agreement(double value, double contrast) { return std::clamp(value / contrast, -0.3, 1.0); }
+
+struct PairHypothesis
+{
+  ProfilePeak left, right;
+  Vector2d direction; ///< of the bearing in the world, unit
+  double s = 0;       ///< r / d
+};
+
+PairHypothesis makePair(const PlaneView &view, const ProfilePeak &left, const ProfilePeak &right)
+{
+  PairHypothesis pair{left, right, {}, 0};
+  const double b_left = std::atan(left.q), b_right = std::atan(right.q);
+  const double bearing = 0.5 * (b_left + b_right);
+  pair.s = std::sin(0.5 * (b_left - b_right));
+  pair.direction = std::cos(bearing) * view.forward + std::sin(bearing) * view.left;
+  return pair;
+}
+
+struct SweepResult
+{
+  double range = 0, agreement = 0;
+  int views = 0;
+};
+
+/// Mean agreement of the views, every \p stride-th, with the pair at \p range.
+double windowAgreement(const std::vector<PlaneView> &views, const PairHypothesis &pair, double range,
+                       std::size_t stride, int &seen)
+{
+  const Vector2d xy = views.back().position + range * pair.direction;
+  double sum = 0;
+  seen = 0;
+  for (std::size_t i = (views.size() - 2) % stride; i + 1 < views.size(); i += stride) {
+    const LevelProfile &profile = *views[i].profile;
+    const auto columns = bordersOf(views[i], xy, pair.s * range);
+    if (!columns || !profile.covers(columns->q_left) || !profile.covers(columns->q_right))
+      continue;
+    ++seen;
+    sum += 0.5 * (agreement(profile.strongestNear(columns->q_left, pair.left.contrast), pair.left.contrast) +
+                  agreement(profile.strongestNear(columns->q_right, pair.right.contrast), pair.right.contrast));
+  }
+  return seen ? sum / seen : 0;
+}
+
+/// The range, uniform in inverse depth, where the window agrees best: coarse over a third of the views, then fine.
+SweepResult sweepRange(const std::vector<PlaneView> &views, const PairHypothesis &pair, const DetectorOptions &options)
+{
+  const double near = std::max(options.range_min, options.radius_min / pair.s);
+  const double far = std::min(1.2 * options.range_max, options.radius_max / pair.s);
+  if (!(near < far))
+    return {};
+  constexpr int kCoarse = 12, kFine = 4;
+  const double step = (1 / near - 1 / far) / kCoarse;
+  const std::size_t stride = std::max<std::size_t>(1, views.size() / 8);
+  double best_inverse = 0, best_coarse = 0.8 * options.agreement_min;
+  int seen = 0;
+  for (int i = 0; i <= kCoarse; ++i) {
+    const double score = windowAgreement(views, pair, 1 / (1 / far + i * step), stride, seen);
+    if (seen >= 2 && score > best_coarse) {
+      best_coarse = score;
+      best_inverse = 1 / far + i * step;
+    }
+  }
+  SweepResult best;
+  for (int i = -kFine; best_inverse > 0 && i <= kFine; ++i) {
+    const double range = 1 / std::max(best_inverse + i * step / kFine, 1e-3);
+    const double score = windowAgreement(views, pair, range, 1, seen);
+    if (seen >= options.views_min && score > best.agreement)
+      best = {range, score, seen};
+  }
+  return best;
+}
+
+/// The peak of the polarity of \p contrast nearest to q, within \p gate; nothing where there is none.
+std::optional<double> nearestPeak(const LevelProfile &profile, double q, double contrast, double gate)
+{
+  const auto &peaks = profile.peaks;
+  auto it = std::lower_bound(peaks.begin(), peaks.end(), q - gate,
+                             [](const ProfilePeak &peak, double value) { return peak.q < value; });
+  std::optional<double> best;
+  for (; it != peaks.end() && it->q <= q + gate; ++it)
+    if (it->contrast * contrast > 0 && (!best || std::abs(it->q - q) < std::abs(*best - q)))
+      best = it->q;
+  return best;
+}
+
+struct Fit
+{
+  Vector3d p; ///< x, y, log r
+  Matrix3d information = Matrix3d::Zero();
+  int views = 0, inliers = 0;
+  double rms_px = 0;
+};
+
+/// Normal equations of one border in one view: residual [px] of its column against a peak.
+void accumulate(const PlaneView &view, const Vector3d &p, double q, double q_seen, double side, double px_per_q,
+                Matrix3d &H, Vector3d &g, double weight)
+{
+  const Vector2d w = p.head<2>() - view.position;
+  const double d = w.norm(), tangent = std::exp(p(2)) / std::sqrt(d * d - std::exp(2 * p(2)));
+  Vector3d J;
+  J.head<2>() = Vector2d(-w.y(), w.x()) / (d * d) - side * tangent / (d * d) * w;
+  J(2) = side * tangent;
+  J *= (1 + q * q) * px_per_q;
+  const double residual = (q - q_seen) * px_per_q;
+  H += weight * J * J.transpose();
+  g += weight * residual * J;
+}
+
+/// Least squares on the nearest peaks of the window, with the log-normal prior on the radius.
+Fit refine(const std::vector<PlaneView> &views, const PairHypothesis &pair, double range, double px_per_q,
+           const DetectorOptions &options)
+{
+  Fit fit;
+  fit.p << views.back().position + range * pair.direction, std::log(pair.s * range);
+  constexpr int kIterations = 6;
+  for (int iteration = 0; iteration <= kIterations; ++iteration) {
+    const double gate_px = iteration < 2 ? 2 * options.inlier_px : options.inlier_px;
+    Matrix3d H = Matrix3d::Zero();
+    Vector3d g = Vector3d::Zero();
+    fit.views = fit.inliers = 0;
+    double squares = 0;
+    for (const PlaneView &view : views) {
+      const auto columns = bordersOf(view, fit.p.head<2>(), std::exp(fit.p(2)));
+      if (!columns || !view.profile->covers(columns->q_left) || !view.profile->covers(columns->q_right))
+        continue;
+      ++fit.views;
+      const auto left = nearestPeak(*view.profile, columns->q_left, pair.left.contrast, gate_px / px_per_q);
+      const auto right = nearestPeak(*view.profile, columns->q_right, pair.right.contrast, gate_px / px_per_q);
+      if (left)
+        accumulate(view, fit.p, columns->q_left, *left, 1, px_per_q, H, g, 1);
+      if (right)
+        accumulate(view, fit.p, columns->q_right, *right, -1, px_per_q, H, g, 1);
+      if (left && right) {
+        ++fit.inliers;
+        squares += 0.5 * (std::pow((columns->q_left - *left) * px_per_q, 2) +
+                          std::pow((columns->q_right - *right) * px_per_q, 2));
+      }
+    }
+    fit.rms_px = fit.inliers ? std::sqrt(squares / fit.inliers) : 1e9;
+    fit.information = H;
+    if (iteration == kIterations)
+      break;
+    H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
+    const Vector3d step = H.ldlt().solve(-g);
+    if (!step.allFinite())
+      break;
+    fit.p += step.cwiseMax(-0.5).cwiseMin(0.5);
+  }
+  return fit;
+}
+
+double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy)
+{
+  double low = 0, high = 0;
+  const Vector2d reference = (xy - views.back().position).normalized();
+  for (const PlaneView &view : views) {
+    const Vector2d w = xy - view.position;
+    const double angle = std::atan2(reference.x() * w.y() - reference.y() * w.x(), reference.dot(w));
+    low = std::min(low, angle);
+    high = std::max(high, angle);
+  }
+  return high - low;
+}
+
+bool overlaps(const Detection &a, const Detection &b)
+{
+  return a.q_left > b.q_right && b.q_left > a.q_right;
+}
+
+/// Best first; a trunk that overlaps a better one in the image is another reading of the same lines.
+std::vector<Detection> suppress(std::vector<Detection> found)
+{
+  std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) {
+    return a.agreement * a.inliers > b.agreement * b.inliers;
+  });
+  std::vector<Detection> kept;
+  for (const Detection &detection : found)
+    if (std::none_of(kept.begin(), kept.end(), [&](const Detection &k) { return overlaps(k, detection); }))
+      kept.push_back(detection);
+  return kept;
+}
+
+std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairHypothesis &pair, double px_per_q,
+                                const DetectorOptions &options)
+{
+  const SweepResult sweep = sweepRange(views, pair, options);
+  if (sweep.agreement < options.agreement_min)
+    return std::nullopt;
+  const Fit fit = refine(views, pair, sweep.range, px_per_q, options);
+  if (fit.inliers < options.views_min || fit.inliers < options.inliers_min * fit.views ||
+      fit.rms_px > options.rms_max_px)
+    return std::nullopt;
+
+  Detection detection;
+  detection.trunk.xy = fit.p.head<2>();
+  detection.trunk.log_radius = fit.p(2);
+  const Vector2d w = detection.trunk.xy - views.back().position;
+  detection.range = w.norm();
+  const double r = detection.trunk.radius();
+  detection.parallax = parallaxOf(views, detection.trunk.xy);
+  Matrix3d information = fit.information;
+  information.diagonal() += Vector3d(1e-2, 1e-2, 1.0);
+  detection.covariance = information.inverse();
+  const Vector2d along = w / detection.range;
+  const double sigma = std::sqrt(along.dot(detection.covariance.topLeftCorner<2, 2>() * along));
+  if (detection.range < options.range_min || detection.range > options.range_max || r < options.radius_min ||
+      r > options.radius_max || detection.parallax < options.parallax_min ||
+      sigma > options.range_sigma_max * detection.range)
+    return std::nullopt;
+  detection.agreement = sweep.agreement;
+  detection.rms_px = fit.rms_px;
+  detection.views = fit.views;
+  detection.inliers = fit.inliers;
+  detection.q_left = pair.left.q;
+  detection.q_right = pair.right.q;
+  detection.left_contrast = pair.left.contrast;
+  detection.right_contrast = pair.right.contrast;
+  return detection;
+}
+
+bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double q_left)
+{
+  return std::any_of(known.begin(), known.end(),
+                     [&](const InhibitedRange &range) { return q_left > range.q_right && q_right < range.q_left; });
+}
+} // namespace
+
+double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
+                         const ElevationRange &range)
+{
+  const BorderLine left = borderLine(camera, relative, Border::left, range, 0);
+  const BorderLine right = borderLine(camera, relative, Border::right, range, 0);
+  double sum = 0;
+  int n = 0;
+  for (int v = std::max(left.row_begin, right.row_begin); v < std::min(left.row_end, right.row_end); ++v)
+    for (int u = static_cast<int>(std::ceil(left.xAt(v))); u <= right.xAt(v); ++u, ++n)
+      sum += 1 - static_cast<double>(p_background[v][u]);
+  return n >= 30 ? sum / n : -1;
+}
+
+std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
+                                    const std::vector<InhibitedRange> &known, const DetectorOptions &options)
+{
+  std::vector<Detection> found;
+  if (static_cast<int>(views.size()) < options.views_min)
+    return found;
+  std::vector<PlaneView> plane;
+  for (const DetectorView &view : views) {
+    const Vector3d axis = view.wMc.R.col(2);
+    const Vector2d forward = axis.head<2>().normalized();
+    plane.push_back({view.profile, view.wMc.t.head<2>(), forward, {-forward.y(), forward.x()}});
+  }
+
+  const auto &peaks = views.back().profile->peaks; // by rising q: from right to left
+  for (std::size_t i = 0; i < peaks.size(); ++i)
+    for (std::size_t j = i + 1; j < peaks.size(); ++j) {
+      const PairHypothesis pair = makePair(plane.back(), peaks[j], peaks[i]);
+      if (pair.s * options.range_min > options.radius_max)
+        break;
+      if (pair.s * options.range_max < options.radius_min || inhibited(known, peaks[i].q, peaks[j].q))
+        continue;
+      if (const auto detection = verify(plane, pair, camera.fx, options))
+        found.push_back(*detection);
+    }
+  return suppress(std::move(found));
+}
+} // namespace bole

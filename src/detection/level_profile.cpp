@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/detection/level_profile.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+using Eigen::Vector3d;
+
+double LevelProfile::strongestNear(double q, double contrast) const
+{
+  const double x = (q - q_first) / step + 0.5;
+  if (!(x >= 0) || x >= static_cast<double>(mean.size()))
+    return 0;
+  const auto i = static_cast<std::size_t>(x);
+  return contrast > 0 ? rising[i] : falling[i];
+}
+
+namespace
+{
+/// Extremes within two samples, a pixel.
+void findExtremes(LevelProfile &profile)
+{
+  const auto &p = profile.mean;
+  profile.rising.assign(p.size(), 0.f);
+  profile.falling.assign(p.size(), 0.f);
+  for (std::size_t i = 2; i + 2 < p.size(); ++i) {
+    const auto [low, high] = std::minmax_element(p.begin() + static_cast<long>(i) - 2, p.begin() + static_cast<long>(i) + 3);
+    profile.rising[i] = std::max(*high, 0.f);
+    profile.falling[i] = std::min(*low, 0.f);
+  }
+}
+
+void findPeaks(LevelProfile &profile, double contrast_min)
+{
+  const auto &p = profile.mean;
+  for (std::size_t i = 1; i + 1 < p.size(); ++i) {
+    const double a = std::abs(p[i - 1]), b = std::abs(p[i]), c = std::abs(p[i + 1]);
+    if (b < contrast_min || b < a || b <= c)
+      continue;
+    const double bend = a - 2 * b + c;
+    const double shift = bend < 0 ? std::clamp(0.5 * (a - c) / bend, -0.5, 0.5) : 0;
+    profile.peaks.push_back({profile.q_first + profile.step * (static_cast<double>(i) + shift),
+                             std::copysign(b - 0.25 * (a - c) * shift, p[i])});
+  }
+}
+} // namespace
+
+LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
+                                 const ProfileOptions &options)
+{
+  LevelProfile profile;
+  const Vector3d forward = wRc.col(2);
+  const double heading = std::atan2(forward.y(), forward.x());
+  profile.cRl = wRc.transpose() * Eigen::AngleAxisd(heading, Vector3d::UnitZ()).toRotationMatrix();
+  profile.step = 0.5 / camera.fx;
+  const double q_max = 1.15 * std::max(camera.cx, camera.width - camera.cx) / camera.fx;
+  const int half = static_cast<int>(q_max / profile.step);
+  profile.q_first = -half * profile.step;
+  profile.mean.assign(static_cast<std::size_t>(2 * half + 1), 0.f);
+
+  for (int i = -half; i <= half; ++i) {
+    const double q = i * profile.step, horizontal = std::hypot(1, q);
+    const Vector3d low = profile.cRl * Vector3d(1, q, options.range.low * horizontal);
+    const Vector3d high = profile.cRl * Vector3d(1, q, options.range.high * horizontal);
+    const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
+    const double rows_full = camera.fy * (options.range.high - options.range.low) * horizontal;
+    if (line.rows() >= options.rows_min * rows_full)
+      profile.mean[static_cast<std::size_t>(i + half)] = static_cast<float>(meanAlongOnly(g, line));
+  }
+  findExtremes(profile);
+  findPeaks(profile, options.contrast_min);
+  return profile;
+}
+} // namespace bole
