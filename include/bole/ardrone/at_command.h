@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace bole
+{
+struct AtCommand
+{
+  std::string name; ///< "REF", "PCMD", "CONFIG", "COMWDG", ...
+  std::int64_t sequence = 0;
+  std::vector<std::string> arguments; ///< without quotes
+};
+
+/// The commands of a datagram; what is not a command is left out. For the emulator and the tests.
+std::vector<AtCommand> parseAtCommands(const std::string &datagram);
+
+/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
+std::string atFloat(float value);
+/// The inverse of atFloat().
+float atFloatValue(const std::string &text);
+
+/// Sends commands with rising sequence numbers. Thread-safe: the drone refuses numbers that go back, so a
+/// program must have one channel to a drone.
+class AtChannel
+{
+public:
+  AtChannel(const std::string &host, std::uint16_t port);
+  ~AtChannel();
+  AtChannel(const AtChannel &) = delete;
+  AtChannel &operator=(const AtChannel &) = delete;
+
+  // Housekeeping: moves nothing.
+  void config(const std::string &key, const std::string &value);
+  void acknowledgeConfig();
+  void resetWatchdog();
+
+  // Flight: only vpRobotArDrone calls these.
+  void trimFlat();
+  void reference(bool take_off, bool emergency);
+  /// \param roll, pitch share of the largest tilt, in [-1, 1]: left and nose down are negative.
+  /// \param gaz, yaw share of the largest climb and turn rate: up and clockwise seen from above are positive.
+  /// \param progressive false hovers whatever the other arguments are.
+  void move(bool progressive, float roll, float pitch, float gaz, float yaw);
+
+private:
+  void send(const std::string &name, const std::string &arguments);
+
+  struct Link;
+  std::unique_ptr<Link> m_link;
+  std::mutex m_mutex;
+  std::int64_t m_sequence = 0;
+};
+} // namespace bole

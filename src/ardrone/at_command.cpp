@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/at_command.h>
+
+#include "socket.h"
+
+#include <charconv>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace bole
+{
+namespace
+{
+// Bits 18, 20, 22, 24 and 28 are always set in AT*REF.
+constexpr std::uint32_t kReferenceBase = 0x11540000, kTakeOff = 1u << 9, kEmergency = 1u << 8;
+
+bool parseInteger(const std::string &text, std::int64_t &value)
+{
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+/// Cuts at commas outside quotes and drops the quotes.
+std::vector<std::string> splitArguments(const std::string &text)
+{
+  std::vector<std::string> out(1);
+  bool quoted = false;
+  for (const char c : text) {
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+} // namespace
+
+std::vector<AtCommand> parseAtCommands(const std::string &datagram)
+{
+  std::vector<AtCommand> commands;
+  for (std::size_t at = 0; (at = datagram.find("AT*", at)) != std::string::npos;) {
+    at += 3;
+    const std::size_t end = datagram.find_first_of("\r\n", at);
+    const std::string line = datagram.substr(at, end == std::string::npos ? end : end - at);
+    const std::size_t equals = line.find('=');
+    if (equals == std::string::npos)
+      continue;
+    AtCommand command;
+    command.name = line.substr(0, equals);
+    command.arguments = splitArguments(line.substr(equals + 1));
+    if (!parseInteger(command.arguments.front(), command.sequence))
+      continue;
+    command.arguments.erase(command.arguments.begin());
+    commands.push_back(std::move(command));
+  }
+  return commands;
+}
+
+std::string atFloat(float value)
+{
+  std::int32_t bits = 0;
+  std::memcpy(&bits, &value, 4);
+  return std::to_string(bits);
+}
+
+float atFloatValue(const std::string &text)
+{
+  std::int64_t number = 0;
+  if (!parseInteger(text, number))
+    return 0;
+  const auto bits = static_cast<std::int32_t>(number);
+  float value = 0;
+  std::memcpy(&value, &bits, 4);
+  return value;
+}
+
+struct AtChannel::Link
+{
+  Socket socket;
+};
+
+AtChannel::AtChannel(const std::string &host, std::uint16_t port) : m_link(std::make_unique<Link>())
+{
+  m_link->socket = Socket::connectUdp(host, port);
+}
+AtChannel::~AtChannel() = default;
+
+void AtChannel::send(const std::string &name, const std::string &arguments)
+{
+  const std::lock_guard<std::mutex> lock(m_mutex);
+  std::string line = fmt::format("AT*{}={}", name, ++m_sequence);
+  if (!arguments.empty())
+    line += "," + arguments;
+  line += "\r";
+  m_link->socket.send(line.data(), line.size());
+}
+
+void AtChannel::config(const std::string &key, const std::string &value) { send("CONFIG", fmt::format("\"{}\",\"{}\"", key, value)); }
+void AtChannel::acknowledgeConfig() { send("CTRL", "5,0"); }
+void AtChannel::resetWatchdog() { send("COMWDG", ""); }
+void AtChannel::trimFlat() { send("FTRIM", ""); }
+
+void AtChannel::reference(bool take_off, bool emergency)
+{
+  send("REF", std::to_string(kReferenceBase | (take_off ? kTakeOff : 0) | (emergency ? kEmergency : 0)));
+}
+
+void AtChannel::move(bool progressive, float roll, float pitch, float gaz, float yaw)
+{
+  send("PCMD", fmt::format("{},{},{},{},{}", progressive ? 1 : 0, atFloat(roll), atFloat(pitch), atFloat(gaz), atFloat(yaw)));
+}
+} // namespace bole

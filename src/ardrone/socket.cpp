@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "socket.h"
+
+#include <arpa/inet.h>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <netdb.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+std::optional<sockaddr_in> resolve(const std::string &host, std::uint16_t port)
+{
+  addrinfo hints = {}, *found = nullptr;
+  hints.ai_family = AF_INET;
+  if (getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0 || found == nullptr)
+    return std::nullopt;
+  sockaddr_in address = {};
+  std::memcpy(&address, found->ai_addr, sizeof(address));
+  address.sin_port = htons(port);
+  freeaddrinfo(found);
+  return address;
+}
+
+bool waitFor(int descriptor, short events, Milliseconds timeout)
+{
+  pollfd waiting = {descriptor, events, 0};
+  return poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
+}
+
+void setNonBlocking(int descriptor) { fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL, 0) | O_NONBLOCK); }
+
+Socket bindTo(const std::string &host, std::uint16_t port, int type)
+{
+  const auto address = resolve(host, port);
+  const int descriptor = ::socket(AF_INET, type | SOCK_CLOEXEC, 0);
+  Socket owner(descriptor);
+  const int on = 1;
+  setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+  if (!address || descriptor < 0 || bind(descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
+    throw vpException(vpException::ioError, fmt::format("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port, host, std::strerror(errno)));
+  setNonBlocking(descriptor);
+  return owner;
+}
+} // namespace
+
+Socket &Socket::operator=(Socket &&other) noexcept
+{
+  std::swap(m_descriptor, other.m_descriptor);
+  return *this;
+}
+
+void Socket::close()
+{
+  if (m_descriptor >= 0)
+    ::close(m_descriptor);
+  m_descriptor = -1;
+}
+
+Socket Socket::connectTcp(const std::string &host, std::uint16_t port, Milliseconds timeout)
+{
+  const auto address = resolve(host, port);
+  Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (!address || !socket.valid())
+    return {};
+  setNonBlocking(socket.m_descriptor);
+  if (connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0) {
+    int error = 0;
+    socklen_t length = sizeof(error);
+    if (errno != EINPROGRESS || !waitFor(socket.m_descriptor, POLLOUT, timeout) ||
+        getsockopt(socket.m_descriptor, SOL_SOCKET, SO_ERROR, &error, &length) != 0 || error != 0)
+      return {};
+  }
+  const int on = 1;
+  setsockopt(socket.m_descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  return socket;
+}
+
+Socket Socket::connectUdp(const std::string &host, std::uint16_t port)
+{
+  const auto address = resolve(host, port);
+  Socket socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (!address || !socket.valid() ||
+      connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
+    return {};
+  setNonBlocking(socket.m_descriptor);
+  return socket;
+}
+
+Socket Socket::bindUdp(const std::string &host, std::uint16_t port) { return bindTo(host, port, SOCK_DGRAM); }
+
+Socket Socket::listenTcp(const std::string &host, std::uint16_t port)
+{
+  Socket socket = bindTo(host, port, SOCK_STREAM);
+  if (listen(socket.m_descriptor, 4) != 0)
+    throw vpException(vpException::ioError, fmt::format("TCP port {} of {}: {}", port, host, std::strerror(errno)));
+  return socket;
+}
+
+std::uint16_t Socket::localPort() const
+{
+  sockaddr_in address = {};
+  socklen_t length = sizeof(address);
+  getsockname(m_descriptor, reinterpret_cast<sockaddr *>(&address), &length);
+  return ntohs(address.sin_port);
+}
+
+bool Socket::waitReadable(Milliseconds timeout) const { return waitFor(m_descriptor, POLLIN, timeout); }
+
+Socket::Read Socket::receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const
+{
+  sockaddr_in sender = {};
+  return receiveFrom(buffer, capacity, size, sender, timeout);
+}
+
+Socket::Read Socket::receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender, Milliseconds timeout) const
+{
+  size = 0;
+  if (!waitReadable(timeout))
+    return Read::timeout;
+  socklen_t length = sizeof(sender);
+  const ssize_t count = recvfrom(m_descriptor, buffer, capacity, 0, reinterpret_cast<sockaddr *>(&sender), &length);
+  if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
+    return Read::timeout;
+  if (count <= 0)
+    return Read::closed; // for a datagram socket: the port at the other end is closed
+  size = static_cast<std::size_t>(count);
+  return Read::data;
+}
+
+bool Socket::send(const void *data, std::size_t size) const
+{
+  return ::send(m_descriptor, data, size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
+}
+
+bool Socket::sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const
+{
+  return ::sendto(m_descriptor, data, size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr *>(&peer), sizeof(peer)) == static_cast<ssize_t>(size);
+}
+
+bool Socket::sendAll(const std::uint8_t *data, std::size_t size, Milliseconds timeout) const
+{
+  while (size > 0) {
+    const ssize_t count = ::send(m_descriptor, data, size, MSG_NOSIGNAL);
+    if (count > 0) {
+      data += count;
+      size -= static_cast<std::size_t>(count);
+    }
+    else if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
+      return false;
+    }
+    else if (!waitFor(m_descriptor, POLLOUT, timeout)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+Socket Socket::accept() const
+{
+  Socket socket(::accept4(m_descriptor, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  if (socket.valid()) {
+    const int on = 1;
+    setsockopt(socket.m_descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  }
+  return socket;
+}
+} // namespace bole
