@@ -145,6 +145,17 @@ std::string AslSource::name() const { return m_state->name; }
 bool AslSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
 bool AslSource::hasGyro() const { return !m_state->builder->recording().gyro.empty(); }
 
+std::vector<std::int64_t> AslSource::stamps() const
+{
+  std::vector<std::int64_t> stamps;
+  for (const Row &row : m_state->rows)
+    stamps.push_back(row.stamp_ns);
+  return stamps;
+}
+
+const Trajectory &AslSource::odometry() const { return m_state->builder->recording().odometry; }
+const Trajectory &AslSource::truth() const { return m_state->builder->recording().truth; }
+
 bool AslSource::accepts(const std::string &path)
 {
   return fs::is_directory(path) && fs::is_regular_file(sensorRoot(path) / "cam0" / "data.csv");

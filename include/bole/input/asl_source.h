@@ -5,6 +5,7 @@
 
 #include <bole/input/frame.h>
 #include <bole/input/source_options.h>
+#include <bole/input/trajectory.h>
 
 namespace bole
 {
@@ -35,6 +36,11 @@ public:
   std::string name() const override;
   bool hasOdometry() const override;
   bool hasGyro() const override;
+
+  /// Stamps of all frames [ns]; the whole odometry and the whole truth, each may be empty.
+  std::vector<std::int64_t> stamps() const;
+  const Trajectory &odometry() const;
+  const Trajectory &truth() const;
 
   /// Whether \p path looks like such a folder.
   static bool accepts(const std::string &path);

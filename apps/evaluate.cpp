@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole evaluate: a finished run against the ground truth of its sequence.
+#include "commands.h"
+
+#include <bole/output/atomic_file.h>
+#include <bole/output/evaluation.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+namespace bole::apps
+{
+void addEvaluate(CLI::App &app)
+{
+  struct Arguments
+  {
+    std::string run, sequence;
+    bool is_verbose = false;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App *command = app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
+  command->add_option("RUN", arguments->run, "Folder written by `bole track`")->required();
+  command->add_option("SEQUENCE", arguments->sequence, "EuRoC/ASL folder with ground truth (and trees.csv)")->required();
+  command->add_flag("-v,--verbose", arguments->is_verbose, "List every match, miss and false positive");
+  command->footer("Prints a table and writes RUN/evaluation.json.\n"
+                  "Example: bole evaluate run/park data/park-forward --verbose");
+  command->callback([arguments] {
+    const Evaluation evaluation = evaluate(arguments->run, arguments->sequence);
+    std::fputs(toTable(evaluation, arguments->is_verbose).c_str(), stdout);
+    writeAtomically(arguments->run + "/evaluation.json", toJson(evaluation));
+  });
+}
+} // namespace bole::apps
