@@ -8,4 +8,5 @@
 
 namespace bole::apps
 {
+void addEvaluate(CLI::App &app); ///< a run against the ground truth
 } // namespace bole::apps

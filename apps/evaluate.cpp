@@ -19,10 +19,15 @@ void addEvaluate(CLI::App &app)
     bool is_verbose = false;
   };
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App *command = app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
+  CLI::App *command =
+      app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
   command->add_option("RUN", arguments->run, "Folder written by `bole track`")->required();
-  command->add_option("SEQUENCE", arguments->sequence, "EuRoC/ASL folder with ground truth (and trees.csv)")->required();
-  command->add_flag("-v,--verbose", arguments->is_verbose, "List every match, miss and false positive");
+  command
+      ->add_option("SEQUENCE", arguments->sequence,
+                   "EuRoC/ASL folder with ground truth (and trees.csv)")
+      ->required();
+  command->add_flag("-v,--verbose", arguments->is_verbose,
+                    "List every match, miss and false positive");
   command->footer("Prints a table and writes RUN/evaluation.json.\n"
                   "Example: bole evaluate run/park data/park-forward --verbose");
   command->callback([arguments] {

@@ -12,10 +12,12 @@ std::vector<int> assignRows(const Eigen::MatrixXd &cost)
 {
   const Eigen::Index rows = cost.rows(), columns = cost.cols();
   const Eigen::Index none = columns; // a column that does not exist: where each search starts
-  Eigen::VectorXd row_price = Eigen::VectorXd::Zero(rows), column_price = Eigen::VectorXd::Zero(columns + 1);
+  Eigen::VectorXd row_price = Eigen::VectorXd::Zero(rows),
+                  column_price = Eigen::VectorXd::Zero(columns + 1);
   std::vector<Eigen::Index> row_of(static_cast<std::size_t>(columns) + 1, -1);
   for (Eigen::Index row = 0; row < rows; ++row) {
-    Eigen::VectorXd slack = Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
+    Eigen::VectorXd slack =
+        Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
     std::vector<Eigen::Index> came_from(static_cast<std::size_t>(columns), none);
     std::vector<bool> is_done(static_cast<std::size_t>(columns) + 1, false);
     Eigen::Index at = none;
@@ -57,7 +59,8 @@ std::vector<int> assignRows(const Eigen::MatrixXd &cost)
   std::vector<int> column_of(static_cast<std::size_t>(rows), -1);
   for (Eigen::Index c = 0; c < columns; ++c)
     if (row_of[static_cast<std::size_t>(c)] >= 0)
-      column_of[static_cast<std::size_t>(row_of[static_cast<std::size_t>(c)])] = static_cast<int>(c);
+      column_of[static_cast<std::size_t>(row_of[static_cast<std::size_t>(c)])] =
+          static_cast<int>(c);
   return column_of;
 }
 } // namespace
@@ -66,8 +69,8 @@ std::vector<int> assign(const Eigen::MatrixXd &cost, double gate)
 {
   if (cost.rows() == 0 || cost.cols() == 0)
     return std::vector<int>(static_cast<std::size_t>(cost.rows()), -1);
-  // A pair beyond the gate costs more than all pairs within it together, so it is never preferred; spare
-  // columns let every row stay alone at that price.
+  // A pair beyond the gate costs more than all pairs within it together, so it is never preferred;
+  // spare columns let every row stay alone at that price.
   const double alone = (gate + 1) * static_cast<double>(cost.rows() + 1);
   Eigen::MatrixXd padded = Eigen::MatrixXd::Constant(cost.rows(), cost.cols() + cost.rows(), alone);
   padded.leftCols(cost.cols()) = (cost.array() <= gate).select(cost.array(), 4 * alone).matrix();

@@ -29,7 +29,8 @@ std::vector<PosePair> pairsOf(const std::string &path, const Trajectory &truth)
 {
   std::vector<PosePair> pairs = pairPoses(readTumTrajectory(path), truth);
   if (pairs.empty())
-    throw vpException(vpException::badValue, fmt::format("{}: none of its stamps lies in the ground truth's", path));
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: none of its stamps lies in the ground truth's", path));
   return pairs;
 }
 
@@ -46,13 +47,16 @@ std::vector<Pose> truePoses(const AslSource &source)
 
 Evaluation evaluate(const std::string &run, const std::string &sequence)
 {
-  const auto in_run = [&](const char *name) { return (std::filesystem::path(run) / name).string(); };
+  const auto in_run = [&](const char *name) {
+    return (std::filesystem::path(run) / name).string();
+  };
   if (!std::filesystem::is_directory(run))
     throw vpException(vpException::ioError, fmt::format("{}: no such folder", run));
   const AslSource source(sequence);
   if (source.truth().empty())
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
+    throw vpException(
+        vpException::ioError,
+        fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
 
   Evaluation evaluation;
   evaluation.run = run;
@@ -71,9 +75,9 @@ Evaluation evaluate(const std::string &run, const std::string &sequence)
   }
   const std::vector<TruthTrunk> truth = readTruthTrunks(sequence);
   if (!truth.empty())
-    evaluation.trunks = trunkMetrics(readTrunks(in_run("trunks.csv")), truth,
-                                     trunkVisibility(truth, truePoses(source), source.bMc(), source.camera()),
-                                     alignAll(pairs));
+    evaluation.trunks = trunkMetrics(
+        readTrunks(in_run("trunks.csv")), truth,
+        trunkVisibility(truth, truePoses(source), source.bMc(), source.camera()), alignAll(pairs));
   return evaluation;
 }
 } // namespace bole

@@ -10,10 +10,11 @@ namespace bole
 namespace
 {
 using Json = nlohmann::ordered_json;
-constexpr std::array<Alignment, 4> kAlignments = {Alignment::none, Alignment::first_pose, Alignment::xy_yaw,
-                                                  Alignment::xy_yaw_scale};
+constexpr std::array<Alignment, 4> kAlignments = {Alignment::none, Alignment::first_pose,
+                                                  Alignment::xy_yaw, Alignment::xy_yaw_scale};
 
-template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
+template <typename... Arguments>
+void add(std::string &text, const char *format, const Arguments &...arguments)
 {
   fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
 }
@@ -23,17 +24,18 @@ std::size_t index(Alignment alignment) { return static_cast<std::size_t>(alignme
 void addTrajectory(std::string &text, const char *name, const TrajectoryReport &report)
 {
   const auto ate = [&](Alignment alignment) { return report.absolute[index(alignment)].ate; };
-  add(text, "  {:<10} {:8.3f} {:10.3f} {:10.3f} {:8.3f} {:10.2f} {:10.3f} {:10.2f}\n", name, ate(Alignment::none),
-      ate(Alignment::xy_yaw), ate(Alignment::xy_yaw_scale), report.scaled.scale,
-      report.absolute[index(Alignment::xy_yaw)].rotation_deg, report.over_second.translation,
-      report.over_second.rotation_deg);
+  add(text, "  {:<10} {:8.3f} {:10.3f} {:10.3f} {:8.3f} {:10.2f} {:10.3f} {:10.2f}\n", name,
+      ate(Alignment::none), ate(Alignment::xy_yaw), ate(Alignment::xy_yaw_scale),
+      report.scaled.scale, report.absolute[index(Alignment::xy_yaw)].rotation_deg,
+      report.over_second.translation, report.over_second.rotation_deg);
 }
 
 void addErrors(std::string &text, const std::string &name, const TrunkErrors &errors)
 {
-  add(text, "  {:<20} {:>3} of {:<3} {:6} {:8.3f} {:8.3f} {:8.3f} {:8.2f} {:9.3f} {:+9.3f}\n", name, errors.found,
-      errors.expected, errors.matches, errors.median[index(Alignment::xy_yaw)], errors.rmse[index(Alignment::xy_yaw)],
-      errors.predicted_sigma, errors.nees_half, errors.radius_rmse, errors.radius_bias);
+  add(text, "  {:<20} {:>3} of {:<3} {:6} {:8.3f} {:8.3f} {:8.3f} {:8.2f} {:9.3f} {:+9.3f}\n", name,
+      errors.found, errors.expected, errors.matches, errors.median[index(Alignment::xy_yaw)],
+      errors.rmse[index(Alignment::xy_yaw)], errors.predicted_sigma, errors.nees_half,
+      errors.radius_rmse, errors.radius_bias);
 }
 
 void addTrunks(std::string &text, const TrunkMetrics &trunks)
@@ -41,8 +43,8 @@ void addTrunks(std::string &text, const TrunkMetrics &trunks)
   add(text,
       "\nTrunks: {} confirmed, {} matched one to one under {} m after alignment in x, y, yaw\n"
       "  recall {:.3f} ({} of {})   precision {:.3f}   F1 {:.3f}   duplicates {:.3f}\n\n",
-      trunks.confirmed, trunks.matches.size(), kMatchGate, trunks.recall, trunks.all.found, trunks.all.expected,
-      trunks.precision, trunks.f1, trunks.duplicates);
+      trunks.confirmed, trunks.matches.size(), kMatchGate, trunks.recall, trunks.all.found,
+      trunks.all.expected, trunks.precision, trunks.f1, trunks.duplicates);
   add(text, "  Position error [m]       median     RMSE\n");
   for (const auto &[alignment, name] :
        {std::pair(Alignment::none, "unaligned"), std::pair(Alignment::xy_yaw, "aligned x, y, yaw"),
@@ -51,8 +53,8 @@ void addTrunks(std::string &text, const TrunkMetrics &trunks)
         trunks.all.rmse[index(alignment)]);
   add(text, "  predicted sigma {:.3f} m, NEES/2 {:.2f} (first pose as gauge; 1 when honest)\n",
       trunks.all.predicted_sigma, trunks.all.nees_half);
-  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match", "median", "RMSE",
-      "sigma", "NEES/2", "r RMSE", "r bias");
+  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match",
+      "median", "RMSE", "sigma", "NEES/2", "r RMSE", "r bias");
   addErrors(text, "all", trunks.all);
   add(text, "  by nearest range\n");
   for (const TrunkBin &bin : trunks.by_range)
@@ -64,19 +66,22 @@ void addTrunks(std::string &text, const TrunkMetrics &trunks)
 
 void addVerbose(std::string &text, const TrunkMetrics &trunks)
 {
-  add(text, "\nMatches (truth <- map): position error unaligned / aligned, predicted sigma, NEES/2, radius error\n");
+  add(text, "\nMatches (truth <- map): position error unaligned / aligned, predicted sigma, "
+            "NEES/2, radius error\n");
   for (const TrunkMatch &match : trunks.matches)
     add(text,
-        "  {:>5} <- {:<5} {:6.3f} / {:.3f} m  sigma {:.3f} m  NEES/2 {:6.2f}  r {:.3f} {:+.3f} m  seen {:3} frames from "
+        "  {:>5} <- {:<5} {:6.3f} / {:.3f} m  sigma {:.3f} m  NEES/2 {:6.2f}  r {:.3f} {:+.3f} m  "
+        "seen {:3} frames from "
         "{:4.1f} m over {:5.1f} deg, {} observations{}\n",
-        match.truth.id, match.estimate.id, match.error[index(Alignment::none)], match.error[index(Alignment::xy_yaw)],
-        match.predicted_sigma, match.nees_half, match.truth.radius, match.radius_error, match.visibility.frames,
-        match.visibility.min_range, match.visibility.bearing_change, match.estimate.observations,
+        match.truth.id, match.estimate.id, match.error[index(Alignment::none)],
+        match.error[index(Alignment::xy_yaw)], match.predicted_sigma, match.nees_half,
+        match.truth.radius, match.radius_error, match.visibility.frames, match.visibility.min_range,
+        match.visibility.bearing_change, match.estimate.observations,
         match.visibility.is_expected ? "" : " (not expected)");
   add(text, "Missed trunks of the truth\n");
   for (const Unmatched &miss : trunks.misses) {
-    add(text, "  {:>5} seen {:3} frames from {:4.1f} m over {:5.1f} deg; ", miss.id, miss.visibility.frames,
-        miss.visibility.min_range, miss.visibility.bearing_change);
+    add(text, "  {:>5} seen {:3} frames from {:4.1f} m over {:5.1f} deg; ", miss.id,
+        miss.visibility.frames, miss.visibility.min_range, miss.visibility.bearing_change);
     if (miss.nearest_id < 0)
       add(text, "the map is empty\n");
     else
@@ -85,11 +90,14 @@ void addVerbose(std::string &text, const TrunkMetrics &trunks)
   }
   add(text, "False positives\n");
   for (const Unmatched &extra : trunks.false_positives)
-    add(text, "  {:>5} at ({:.2f}, {:.2f}) r {:.3f} m, sigma {:.2f} m, {} observations, {:.1f} to {:.1f} s: {} {} at {:.2f} m\n",
+    add(text,
+        "  {:>5} at ({:.2f}, {:.2f}) r {:.3f} m, sigma {:.2f} m, {} observations, {:.1f} to {:.1f} "
+        "s: {} {} at {:.2f} m\n",
         extra.id, extra.estimate.xy.x(), extra.estimate.xy.y(), extra.estimate.radius,
         std::sqrt(std::max(0.0, extra.estimate.covariance_xy.trace())), extra.estimate.observations,
         extra.estimate.first_seen_s, extra.estimate.last_seen_s,
-        extra.is_duplicate ? "duplicate of" : "nearest is", extra.nearest_id, extra.nearest_distance);
+        extra.is_duplicate ? "duplicate of" : "nearest is", extra.nearest_id,
+        extra.nearest_distance);
 }
 
 Json toJson(const TrajectoryReport &report)
@@ -97,13 +105,16 @@ Json toJson(const TrajectoryReport &report)
   Json json;
   for (const Alignment alignment : kAlignments) {
     const TrajectoryErrors &errors = report.absolute[index(alignment)];
-    json["ate"][toString(alignment)] = {
-        {"rmse_m", errors.ate}, {"rmse_xy_m", errors.ate_xy}, {"rotation_rmse_deg", errors.rotation_deg}};
+    json["ate"][toString(alignment)] = {{"rmse_m", errors.ate},
+                                        {"rmse_xy_m", errors.ate_xy},
+                                        {"rotation_rmse_deg", errors.rotation_deg}};
   }
   json["poses"] = report.absolute[0].poses;
   json["scale"] = report.scaled.scale;
   const auto relative = [](const RelativeErrors &errors) {
-    return Json{{"intervals", errors.intervals}, {"translation_rmse_m", errors.translation}, {"rotation_rmse_deg", errors.rotation_deg}};
+    return Json{{"intervals", errors.intervals},
+                {"translation_rmse_m", errors.translation},
+                {"rotation_rmse_deg", errors.rotation_deg}};
   };
   json["rpe_frame"] = relative(report.over_frame);
   json["rpe_1s"] = relative(report.over_second);
@@ -112,9 +123,13 @@ Json toJson(const TrajectoryReport &report)
 
 Json toJson(const TrunkErrors &errors)
 {
-  Json json = {{"expected", errors.expected}, {"found", errors.found}, {"recall", errors.recall()}, {"matches", errors.matches}};
+  Json json = {{"expected", errors.expected},
+               {"found", errors.found},
+               {"recall", errors.recall()},
+               {"matches", errors.matches}};
   for (const Alignment alignment : kAlignments)
-    json["position_m"][toString(alignment)] = {{"median", errors.median[index(alignment)]}, {"rmse", errors.rmse[index(alignment)]}};
+    json["position_m"][toString(alignment)] = {{"median", errors.median[index(alignment)]},
+                                               {"rmse", errors.rmse[index(alignment)]}};
   json["nees_half"] = errors.nees_half;
   json["predicted_sigma_m"] = errors.predicted_sigma;
   json["radius_m"] = {{"rmse", errors.radius_rmse}, {"bias", errors.radius_bias}};
@@ -123,10 +138,12 @@ Json toJson(const TrunkErrors &errors)
 
 Json toJson(const TrunkMetrics &trunks)
 {
-  Json json = {{"confirmed", trunks.confirmed}, {"precision", trunks.precision}, {"recall", trunks.recall},
-               {"f1", trunks.f1},               {"duplicates", trunks.duplicates}, {"gate_m", kMatchGate},
+  Json json = {{"confirmed", trunks.confirmed},   {"precision", trunks.precision},
+               {"recall", trunks.recall},         {"f1", trunks.f1},
+               {"duplicates", trunks.duplicates}, {"gate_m", kMatchGate},
                {"all", toJson(trunks.all)}};
-  for (const auto &[key, bins] : {std::pair("by_range", &trunks.by_range), std::pair("by_parallax", &trunks.by_parallax)})
+  for (const auto &[key, bins] :
+       {std::pair("by_range", &trunks.by_range), std::pair("by_parallax", &trunks.by_parallax)})
     for (const TrunkBin &bin : *bins)
       json[key][bin.name] = toJson(bin.errors);
   json["matched"] = Json::array();
@@ -141,7 +158,9 @@ Json toJson(const TrunkMetrics &trunks)
                                {"radius_error_m", match.radius_error}});
   json["missed"] = Json::array();
   for (const Unmatched &miss : trunks.misses)
-    json["missed"].push_back({{"truth", miss.id}, {"nearest_map", miss.nearest_id}, {"distance_m", miss.nearest_distance}});
+    json["missed"].push_back({{"truth", miss.id},
+                              {"nearest_map", miss.nearest_id},
+                              {"distance_m", miss.nearest_distance}});
   json["false_positives"] = Json::array();
   for (const Unmatched &extra : trunks.false_positives)
     json["false_positives"].push_back({{"map", extra.id},
@@ -157,8 +176,8 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
   std::string text;
   add(text, "{} against {}: {} of {} frames\n\n", evaluation.run, evaluation.sequence,
       evaluation.smoothed.absolute[0].poses, evaluation.frames);
-  add(text, "Trajectory      ATE [m] aligned in  and scale    scale   rotation RPE 1s [m] RPE 1s [deg]\n");
-  add(text, "              unaligned  x, y, yaw                          [deg]\n");
+  add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]",
+      "x, y, yaw", "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");
   addTrajectory(text, "smoothed", evaluation.smoothed);
   if (evaluation.online)
     addTrajectory(text, "online", *evaluation.online);
@@ -174,7 +193,8 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
 
 std::string toJson(const Evaluation &evaluation)
 {
-  Json json = {{"run", evaluation.run}, {"sequence", evaluation.sequence}, {"frames", evaluation.frames}};
+  Json json = {
+      {"run", evaluation.run}, {"sequence", evaluation.sequence}, {"frames", evaluation.frames}};
   json["trajectory"]["smoothed"] = toJson(evaluation.smoothed);
   if (evaluation.online)
     json["trajectory"]["online"] = toJson(*evaluation.online);

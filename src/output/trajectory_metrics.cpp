@@ -40,7 +40,10 @@ Eigen::Matrix2d PlanarTransform::linear() const
   return scale * R;
 }
 
-Eigen::Vector2d PlanarTransform::operator*(const Eigen::Vector2d &xy) const { return linear() * xy + t; }
+Eigen::Vector2d PlanarTransform::operator*(const Eigen::Vector2d &xy) const
+{
+  return linear() * xy + t;
+}
 
 Eigen::Vector3d PlanarTransform::operator*(const Eigen::Vector3d &p) const
 {
@@ -94,7 +97,8 @@ PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment)
   return transform;
 }
 
-TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform)
+TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
+                                const PlanarTransform &transform)
 {
   double sum = 0, sum_xy = 0, sum_rotation = 0;
   for (const PosePair &pair : pairs) {
@@ -104,7 +108,8 @@ TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const Planar
     sum_xy += error.head<2>().squaredNorm();
     sum_rotation += logSo3(pair.truth.R.transpose() * aligned.R).squaredNorm();
   }
-  return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()), rms(sum_rotation, pairs.size()) / kDegree};
+  return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()),
+          rms(sum_rotation, pairs.size()) / kDegree};
 }
 
 RelativeErrors relativeErrors(const std::vector<PosePair> &pairs, double delta_s)

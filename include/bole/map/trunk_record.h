@@ -34,10 +34,11 @@ inline const char *toString(TrunkStatus status)
   return "unknown";
 }
 
-/// A trunk in the world frame. Position and radius are those at breast height, where forest inventories
-/// measure (and the ground truth of the rendered flights is given): the axis at kBreastHeight above the ground. For an
-/// upright trunk the height does not matter; one that leans by 3 degrees is 7 cm off at its foot. Without a
-/// known ground (no odometry) the height of the first camera stands in.
+/// A trunk in the world frame. Position and radius are those at breast height, where forest
+/// inventories measure (and the ground truth of the rendered flights is given): the axis at
+/// kBreastHeight above the ground. For an upright trunk the height does not matter; one that leans
+/// by 3 degrees is 7 cm off at its foot. Without a known ground (no odometry) the height of the
+/// first camera stands in.
 struct TrunkRecord
 {
   int id = 0;

@@ -8,8 +8,8 @@
 
 namespace bole
 {
-/// A file that is written beside its place and moved there when complete: temporary name in the same
-/// folder, fsync, rename, fsync of the folder. Without commit() the temporary file is removed.
+/// A file that is written beside its place and moved there when complete: temporary name in the
+/// same folder, fsync, rename, fsync of the folder. Without commit() the temporary file is removed.
 ///
 /// \code
 /// AtomicFile file("run/overlay.mp4");

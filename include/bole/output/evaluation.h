@@ -16,25 +16,27 @@ struct TrajectoryReport
 {
   std::array<TrajectoryErrors, 4> absolute; ///< by Alignment
   PlanarTransform scaled;                   ///< the transform of Alignment::xy_yaw_scale
-  RelativeErrors over_frame, over_second;   ///< relative errors between consecutive frames and over 1 s
+  RelativeErrors over_frame,
+      over_second; ///< relative errors between consecutive frames and over 1 s
 };
 
 struct Evaluation
 {
   std::string run, sequence;
-  std::size_t frames = 0;                    ///< of the sequence
-  TrajectoryReport smoothed;                 ///< trajectory.tum
-  std::optional<TrajectoryReport> online;    ///< trajectory_online.tum
-  std::optional<TrajectoryReport> odometry;  ///< the pose filter at the frames of trajectory.tum
-  std::optional<TrunkMetrics> trunks;        ///< where the sequence has trees.csv
+  std::size_t frames = 0;                   ///< of the sequence
+  TrajectoryReport smoothed;                ///< trajectory.tum
+  std::optional<TrajectoryReport> online;   ///< trajectory_online.tum
+  std::optional<TrajectoryReport> odometry; ///< the pose filter at the frames of trajectory.tum
+  std::optional<TrunkMetrics> trunks;       ///< where the sequence has trees.csv
 };
 
 /// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence.
-/// Errors: vpException naming the file that is missing or faulty, or that has no common stamps with the truth.
+/// Errors: vpException naming the file that is missing or faulty, or that has no common stamps with
+/// the truth.
 Evaluation evaluate(const std::string &run, const std::string &sequence);
 
-/// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match or its
-/// nearest neighbour, and every false positive and duplicate.
+/// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match
+/// or its nearest neighbour, and every false positive and duplicate.
 std::string toTable(const Evaluation &evaluation, bool verbose);
 
 /// Everything, as JSON.

@@ -11,10 +11,11 @@
 namespace bole
 {
 /// What is taken from the estimate before it is compared with the truth.
-enum class Alignment {
-  none,        ///< both are taken in the world as they stand
-  first_pose,  ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
-  xy_yaw,      ///< least squares over the trajectory in x, y and yaw; z stays
+enum class Alignment
+{
+  none,       ///< both are taken in the world as they stand
+  first_pose, ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
+  xy_yaw,     ///< least squares over the trajectory in x, y and yaw; z stays
   xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
 };
 const char *toString(Alignment alignment);
@@ -23,9 +24,9 @@ const char *toString(Alignment alignment);
 struct PlanarTransform
 {
   double scale = 1;
-  double yaw = 0;                               ///< [rad]
-  Eigen::Vector2d t = Eigen::Vector2d::Zero();  ///< [m]
-  double dz = 0;                                ///< [m]
+  double yaw = 0;                              ///< [rad]
+  Eigen::Vector2d t = Eigen::Vector2d::Zero(); ///< [m]
+  double dz = 0;                               ///< [m]
 
   Eigen::Vector2d operator*(const Eigen::Vector2d &xy) const;
   Eigen::Vector3d operator*(const Eigen::Vector3d &p) const;
@@ -43,8 +44,9 @@ struct PosePair
 /// Pairs at the stamps of \p estimate that lie within the range of \p truth.
 std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &truth);
 
-/// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products of the
-/// centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory that does not move keeps scale 1.
+/// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products
+/// of the centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory
+/// that does not move keeps scale 1.
 PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
 
 struct TrajectoryErrors
@@ -56,7 +58,8 @@ struct TrajectoryErrors
 };
 
 /// Errors after \p transform.
-TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform);
+TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
+                                const PlanarTransform &transform);
 
 struct RelativeErrors
 {
@@ -65,7 +68,7 @@ struct RelativeErrors
   double rotation_deg = 0; ///< [degrees]
 };
 
-/// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the first pose at
-/// least \p delta_s (less half a millisecond) after i and no later than twice that.
+/// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the
+/// first pose at least \p delta_s (less half a millisecond) after i and no later than twice that.
 RelativeErrors relativeErrors(const std::vector<PosePair> &pairs, double delta_s);
 } // namespace bole

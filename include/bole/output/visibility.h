@@ -23,18 +23,19 @@ struct VisibilityOptions
 /// What a flight saw of a trunk.
 struct TrunkVisibility
 {
-  std::size_t frames = 0;      ///< within range, inside the image, not hidden
-  double bearing_change = 0;   ///< largest difference of its bearings over those frames [degrees]
-  double min_range = 0;        ///< of those frames [m]
-  bool is_expected = false;    ///< counts for recall
+  std::size_t frames = 0;    ///< within range, inside the image, not hidden
+  double bearing_change = 0; ///< largest difference of its bearings over those frames [degrees]
+  double min_range = 0;      ///< of those frames [m]
+  bool is_expected = false;  ///< counts for recall
 };
 
 /// Sees every trunk of \p trunks from the true poses \p wMb of the frames.
 ///
-/// A trunk is inside the image when both of its borders are at the height of the camera; it is hidden as far as
-/// the bearings between its borders are covered by those of nearer trunks. Trunks without radius (far ones)
-/// neither hide nor are expected.
-std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
-                                             const Pose &bMc, const PinholeCamera &camera,
+/// A trunk is inside the image when both of its borders are at the height of the camera; it is
+/// hidden as far as the bearings between its borders are covered by those of nearer trunks. Trunks
+/// without radius (far ones) neither hide nor are expected.
+std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks,
+                                             const std::vector<Pose> &wMb, const Pose &bMc,
+                                             const PinholeCamera &camera,
                                              const VisibilityOptions &options = {});
 } // namespace bole
