@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Growing the graph: variables, factors, and taking them out again.
+#include "state.h"
+
+#include <algorithm>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+double *BlockStore::allocate(std::size_t count)
+{
+  if (m_used + count > kChunk) {
+    m_chunks.emplace_back(kChunk);
+    m_used = 0;
+  }
+  double *block = m_chunks.back().data() + m_used;
+  m_used += count;
+  return block;
+}
+
+void Smoother::State::checkPose(std::size_t pose) const
+{
+  if (pose >= poses.size())
+    throw vpException(vpException::badValue, "pose = %zu, must be below %zu", pose, poses.size());
+}
+
+void Smoother::State::checkTrunk(std::size_t trunk) const
+{
+  if (trunk >= trunks.size() || trunks[trunk].removed)
+    throw vpException(vpException::badValue, "trunk = %zu, must be one of the %zu and not removed",
+                      trunk, trunks.size());
+}
+
+std::size_t Smoother::State::newPose(const Pose &point)
+{
+  if (!point.isFinite())
+    throw vpException(vpException::badValue, "pose, must be finite");
+  Variable variable;
+  variable.number = static_cast<int>(poses.size());
+  PoseState pose;
+  pose.point = point;
+  pose.variable = static_cast<int>(variables.size());
+  variables.push_back(std::move(variable));
+  poses.push_back(pose);
+  touch(pose.variable);
+  return poses.size() - 1;
+}
+
+std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prior)
+{
+  if (!point.minus(Trunk()).allFinite() || !prior.mean.minus(Trunk()).allFinite() ||
+      !prior.sigma.allFinite() || !(prior.sigma.array() > 0).all())
+    throw vpException(vpException::badValue, "trunk, must be finite with sigmas above 0");
+  TrunkState trunk;
+  trunk.point = point;
+  trunk.prior = prior;
+  trunk.last_pose = std::max<int>(0, static_cast<int>(poses.size()) - 1);
+  trunks.push_back(trunk);
+  reopenTrunk(static_cast<int>(trunks.size()) - 1);
+  return trunks.size() - 1;
+}
+
+/// Gives a trunk a variable of its own, at its present point.
+void Smoother::State::reopenTrunk(int trunk)
+{
+  Variable variable;
+  variable.is_pose = false;
+  variable.number = trunk;
+  variable.dim = 5;
+  trunks[trunk].variable = static_cast<int>(variables.size());
+  variables.push_back(std::move(variable));
+  if (options.fixed_lag > 0)
+    open_trunks.push_back(trunks[trunk].variable);
+  touch(trunks[trunk].variable);
+}
+
+int rowCount(FactorKind kind)
+{
+  switch (kind) {
+  case FactorKind::height:
+    return 1;
+  case FactorKind::observation:
+    return 4;
+  case FactorKind::relative_pose:
+    return 5;
+  default:
+    return 6;
+  }
+}
+
+int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
+{
+  const int rows = rowCount(kind);
+  Factor factor;
+  factor.kind = kind;
+  factor.data = data;
+  factor.a = a;
+  factor.b = b;
+  const int columns = variables[a].dim + (b >= 0 ? variables[b].dim : 0) + 1;
+  factor.linear = store.allocate(static_cast<std::size_t>(rows) * columns);
+  const int id = static_cast<int>(factors.size());
+  factors.push_back(factor);
+  variables[a].factors.push_back(id);
+  touch(a);
+  if (b >= 0) {
+    variables[b].factors.push_back(id);
+    touch(b);
+  }
+  stale_factors.push_back(id);
+  return id;
+}
+
+void Smoother::State::dropFactor(int factor)
+{
+  Factor &gone = factors[factor];
+  if (!gone.alive)
+    return;
+  gone.alive = false;
+  constant_cost -= gone.stale ? 0 : gone.cost;
+  if (gone.kind == FactorKind::observation) {
+    --live_observations;
+    --trunks[variables[gone.b].number].observations;
+  }
+  for (const int v : {gone.a, gone.b}) {
+    if (v < 0)
+      continue;
+    std::vector<int> &list = variables[v].factors;
+    list.erase(std::remove(list.begin(), list.end(), factor), list.end());
+    if (isOpen(v))
+      touch(v);
+  }
+}
+
+void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
+{
+  if (!measured.aMb.isFinite())
+    throw vpException(vpException::badValue, "odometry, must be finite");
+  const Matrix6d S = squareRootInformation<6>(measured.covariance, "odometry covariance");
+  const int variable_a = poses[a].variable, variable_b = poses[b].variable;
+  if (!isOpen(variable_a) || !isOpen(variable_b))
+    throw vpException(vpException::badValue, "odometry, must be between poses inside the lag");
+  odometry.push_back({measured, S});
+  newFactor(FactorKind::odometry, static_cast<int>(odometry.size()) - 1, variable_a, variable_b);
+}
+
+void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
+                                           const SquareRootSummary &root)
+{
+  TrunkState &seen = trunks[trunk];
+  if (!isOpen(seen.variable)) { // closed by the lag: what was known of it is its prior now
+    seen.prior.mean = seen.point;
+    seen.prior.sigma = seen.closed_covariance.diagonal().cwiseSqrt();
+    reopenTrunk(trunk);
+  }
+  seen.last_pose = std::max(seen.last_pose, pose);
+  ++seen.observations;
+  ++live_observations;
+  observations.push_back({summary, root});
+  newFactor(FactorKind::observation, static_cast<int>(observations.size()) - 1,
+            poses[pose].variable, seen.variable);
+}
+
+void Smoother::State::removeTrunk(int trunk)
+{
+  TrunkState &gone = trunks[trunk];
+  Variable &variable = variables[gone.variable];
+  gone.removed = true;
+  if (variable.life != Life::open)
+    return;
+  const std::vector<int> list = variable.factors;
+  bool in_marginal = false;
+  for (const int factor : list) {
+    if (factors[factor].kind == FactorKind::marginal)
+      in_marginal = true;
+    else
+      dropFactor(factor);
+  }
+  touch(gone.variable);
+  if (in_marginal) // it stays as a nuisance until the lag closes it
+    return;
+  constant_cost -= variable.share;
+  variable.share = 0;
+  variable.life = Life::removed;
+}
+
+void Smoother::State::mergeTrunks(int keep, int gone)
+{
+  const Variable &variable = variables[trunks[gone].variable];
+  std::vector<std::pair<int, int>> moving; // pose, data
+  for (const int factor : variable.factors)
+    if (factors[factor].kind == FactorKind::observation)
+      moving.emplace_back(variables[factors[factor].a].number, factors[factor].data);
+  removeTrunk(gone);
+  for (const auto &[pose, data] : moving) {
+    const ObservationData seen = observations[data];
+    addObservationFactor(pose, keep, seen.factor, seen.root);
+  }
+}
+} // namespace bole

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Marginal covariances. With H = L L^T, X^T H^-1 X = |L^-1 X|^2, and L^-1 X is zero outside the
+// paths from the rows of X to the roots: a handful of variables for what was seen of late.
+#include "state.h"
+
+#include <algorithm>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+template <int Columns>
+Eigen::Matrix<double, Columns, Columns>
+Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X,
+                             int count)
+{
+  using Rows = Eigen::Map<Eigen::Matrix<double, 6, Columns>>;
+  position.resize(variables.size(), -1);
+  path.clear();
+  for (int i = 0; i < count; ++i)
+    for (int v = variable[i]; v >= 0 && position[v] < 0; v = variables[v].parent) {
+      position[v] = 0;
+      path.push_back(v);
+    }
+  std::sort(path.begin(), path.end(),
+            [this](int l, int r) { return variables[l].order < variables[r].order; });
+  path_rows.resize(std::max(path_rows.size(), path.size()));
+  for (std::size_t slot = 0; slot < path.size(); ++slot) {
+    position[path[slot]] = static_cast<int>(slot);
+    path_rows[slot].fill(0);
+  }
+  for (int i = 0; i < count; ++i)
+    Rows(path_rows[position[variable[i]]].data()) += X[i];
+
+  Eigen::Matrix<double, Columns, Columns> form = Eigen::Matrix<double, Columns, Columns>::Zero();
+  for (std::size_t slot = 0; slot < path.size(); ++slot) {
+    const Variable &v = variables[path[slot]];
+    Rows y(path_rows[slot].data());
+    const int rows = v.dim + v.separator_dim;
+    for (int c = 0; c < v.dim; ++c) {
+      const double *column = v.columns.data() + c * rows;
+      y.row(c) /= column[c];
+      for (int i = c + 1; i < v.dim; ++i)
+        y.row(i) -= column[i] * y.row(c);
+    }
+    form.noalias() += y.topRows(v.dim).transpose() * y.topRows(v.dim);
+    int row = v.dim;
+    for (const int s : v.separator) {
+      Rows b(path_rows[position[s]].data());
+      for (int c = 0; c < v.dim; ++c) {
+        const double *column = v.columns.data() + c * rows + row;
+        for (int i = 0; i < variables[s].dim; ++i)
+          b.row(i) -= column[i] * y.row(c);
+      }
+      row += variables[s].dim;
+    }
+  }
+  for (const int v : path)
+    position[v] = -1;
+  return form;
+}
+
+Matrix5d Smoother::State::trunkCovariance(int trunk)
+{
+  const TrunkState &state = trunks[trunk];
+  if (!isOpen(state.variable))
+    return state.closed_covariance;
+  if (!variables[state.variable].eliminated)
+    return state.prior.sigma.cwiseAbs2().asDiagonal();
+  Eigen::Matrix<double, 6, 5> X = Eigen::Matrix<double, 6, 5>::Zero();
+  X.topRows<5>().setIdentity();
+  return inverseForm<5>(&state.variable, &X, 1);
+}
+
+Matrix6d Smoother::State::poseCovariance(int pose)
+{
+  const PoseState &state = poses[pose];
+  if (!isOpen(state.variable))
+    return state.closed_covariance;
+  if (!variables[state.variable].eliminated)
+    throw vpException(vpException::notInitialized, "pose = %d, must be taken in by update() first",
+                      pose);
+  const Matrix6d X = Matrix6d::Identity();
+  return inverseForm<6>(&state.variable, &X, 1);
+}
+
+Matrix4d Smoother::State::relativeCovariance(int trunk)
+{
+  const TrunkState &seen = trunks[trunk];
+  const PoseState &newest = poses.back();
+  Matrix46d J_pose;
+  Matrix45d J_trunk;
+  relativeTrunk(estimate(newest), options.bMc, estimate(seen), &J_pose, &J_trunk);
+  if (!J_pose.allFinite() || !J_trunk.allFinite())
+    throw vpException(vpException::badValue, "trunk = %d, must not contain the camera", trunk);
+  if (!isOpen(seen.variable) || !variables[seen.variable].eliminated) {
+    return J_pose * poseCovariance(static_cast<int>(poses.size()) - 1) * J_pose.transpose() +
+           J_trunk * trunkCovariance(trunk) * J_trunk.transpose();
+  }
+  if (!variables[newest.variable].eliminated)
+    throw vpException(vpException::notInitialized,
+                      "newest pose, must be taken in by update() first");
+  const int ids[2] = {newest.variable, seen.variable};
+  Eigen::Matrix<double, 6, 4> X[2];
+  X[0] = J_pose.transpose();
+  X[1].setZero();
+  X[1].topRows<5>() = J_trunk.transpose();
+  return inverseForm<4>(ids, X, 2);
+}
+} // namespace bole

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Eliminating one variable from its front, and solving for it afterwards.
+#include "state.h"
+
+#include <algorithm>
+
+namespace bole
+{
+namespace
+{
+using Map = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+
+/// Adds [J_a J_b]^T [J_a J_b r] to the lower triangle of the front.
+template <int Rows, int A, int B>
+void addBinary(const double *linear, double *front, int ld, int at_a, int at_b)
+{
+  const Eigen::Map<const Eigen::Matrix<double, Rows, A>> J_a(linear);
+  const Eigen::Map<const Eigen::Matrix<double, Rows, B>> J_b(linear + Rows * A);
+  const Eigen::Map<const Eigen::Matrix<double, Rows, 1>> r(linear + Rows * (A + B));
+  Map F(front, ld, ld - 1, Eigen::OuterStride<>(ld));
+  F.block<A, A>(at_a, at_a) += J_a.transpose().lazyProduct(J_a);
+  F.block<B, B>(at_b, at_b) += J_b.transpose().lazyProduct(J_b);
+  if (at_b > at_a)
+    F.block<B, A>(at_b, at_a) += J_b.transpose().lazyProduct(J_a);
+  else
+    F.block<A, B>(at_a, at_b) += J_a.transpose().lazyProduct(J_b);
+  F.block<1, A>(ld - 1, at_a) += r.transpose().lazyProduct(J_a);
+  F.block<1, B>(ld - 1, at_b) += r.transpose().lazyProduct(J_b);
+}
+
+template <int Rows, int A> void addUnary(const double *linear, double *front, int ld, int at_a)
+{
+  const Eigen::Map<const Eigen::Matrix<double, Rows, A>> J(linear);
+  const Eigen::Map<const Eigen::Matrix<double, Rows, 1>> r(linear + Rows * A);
+  Map F(front, ld, ld - 1, Eigen::OuterStride<>(ld));
+  F.block<A, A>(at_a, at_a) += J.transpose().lazyProduct(J);
+  F.block<1, A>(ld - 1, at_a) += r.transpose().lazyProduct(J);
+}
+
+/// Cholesky of the first D columns, in place: L_vv over L_sv (with y_v^T in the last row), the
+/// Schur complement in the rest. Returns how many directions had no information beyond rounding;
+/// those are held (their delta is zero).
+template <int D> int factorFront(double *front, int ld)
+{
+  int held = 0;
+  for (int c = 0; c < D; ++c) {
+    double *column = front + c * ld;
+    const double before = column[c];
+    for (int k = 0; k < c; ++k) {
+      const double *earlier = front + k * ld;
+      const double scale = earlier[c];
+      for (int i = c; i < ld; ++i)
+        column[i] -= scale * earlier[i];
+    }
+    if (!(column[c] > 1e-13 * std::abs(before)) || !std::isfinite(column[c])) {
+      ++held;
+      std::fill(column + c, column + ld, 0.0);
+      column[c] = 1;
+      continue;
+    }
+    const double inverse = 1 / std::sqrt(column[c]);
+    for (int i = c; i < ld; ++i)
+      column[i] *= inverse;
+  }
+  for (int j = D; j < ld - 1; ++j) {
+    double w[D];
+    for (int k = 0; k < D; ++k)
+      w[k] = front[k * ld + j];
+    double *column = front + j * ld;
+    for (int i = j; i < ld; ++i) {
+      double sum = 0;
+      for (int k = 0; k < D; ++k)
+        sum += w[k] * front[k * ld + i];
+      column[i] -= sum;
+    }
+  }
+  return held;
+}
+} // namespace
+
+void Smoother::State::assemble(const Factor &factor)
+{
+  double *F = front.data();
+  const int ld = front_rows;
+  switch (factor.kind) {
+  case FactorKind::pose_prior:
+    addUnary<6, 6>(factor.linear, F, ld, position[factor.a]);
+    break;
+  case FactorKind::height:
+    addUnary<1, 6>(factor.linear, F, ld, position[factor.a]);
+    break;
+  case FactorKind::odometry:
+    addBinary<6, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    break;
+  case FactorKind::relative_pose:
+    addBinary<5, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    break;
+  case FactorKind::observation:
+    addBinary<4, 6, 5>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    break;
+  case FactorKind::marginal: {
+    const MarginalData &data = marginals[factor.data];
+    child_map.clear();
+    for (const int v : data.variables)
+      for (int i = 0; i < variables[v].dim; ++i)
+        child_map.push_back(position[v] + i);
+    const int m = static_cast<int>(child_map.size());
+    for (int c = 0; c < m; ++c) {
+      for (int r = c; r < m; ++r) {
+        const auto [low, high] = std::minmax(child_map[r], child_map[c]);
+        F[low * ld + high] += data.H(r, c);
+      }
+      F[child_map[c] * ld + ld - 1] += data.g(c);
+    }
+    break;
+  }
+  }
+}
+
+void Smoother::State::assembleChild(const Variable &child)
+{
+  child_map.clear();
+  bool rising = true;
+  for (const int v : child.separator) {
+    rising = rising && (child_map.empty() || child_map.back() < position[v]);
+    for (int i = 0; i < variables[v].dim; ++i)
+      child_map.push_back(position[v] + i);
+  }
+  const int m = child.separator_dim, ld = front_rows;
+  const int *map = child_map.data();
+  const double *from = child.contribution.data();
+  double *F = front.data();
+  for (int c = 0; c < m; ++c) {
+    if (rising) {
+      double *column = F + map[c] * ld;
+      for (int r = c; r < m; ++r)
+        column[map[r]] += *from++;
+    }
+    else {
+      for (int r = c; r < m; ++r) {
+        const auto [low, high] = std::minmax(map[r], map[c]);
+        F[low * ld + high] += *from++;
+      }
+    }
+  }
+  for (int c = 0; c < m; ++c)
+    F[map[c] * ld + ld - 1] += *from++;
+}
+
+void Smoother::State::eliminate(int id)
+{
+  Variable &v = variables[id];
+  // structure: the neighbours by factors and by what the children left
+  v.separator.clear();
+  position.resize(variables.size(), -1);
+  position[id] = 0;
+  const auto meet = [&](int other) {
+    if (position[other] < 0) {
+      position[other] = 1;
+      v.separator.push_back(other);
+    }
+  };
+  for (const int f : v.assembled) {
+    const Factor &factor = factors[f];
+    if (factor.kind == FactorKind::marginal) {
+      for (const int other : marginals[factor.data].variables)
+        meet(other);
+      continue;
+    }
+    meet(factor.a);
+    if (factor.b >= 0)
+      meet(factor.b);
+  }
+  for (const int child : v.children)
+    for (const int other : variables[child].separator)
+      meet(other);
+  std::sort(v.separator.begin(), v.separator.end(),
+            [this](int l, int r) { return variables[l].order < variables[r].order; });
+
+  int columns = v.dim;
+  for (const int other : v.separator) {
+    position[other] = columns;
+    columns += variables[other].dim;
+  }
+  const int ld = front_rows = columns + 1;
+  v.separator_dim = columns - v.dim;
+  front.assign(static_cast<std::size_t>(ld) * columns, 0.0);
+
+  // numbers
+  for (const int f : v.assembled)
+    assemble(factors[f]);
+  for (const int child : v.children)
+    assembleChild(variables[child]);
+  v.share = 0;
+  if (!v.is_pose) {
+    const TrunkState &trunk = trunks[v.number];
+    const Vector5d r = residual(trunk.prior, trunk.point);
+    for (int i = 0; i < 5; ++i) {
+      front[i * ld + i] += 1 / (trunk.prior.sigma(i) * trunk.prior.sigma(i));
+      front[i * ld + ld - 1] -= r(i) / trunk.prior.sigma(i);
+    }
+    v.share = 0.5 * r.squaredNorm();
+  }
+  if (damping > 0)
+    for (int i = 0; i < v.dim; ++i)
+      front[i * ld + i] += damping * damping_scale[id](i);
+  held_directions +=
+      v.is_pose ? factorFront<6>(front.data(), ld) : factorFront<5>(front.data(), ld);
+
+  // keep the columns of L, y, and the contribution
+  const int rows = ld - 1;
+  v.columns.resize(static_cast<std::size_t>(rows) * v.dim);
+  for (int c = 0; c < v.dim; ++c) {
+    std::copy_n(front.data() + c * ld, rows, v.columns.data() + c * rows);
+    v.y[c] = front[c * ld + rows];
+    v.share -= 0.5 * v.y[c] * v.y[c];
+  }
+  const int m = v.separator_dim;
+  v.contribution.resize(static_cast<std::size_t>(m) * (m + 3) / 2);
+  double *to = v.contribution.data();
+  for (int c = v.dim; c < rows; ++c)
+    to = std::copy(front.data() + c * ld + c, front.data() + c * ld + rows, to);
+  for (int c = v.dim; c < rows; ++c)
+    *to++ = front[c * ld + rows];
+  v.has_contribution = true;
+  v.eliminated = true;
+  v.parent = -1;
+  if (!v.separator.empty()) {
+    v.parent = v.separator.front();
+    variables[v.parent].children.push_back(id);
+  }
+  position[id] = -1;
+  for (const int other : v.separator)
+    position[other] = -1;
+}
+
+/// delta_v = L_vv^-T (y_v - L_sv^T delta_s)
+void Smoother::State::solve(Variable &v)
+{
+  const int rows = v.dim + v.separator_dim;
+  double x[6];
+  std::copy_n(v.y.data(), v.dim, x);
+  int row = v.dim;
+  for (const int id : v.separator) {
+    const Variable &other = variables[id];
+    for (int c = 0; c < v.dim; ++c) {
+      const double *column = v.columns.data() + c * rows + row;
+      for (int i = 0; i < other.dim; ++i)
+        x[c] -= column[i] * other.delta(i);
+    }
+    row += other.dim;
+  }
+  for (int c = v.dim - 1; c >= 0; --c) {
+    const double *column = v.columns.data() + c * rows;
+    for (int i = c + 1; i < v.dim; ++i)
+      x[c] -= column[i] * x[i];
+    x[c] /= column[c];
+  }
+  for (int c = 0; c < v.dim; ++c)
+    v.delta(c) = x[c];
+}
+} // namespace bole

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/smoothing/graph.h>
+
+#include <numeric>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+double cost(const Graph &graph)
+{
+  double sum = 0;
+  const auto pose = [&](std::size_t i) -> const Pose & { return graph.poses[i].wMb; };
+  for (const Graph::PosePriorEdge &edge : graph.pose_priors) {
+    const Matrix6d S = squareRootInformation<6>(edge.prior.covariance, "pose prior covariance");
+    sum += 0.5 * residual(edge.prior, S, pose(edge.pose), nullptr).squaredNorm();
+  }
+  for (const Graph::OdometryEdge &edge : graph.odometry) {
+    const Matrix6d S = squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
+    sum += 0.5 *
+           residual(edge.odometry, S, pose(edge.a), pose(edge.b), nullptr, nullptr).squaredNorm();
+  }
+  for (const Graph::RelativePoseEdge &edge : graph.relative_poses) {
+    const Matrix5d S =
+        squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
+    const Vector5d r =
+        residual(edge.measurement, S, graph.bMc, pose(edge.a), pose(edge.b), nullptr, nullptr);
+    sum += 0.5 * graph.direction_loss.rho(r.squaredNorm());
+  }
+  for (const Graph::HeightEdge &edge : graph.heights) {
+    const double r = residual(edge.height, pose(edge.pose), nullptr);
+    sum += 0.5 * r * r;
+  }
+  for (const Graph::ObservationEdge &edge : graph.observations) {
+    SquareRootSummary root;
+    const SummaryStatus status = squareRoot(edge.summary, root);
+    if (status != SummaryStatus::ok && status != SummaryStatus::projected)
+      throw vpException(vpException::badValue, "summary = %s, must be positive semi-definite",
+                        toString(status));
+    const Vector4d r = residual(root, graph.bMc, pose(edge.pose), graph.trunks[edge.trunk].trunk,
+                                nullptr, nullptr);
+    sum += 0.5 * graph.summary_loss.rho(r.squaredNorm());
+  }
+  for (const Graph::TrunkVertex &vertex : graph.trunks)
+    sum += 0.5 * residual(vertex.prior, vertex.trunk).squaredNorm();
+  return sum;
+}
+
+namespace
+{
+[[noreturn]] void fail(const char *kind, std::size_t i, const char *why)
+{
+  throw vpException(vpException::badValue, "%s %zu: %s", kind, i, why);
+}
+
+/// Sets of poses that factors tie together.
+struct Components
+{
+  explicit Components(std::size_t n) : parent(n) { std::iota(parent.begin(), parent.end(), 0); }
+  std::size_t root(std::size_t i)
+  {
+    while (parent[i] != i)
+      i = parent[i] = parent[parent[i]];
+    return i;
+  }
+  void join(std::size_t a, std::size_t b) { parent[root(a)] = root(b); }
+  std::vector<std::size_t> parent;
+};
+
+void checkVertices(const Graph &graph)
+{
+  for (std::size_t i = 0; i < graph.poses.size(); ++i)
+    if (!graph.poses[i].wMb.isFinite())
+      fail("pose", i, "must be finite");
+  for (std::size_t j = 0; j < graph.trunks.size(); ++j) {
+    const Graph::TrunkVertex &vertex = graph.trunks[j];
+    if (!vertex.trunk.minus(Trunk()).allFinite() || !vertex.prior.mean.minus(Trunk()).allFinite())
+      fail("trunk", j, "must be finite");
+    if (!vertex.prior.sigma.allFinite() || !(vertex.prior.sigma.array() > 0).all())
+      fail("trunk", j, "sigmas of its prior must be above 0");
+  }
+}
+} // namespace
+
+void validate(const Graph &graph)
+{
+  checkVertices(graph);
+  const std::size_t n = graph.poses.size();
+  Components components(n);
+  std::vector<bool> anchored(n, false);
+  for (std::size_t i = 0; i < graph.pose_priors.size(); ++i) {
+    const Graph::PosePriorEdge &edge = graph.pose_priors[i];
+    if (edge.pose >= n)
+      fail("pose prior", i, "must name a pose");
+    if (!edge.prior.mean.isFinite())
+      fail("pose prior", i, "must be finite");
+    squareRootInformation<6>(edge.prior.covariance, "pose prior covariance");
+    anchored[edge.pose] = true;
+  }
+  for (std::size_t i = 0; i < graph.odometry.size(); ++i) {
+    const Graph::OdometryEdge &edge = graph.odometry[i];
+    if (edge.a >= n || edge.b >= n || edge.a == edge.b)
+      fail("odometry", i, "must name two poses");
+    if (!edge.odometry.aMb.isFinite())
+      fail("odometry", i, "must be finite");
+    squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
+    components.join(edge.a, edge.b);
+  }
+  for (std::size_t i = 0; i < graph.relative_poses.size(); ++i) {
+    const Graph::RelativePoseEdge &edge = graph.relative_poses[i];
+    if (edge.a >= n || edge.b >= n || edge.a == edge.b)
+      fail("relative pose", i, "must name two poses");
+    if (!edge.measurement.caRcb.allFinite() ||
+        !(std::abs(edge.measurement.direction.norm() - 1) < 1e-6))
+      fail("relative pose", i, "must be finite with a direction of length 1");
+    squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
+  }
+  for (std::size_t i = 0; i < graph.heights.size(); ++i) {
+    const Graph::HeightEdge &edge = graph.heights[i];
+    if (edge.pose >= n)
+      fail("height", i, "must name a pose");
+    if (!std::isfinite(edge.height.z) || !(edge.height.sigma > 0))
+      fail("height", i, "must be finite with a sigma above 0");
+  }
+  for (std::size_t i = 0; i < graph.observations.size(); ++i) {
+    const Graph::ObservationEdge &edge = graph.observations[i];
+    SquareRootSummary root;
+    if (edge.pose >= n || edge.trunk >= graph.trunks.size())
+      fail("observation", i, "must name a pose and a trunk");
+    const SummaryStatus status = squareRoot(edge.summary, root);
+    if (status == SummaryStatus::indefinite)
+      fail("observation", i, "F must be positive semi-definite");
+    if (status == SummaryStatus::not_finite)
+      fail("observation", i, "must be finite");
+  }
+  for (std::size_t i = 0; i < n; ++i)
+    if (anchored[i])
+      anchored[components.root(i)] = true;
+  for (std::size_t i = 0; i < n; ++i)
+    if (!anchored[components.root(i)])
+      fail("pose", i, "must be tied to the world by odometry and a pose prior");
+}
+} // namespace bole

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The fixed lag: variables too far behind are marginalised into a linear prior on their neighbours.
+#include "state.h"
+
+#include <algorithm>
+
+namespace bole
+{
+/// A leaf of the tree leaves exactly its contribution behind.
+void Smoother::State::closeVariable(int id)
+{
+  Variable &v = variables[id];
+  if (v.is_pose) {
+    poses[v.number].closed_covariance = poseCovariance(v.number);
+    poses[v.number].point = estimate(poses[v.number]);
+  }
+  else {
+    trunks[v.number].closed_covariance = trunkCovariance(v.number);
+    trunks[v.number].point = estimate(trunks[v.number]);
+  }
+  for (const int f : v.assembled) {
+    Factor &factor = factors[f];
+    factor.alive = false;
+    if (factor.kind == FactorKind::observation)
+      --live_observations;
+    const std::vector<int> pair = {factor.a, factor.b};
+    for (const int other :
+         factor.kind == FactorKind::marginal ? marginals[factor.data].variables : pair)
+      if (other >= 0 && other != id) {
+        std::vector<int> &list = variables[other].factors;
+        list.erase(std::remove(list.begin(), list.end(), f), list.end());
+      }
+    if (factor.kind == FactorKind::marginal) { // its numbers are in the new one
+      marginals[factor.data].H.resize(0, 0);
+      marginals[factor.data].poses.clear();
+      marginals[factor.data].trunks.clear();
+    }
+  }
+  if (!v.separator.empty()) {
+    const int m = v.separator_dim;
+    MarginalData data;
+    data.variables = v.separator;
+    data.H.resize(m, m);
+    data.g.resize(m);
+    const double *from = v.contribution.data();
+    for (int c = 0; c < m; ++c)
+      for (int r = c; r < m; ++r)
+        data.H(r, c) = data.H(c, r) = *from++;
+    for (int c = 0; c < m; ++c)
+      data.g(c) = *from++;
+    data.g_there = data.g;
+    const int id_factor = static_cast<int>(factors.size());
+    for (const int other : v.separator) {
+      const Variable &neighbour = variables[other];
+      data.poses.push_back(neighbour.is_pose ? poses[neighbour.number].point : Pose());
+      data.trunks.push_back(neighbour.is_pose ? Trunk() : trunks[neighbour.number].point);
+      variables[other].factors.push_back(id_factor);
+    }
+    Factor factor;
+    factor.kind = FactorKind::marginal;
+    factor.stale = false;
+    factor.data = static_cast<int>(marginals.size());
+    factor.a = v.separator.front();
+    factor.assembled_at = v.parent;
+    marginals.push_back(std::move(data));
+    factors.push_back(factor);
+    Variable &parent = variables[v.parent];
+    parent.assembled.push_back(id_factor);
+    parent.children.erase(std::remove(parent.children.begin(), parent.children.end(), id),
+                          parent.children.end());
+  }
+  v.life = Life::closed;
+  for (std::vector<int> *list : {&v.factors, &v.assembled, &v.separator})
+    std::vector<int>().swap(*list);
+  std::vector<double>().swap(v.columns);
+  std::vector<double>().swap(v.contribution);
+  v.parent = -1;
+}
+
+void Smoother::State::closeBehindLag()
+{
+  const int keep_from = static_cast<int>(poses.size()) - options.fixed_lag;
+  const auto isLeaf = [this](int id) {
+    return variables[id].eliminated && variables[id].children.empty() &&
+           (variables[id].has_contribution || variables[id].separator.empty());
+  };
+  while (true) {
+    bool closed = false;
+    for (std::size_t i = 0; i < open_trunks.size();) {
+      const int id = open_trunks[i];
+      const TrunkState &trunk = trunks[variables[id].number];
+      if (variables[id].life == Life::open &&
+          (trunk.last_pose >= oldest_open_pose || !isLeaf(id))) {
+        ++i;
+        continue;
+      }
+      if (variables[id].life == Life::open) {
+        closeVariable(id);
+        closed = true;
+      }
+      open_trunks[i] = open_trunks.back();
+      open_trunks.pop_back();
+    }
+    if (oldest_open_pose < keep_from && isLeaf(poses[oldest_open_pose].variable)) {
+      closeVariable(poses[oldest_open_pose].variable);
+      ++oldest_open_pose;
+      closed = true;
+    }
+    if (!closed)
+      return;
+  }
+}
+} // namespace bole

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The optimum of the whole graph, by Levenberg-Marquardt over the same elimination.
+#include "state.h"
+
+#include <algorithm>
+
+namespace bole
+{
+/// Diagonal of the normal equations before elimination: the scale of Marquardt's damping.
+void Smoother::State::measureDampingScale()
+{
+  damping_scale.assign(variables.size(), Vector6d::Constant(1e-9));
+  const auto add = [this](int v, const double *columns, int rows) {
+    for (int c = 0; c < variables[v].dim; ++c)
+      for (int i = 0; i < rows; ++i)
+        damping_scale[v](c) += columns[c * rows + i] * columns[c * rows + i];
+  };
+  for (const Factor &factor : factors) {
+    if (!factor.alive || factor.kind == FactorKind::marginal)
+      continue;
+    const int rows = rowCount(factor.kind);
+    add(factor.a, factor.linear, rows);
+    if (factor.b >= 0)
+      add(factor.b, factor.linear + rows * variables[factor.a].dim, rows);
+  }
+}
+
+/// One solve of the whole graph with the present damping; \p anew also moves the points of
+/// linearisation.
+void Smoother::State::solveAll(UpdateResult &result, bool anew)
+{
+  for (int id = 0; id < static_cast<int>(variables.size()); ++id) {
+    if (!isOpen(id))
+      continue;
+    variables[id].in_moved = false;
+    if (anew)
+      relinearise(id);
+    touch(id);
+  }
+  moved.clear();
+  if (anew && damping > 0) {
+    for (const int id : stale_factors)
+      if (factors[id].alive && factors[id].stale)
+        linearise(factors[id]);
+  }
+  if (damping > 0)
+    measureDampingScale();
+  reeliminate(result);
+  backSubstitute(result);
+  ++result.iterations;
+}
+
+UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
+{
+  UpdateResult result;
+  held_directions = 0;
+  damping = 0;
+  double before = costAtEstimate();
+  bool settled = false, anew = true;
+  while (!settled && result.iterations < max_iterations) {
+    solveAll(result, anew);
+    const double after = costAtEstimate();
+    if (std::isfinite(after) && after <= before * (1 + 1e-13)) {
+      settled = before - after <= tolerance * before;
+      before = after;
+      anew = true;
+      damping = damping < 1e-7 ? 0 : damping / 10;
+    }
+    else {
+      for (Variable &v : variables)
+        v.delta.setZero();
+      anew = false;
+      damping = damping == 0 ? 1e-6 : damping * 10;
+      settled = damping > 1e12;
+    }
+  }
+  damping = 0; // the factorisation left behind is that of the graph itself
+  solveAll(result, true);
+  const double after = costAtEstimate();
+  if (!(after <= before))
+    for (Variable &v : variables) {
+      v.delta.setZero();
+      v.passed.setZero();
+    }
+  result.relinearised = variables.size();
+  result.cost = std::min(before, std::isfinite(after) ? after : before);
+  result.status = held_directions > 0 ? UpdateStatus::degenerate
+                  : settled           ? UpdateStatus::ok
+                                      : UpdateStatus::iteration_limit;
+  if (options.fixed_lag > 0)
+    closeBehindLag();
+  return result;
+}
+} // namespace bole

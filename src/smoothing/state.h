@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What a Smoother holds: variables, factors, their linearisation, and the elimination tree.
+///
+/// Normal equations H delta = g in lower Cholesky form, H = L L^T in the order of elimination.
+/// Eliminating variable v from its front [v, separator(v)] leaves the columns of L that belong to
+/// v, y_v = L_vv^-1 g_v, and a contribution (Schur complement and right-hand side on the separator)
+/// that the parent, the first eliminated of the separator, takes into its own front. Every
+/// separator lies on the path from its node to the root.
+
+#include <bole/smoothing/smoother.h>
+
+#include <array>
+#include <deque>
+
+namespace bole
+{
+/// Stable blocks of doubles that are only ever given back all at once.
+class BlockStore
+{
+public:
+  double *allocate(std::size_t count);
+  std::size_t bytes() const { return m_chunks.size() * kChunk * sizeof(double); }
+
+private:
+  static constexpr std::size_t kChunk = 1 << 15;
+  std::deque<std::vector<double>> m_chunks;
+  std::size_t m_used = kChunk;
+};
+
+enum class Life : unsigned char
+{
+  open,
+  closed,
+  removed
+};
+
+struct Variable
+{
+  bool is_pose = true;
+  Life life = Life::open;
+  bool in_moved = false;
+  int number = 0; ///< of the pose or trunk
+  int dim = 6;
+  std::vector<int> factors;
+  Vector6d delta = Vector6d::Zero(); ///< estimate = linearisation point (+) delta
+  Vector6d passed =
+      Vector6d::Zero();          ///< the delta that those eliminated before were last solved with
+  int affected = 0, changed = 0; ///< stamps
+
+  // node of the elimination tree
+  bool eliminated = false;
+  bool has_contribution = false;
+  int parent = -1;
+  int separator_dim = 0;
+  std::int64_t order = -1;
+  std::vector<int> children, separator, assembled;
+  std::vector<double> columns; ///< (dim + separator_dim) x dim, column-major: L_vv over L_sv
+  std::vector<double>
+      contribution; ///< packed lower triangle on the separator, then its right-hand side
+  std::array<double, 6> y{};
+  double share = 0; ///< of the cost of the linearised graph
+};
+
+enum class FactorKind : unsigned char
+{
+  pose_prior,
+  odometry,
+  relative_pose,
+  height,
+  observation,
+  marginal
+};
+
+struct Factor
+{
+  FactorKind kind = FactorKind::pose_prior;
+  bool alive = true;
+  bool stale = true;     ///< linearise before the next elimination
+  int data = 0;          ///< index among the data of its kind
+  int a = -1, b = -1;    ///< variables (marginal: see its data)
+  int assembled_at = -1; ///< variable whose front takes it in
+  double *linear =
+      nullptr;     ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual
+  double cost = 0; ///< rho / 2 at the point of linearisation
+};
+
+/// Rows of the whitened residual (not of a marginal).
+int rowCount(FactorKind kind);
+
+struct PosePriorData
+{
+  PosePrior factor;
+  Matrix6d S;
+};
+struct OdometryData
+{
+  Odometry factor;
+  Matrix6d S;
+};
+struct RelativePoseData
+{
+  RelativePoseMeasurement factor;
+  Matrix5d S;
+};
+struct ObservationData
+{
+  SummaryFactor factor;
+  SquareRootSummary root;
+};
+/// What closed variables leave behind: a quadratic in the tangents at the points where it was made.
+struct MarginalData
+{
+  std::vector<int> variables;
+  std::vector<Pose> poses;   ///< points, for the variables that are poses
+  std::vector<Trunk> trunks; ///< points, for those that are trunks
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g_there, g; ///< at those points, at the present points of linearisation
+};
+
+struct PoseState
+{
+  Pose point; ///< of linearisation; the last estimate once closed
+  int variable = -1;
+  Matrix6d closed_covariance = Matrix6d::Zero();
+};
+struct TrunkState
+{
+  Trunk point;
+  TrunkPrior prior;
+  int variable = -1;
+  int last_pose = 0;
+  int observations = 0;
+  bool removed = false;
+  Matrix5d closed_covariance = Matrix5d::Zero();
+};
+
+class Smoother::State
+{
+public:
+  SmootherOptions options;
+  std::deque<Variable> variables;
+  std::deque<PoseState> poses;
+  std::deque<TrunkState> trunks;
+  std::deque<Factor> factors;
+  std::deque<PosePriorData> pose_priors;
+  std::deque<OdometryData> odometry;
+  std::deque<RelativePoseData> relative_poses;
+  std::deque<Height> heights;
+  std::deque<ObservationData> observations;
+  std::deque<MarginalData> marginals;
+  std::size_t live_observations = 0;
+
+  // build.cpp
+  std::size_t newPose(const Pose &point);
+  std::size_t newTrunk(const Trunk &point, const TrunkPrior &prior);
+  void reopenTrunk(int trunk);
+  int newFactor(FactorKind kind, int data, int a, int b);
+  void dropFactor(int factor);
+  void addOdometryFactor(int a, int b, const Odometry &measured);
+  void addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
+                            const SquareRootSummary &root);
+  void removeTrunk(int trunk);
+  void mergeTrunks(int keep, int gone);
+  void checkPose(std::size_t pose) const;
+  void checkTrunk(std::size_t trunk) const;
+  bool isOpen(int variable) const { return variables[variable].life == Life::open; }
+
+  // linearise.cpp
+  void linearise(Factor &factor);
+  double costAtEstimate(const Factor &factor) const;
+  double costAtEstimate() const;
+  void relinearise(int variable);
+  bool movedTooFar(const Variable &variable) const;
+  Pose estimate(const PoseState &pose) const;
+  Trunk estimate(const TrunkState &trunk) const;
+  Vector5d limitedTrunkStep(const TrunkState &trunk, const Vector5d &step) const;
+
+  // elimination.cpp
+  void eliminate(int variable);
+  void assemble(const Factor &factor);
+  void assembleChild(const Variable &child);
+  void solve(Variable &variable);
+
+  // update.cpp
+  UpdateResult update();
+  void touch(int variable);
+  void closeUpwards();
+  void addMissingContributions();
+  void reeliminate(UpdateResult &result);
+  void backSubstitute(UpdateResult &result);
+  void dropOldContributions();
+
+  // lag.cpp
+  void closeBehindLag();
+  void closeVariable(int variable);
+
+  // optimize.cpp
+  void measureDampingScale();
+  void solveAll(UpdateResult &result, bool anew);
+  UpdateResult optimize(double tolerance, int max_iterations);
+
+  // ordering.cpp
+  void orderAffected();
+  void orderByMinimumDegree();
+
+  // covariance.cpp
+  /// y = L^-1 X with X zero but for the rows of the variables given; returns y^T y.
+  template <int Columns>
+  Eigen::Matrix<double, Columns, Columns>
+  inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X, int count);
+  Matrix5d trunkCovariance(int trunk);
+  Matrix6d poseCovariance(int pose);
+  Matrix4d relativeCovariance(int trunk);
+
+  // export.cpp
+  Graph graph() const;
+  std::size_t memoryBytes() const;
+
+  // work space
+  double damping = 0; ///< Levenberg's, added to the diagonal scaled by damping_scale
+  std::vector<Vector6d> damping_scale;
+  double constant_cost = 0;
+  std::vector<int> touched, affected, moved, stale_factors, pool, orphans, stack;
+  std::vector<double> front;
+  std::vector<int> position, child_map; ///< of a variable in the front
+  std::vector<std::array<double, 36>> path_rows;
+  std::vector<int> path;
+  std::vector<int> open_trunks; ///< variables, for the lag
+  int front_rows = 0;           ///< columns of the front plus the row of the right-hand side
+  int stamp = 0, change_stamp = 0;
+  int held_directions = 0;
+  std::int64_t next_order = 0;
+  int oldest_open_pose = 0;
+  BlockStore store;
+};
+} // namespace bole
