@@ -9,4 +9,5 @@
 namespace bole::apps
 {
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
+void addSimulate(CLI::App &app);
 } // namespace bole::apps

@@ -11,6 +11,7 @@ int main(int argc, char **argv)
   app.set_version_flag("--version", "bole " BOLE_VERSION);
   app.require_subcommand(1);
   bole::apps::addEvaluate(app);
+  bole::apps::addSimulate(app);
   try {
     app.parse(argc, argv);
   }
