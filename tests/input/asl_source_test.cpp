@@ -1,36 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight_folder.h"
+#include "messages.h"
 
 #include <bole/input/asl_source.h>
 
 #include <gmock/gmock.h>
-#include <visp3/core/vpException.h>
 
 using namespace bole;
 using bole::test::FlightFolder;
+using bole::test::messageOf;
+using bole::test::readAll;
 using testing::HasSubstr;
-
-namespace
-{
-std::string messageOf(const std::function<void()> &action)
-{
-  try {
-    action();
-  }
-  catch (const vpException &error) {
-    return error.what();
-  }
-  return "";
-}
-
-std::vector<Frame> readAll(FrameSource &source)
-{
-  std::vector<Frame> frames;
-  for (Frame frame; source.next(frame);)
-    frames.push_back(frame);
-  return frames;
-}
-} // namespace
 
 TEST(AslSource, DeliversEveryFrameWithStampPixelsOdometryAndGyro)
 {

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "frame_builder.h"
+
+#include <bole/input/sequence_source.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+#include <regex>
+#include <visp3/core/vpException.h>
+#include <visp3/core/vpIoTools.h>
+
+namespace bole
+{
+namespace fs = std::filesystem;
+namespace
+{
+struct Numbers
+{
+  long first = std::numeric_limits<long>::max();
+  long last = -1;
+};
+
+/// The one `%d` or `%0Nd` of a pattern.
+std::smatch placeholderOf(const std::string &name)
+{
+  static const std::regex kPlaceholder("%(0[0-9]{1,2})?d");
+  std::smatch match;
+  if (!std::regex_search(name, match, kPlaceholder) ||
+      std::count(name.begin(), name.end(), '%') != 1)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: must have one number such as %04d in its name", name));
+  return match;
+}
+
+std::string imagePath(const std::string &pattern, long number)
+{
+  const std::string name = fs::path(pattern).filename().string();
+  const std::smatch match = placeholderOf(name);
+  const std::string digits = match[1].matched ? match[1].str().substr(1) : "0";
+  const std::string padded = fmt::format("{:0{}d}", number, std::stoi("0" + digits));
+  return (fs::path(pattern).parent_path() / (match.prefix().str() + padded + match.suffix().str()))
+      .string();
+}
+
+Numbers numbersOf(const std::string &pattern)
+{
+  const fs::path folder =
+      fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
+  const std::string name = fs::path(pattern).filename().string();
+  placeholderOf(name);
+  if (!fs::is_directory(folder))
+    throw vpException(vpException::ioError, fmt::format("{}: no such folder", folder.string()));
+  Numbers numbers;
+  for (const auto &entry : fs::directory_iterator(folder)) {
+    const long number = vpIoTools::getIndex(entry.path().filename().string(), name);
+    if (number < 0 || fs::path(imagePath(pattern, number)).filename() != entry.path().filename())
+      continue;
+    numbers.first = std::min(numbers.first, number);
+    numbers.last = std::max(numbers.last, number);
+  }
+  if (numbers.last < 0)
+    throw vpException(vpException::ioError, fmt::format("{}: no such image", pattern));
+  return numbers;
+}
+
+/// The first image that can be read gives the size of all.
+ImageFile firstReadable(const std::string &pattern, const Numbers &numbers)
+{
+  std::string fault;
+  for (long number = numbers.first; number <= numbers.last; ++number) {
+    ImageFile file = readImageFile(imagePath(pattern, number));
+    if (file.status == FrameStatus::ok)
+      return file;
+    fault = fault.empty() ? file.message : fault;
+  }
+  throw vpException(vpException::ioError,
+                    fmt::format("{}: none of the images can be read; {}", pattern, fault));
+}
+
+bool isImage(const fs::path &path)
+{
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const std::vector<std::string> kExtensions = {".png", ".jpg", ".jpeg", ".pgm", ".ppm",
+                                                       ".pnm", ".bmp", ".tif",  ".tiff"};
+  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+}
+} // namespace
+
+struct SequenceSource::State
+{
+  std::string pattern;
+  std::string note;
+  Numbers numbers;
+  long at = 0;
+  double rate_hz = 25;
+  std::unique_ptr<FrameBuilder> builder;
+
+  std::int64_t stampOf(long number) const
+  {
+    return std::llround(static_cast<double>(number - numbers.first) * 1e9 / rate_hz);
+  }
+};
+
+SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &options)
+    : m_state(std::make_unique<State>())
+{
+  options.validate();
+  State &state = *m_state;
+  state.pattern = fs::is_directory(pattern) ? patternOf(pattern) : pattern;
+  if (state.pattern.empty())
+    throw vpException(vpException::ioError, fmt::format("{}: no numbered images in it", pattern));
+  state.numbers = numbersOf(state.pattern);
+  state.at = state.numbers.first;
+  state.rate_hz = options.frame_rate_hz;
+  const ImageFile first = firstReadable(state.pattern, state.numbers);
+  const MountedCamera camera = cameraFor(options, static_cast<int>(first.image.getWidth()),
+                                         static_cast<int>(first.image.getHeight()), state.note);
+  Recording recording;
+  recording.odometry = readOdometry(options);
+  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path,
+                 state.pattern);
+  state.builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
+}
+
+SequenceSource::~SequenceSource() = default;
+
+bool SequenceSource::next(Frame &frame)
+{
+  State &state = *m_state;
+  if (state.at > state.numbers.last)
+    return false;
+  const long number = state.at++;
+  state.builder->build(state.stampOf(number), readImageFile(imagePath(state.pattern, number)),
+                       frame);
+  return true;
+}
+
+PinholeCamera SequenceSource::camera() const { return m_state->builder->camera(); }
+Pose SequenceSource::bMc() const { return m_state->builder->bMc(); }
+std::size_t SequenceSource::size() const
+{
+  return static_cast<std::size_t>(m_state->numbers.last - m_state->numbers.first + 1);
+}
+std::string SequenceSource::name() const { return m_state->pattern; }
+bool SequenceSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
+bool SequenceSource::hasGyro() const { return false; }
+std::string SequenceSource::note() const { return m_state->note; }
+
+std::string SequenceSource::patternOf(const std::string &folder)
+{
+  if (!fs::is_directory(folder))
+    return {};
+  static const std::regex kNumbered("^([^0-9]*(?:[0-9]+[^0-9]+)*?)([0-9]+)(\\.[A-Za-z]+)$");
+  std::map<std::string, int> counts; // of the images of each pattern
+  for (const auto &entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    std::smatch match;
+    if (!isImage(entry.path()) || name.find('%') != std::string::npos ||
+        !std::regex_match(name, match, kNumbered))
+      continue;
+    const std::string digits = match[2].str();
+    const bool is_padded = digits.size() > 1 && digits.front() == '0';
+    ++counts[match[1].str() + (is_padded ? fmt::format("%0{}d", digits.size()) : "%d") +
+             match[3].str()];
+  }
+  // image0099.png counts for %04d, image1000.png for %d: the padded pattern knows both.
+  std::string best;
+  for (const auto &[pattern, count] : counts) {
+    const bool is_padded = pattern.find("%d") == std::string::npos;
+    const bool best_is_padded = !best.empty() && best.find("%d") == std::string::npos;
+    if (best.empty() || is_padded > best_is_padded ||
+        (is_padded == best_is_padded && count > counts[best]))
+      best = pattern;
+  }
+  return best.empty() ? best : (fs::path(folder) / best).string();
+}
+} // namespace bole

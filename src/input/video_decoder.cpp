@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "video_decoder.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <visp3/core/vpException.h>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/display.h>
+#include <libavutil/pixdesc.h>
+#include <libswscale/swscale.h>
+}
+
+namespace bole
+{
+namespace
+{
+template <typename Object, void (*release)(Object **)> struct Release
+{
+  void operator()(Object *object) const { release(&object); }
+};
+void releaseScaler(SwsContext **scaler) { sws_freeContext(*scaler); }
+
+using Format = std::unique_ptr<AVFormatContext, Release<AVFormatContext, avformat_close_input>>;
+using Codec = std::unique_ptr<AVCodecContext, Release<AVCodecContext, avcodec_free_context>>;
+using Packet = std::unique_ptr<AVPacket, Release<AVPacket, av_packet_free>>;
+using FramePtr = std::unique_ptr<AVFrame, Release<AVFrame, av_frame_free>>;
+using Scaler = std::unique_ptr<SwsContext, Release<SwsContext, releaseScaler>>;
+
+/// Keeps libav from writing to the terminal while it lives: its faults become exceptions or
+/// statuses.
+class Quiet
+{
+public:
+  Quiet() : m_level(av_log_get_level()) { av_log_set_level(AV_LOG_QUIET); }
+  ~Quiet() { av_log_set_level(m_level); }
+  Quiet(const Quiet &) = delete;
+  Quiet &operator=(const Quiet &) = delete;
+
+private:
+  int m_level;
+};
+
+[[noreturn]] void fail(const std::string &path, const char *what, int code)
+{
+  std::array<char, AV_ERROR_MAX_STRING_SIZE> reason{};
+  av_strerror(code, reason.data(), reason.size());
+  throw vpException(vpException::ioError, fmt::format("{}: {}: {}", path, what, reason.data()));
+}
+
+/// Quarter turns, clockwise, that bring the picture upright.
+int quarterTurns(AVStream &stream)
+{
+  const std::uint8_t *matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  if (matrix == nullptr)
+    return 0;
+  std::array<std::int32_t, 9> values;
+  std::memcpy(values.data(), matrix, sizeof values);
+  const double degrees = -av_display_rotation_get(values.data());
+  return std::isfinite(degrees) ? (static_cast<int>(std::lround(degrees / 90)) % 4 + 4) % 4 : 0;
+}
+
+/// Whether the first plane is the 8-bit luma of every pixel.
+bool hasLumaPlane(AVPixelFormat format)
+{
+  switch (format) {
+  case AV_PIX_FMT_YUV420P:
+  case AV_PIX_FMT_YUV422P:
+  case AV_PIX_FMT_YUV444P:
+  case AV_PIX_FMT_YUVJ420P:
+  case AV_PIX_FMT_YUVJ422P:
+  case AV_PIX_FMT_YUVJ444P:
+  case AV_PIX_FMT_NV12:
+  case AV_PIX_FMT_GRAY8:
+    return true;
+  default:
+    return false;
+  }
+}
+
+bool isFullRange(const AVFrame &frame)
+{
+  const auto format = static_cast<AVPixelFormat>(frame.format);
+  return frame.color_range == AVCOL_RANGE_JPEG || format == AV_PIX_FMT_YUVJ420P ||
+         format == AV_PIX_FMT_YUVJ422P || format == AV_PIX_FMT_YUVJ444P ||
+         format == AV_PIX_FMT_GRAY8;
+}
+
+/// Luma 16 .. 235 of video to 0 .. 255.
+const std::array<unsigned char, 256> &fullRangeTable()
+{
+  static const auto kTable = [] {
+    std::array<unsigned char, 256> table{};
+    for (int i = 0; i < 256; ++i)
+      table[static_cast<std::size_t>(i)] =
+          cv::saturate_cast<unsigned char>((i - 16) * 255.0 / 219.0);
+    return table;
+  }();
+  return kTable;
+}
+} // namespace
+
+struct VideoDecoder::Libav
+{
+  Format format;
+  Codec codec;
+  Packet packet{av_packet_alloc()};
+  FramePtr frame{av_frame_alloc()};
+  Scaler scaler;
+  int stream = 0;
+  int quarter_turns = 0;
+
+  cv::Mat grey(const AVFrame &picture);
+};
+
+cv::Mat VideoDecoder::Libav::grey(const AVFrame &picture)
+{
+  const auto pixel_format = static_cast<AVPixelFormat>(picture.format);
+  cv::Mat image(picture.height, picture.width, CV_8UC1);
+  if (hasLumaPlane(pixel_format)) {
+    const bool is_full = isFullRange(picture);
+    const auto &table = fullRangeTable();
+    for (int v = 0; v < picture.height; ++v) {
+      const unsigned char *line =
+          picture.data[0] + static_cast<std::ptrdiff_t>(v) * picture.linesize[0];
+      unsigned char *out = image.ptr(v);
+      for (int u = 0; u < picture.width; ++u)
+        out[u] = is_full ? line[u] : table[line[u]];
+    }
+  }
+  else {
+    scaler.reset(sws_getCachedContext(scaler.release(), picture.width, picture.height, pixel_format,
+                                      picture.width, picture.height, AV_PIX_FMT_GRAY8, SWS_POINT,
+                                      nullptr, nullptr, nullptr));
+    if (!scaler)
+      return {};
+    unsigned char *out[] = {image.data};
+    const int stride[] = {static_cast<int>(image.step)};
+    sws_scale(scaler.get(), picture.data, picture.linesize, 0, picture.height, out, stride);
+  }
+  if (quarter_turns != 0) {
+    const int codes[] = {cv::ROTATE_90_CLOCKWISE, cv::ROTATE_180, cv::ROTATE_90_COUNTERCLOCKWISE};
+    cv::rotate(image.clone(), image, codes[quarter_turns - 1]);
+  }
+  return image;
+}
+
+VideoDecoder::VideoDecoder(const std::string &path)
+    : m_path(path), m_libav(std::make_unique<Libav>())
+{
+  if (!std::filesystem::is_regular_file(path))
+    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+  const Quiet quiet;
+  AVFormatContext *format = nullptr;
+  int code = avformat_open_input(&format, path.c_str(), nullptr, nullptr);
+  if (code < 0)
+    fail(path, "no video", code);
+  m_libav->format.reset(format);
+  code = avformat_find_stream_info(format, nullptr);
+  if (code < 0)
+    fail(path, "no video", code);
+  const AVCodec *decoder = nullptr;
+  m_libav->stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
+  if (m_libav->stream < 0)
+    fail(path, "no video stream that can be decoded", m_libav->stream);
+
+  AVStream &stream = *format->streams[m_libav->stream];
+  m_libav->codec.reset(avcodec_alloc_context3(decoder));
+  AVCodecContext &codec = *m_libav->codec;
+  avcodec_parameters_to_context(&codec, stream.codecpar);
+  codec.thread_count = 1;
+  codec.pkt_timebase = stream.time_base;
+  codec.err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
+  code = avcodec_open2(&codec, decoder, nullptr);
+  if (code < 0)
+    fail(path, "its codec cannot be opened", code);
+  m_libav->quarter_turns = quarterTurns(stream);
+}
+
+VideoDecoder::~VideoDecoder() = default;
+
+std::size_t VideoDecoder::frames() const
+{
+  const std::int64_t count = m_libav->format->streams[m_libav->stream]->nb_frames;
+  return count > 0 ? static_cast<std::size_t>(count) : 0;
+}
+
+bool VideoDecoder::next(Picture &picture)
+{
+  while (m_ready.empty() && !m_is_at_end)
+    decodeMore();
+  if (m_ready.empty())
+    return false;
+  picture = std::move(m_ready.front());
+  m_ready.pop_front();
+  return true;
+}
+
+/// Feeds one packet of the stream, or the end of it, and takes what comes out.
+void VideoDecoder::decodeMore()
+{
+  const Quiet quiet;
+  AVPacket &packet = *m_libav->packet;
+  AVCodecContext &codec = *m_libav->codec;
+  const bool has_packet = av_read_frame(m_libav->format.get(), &packet) >= 0;
+  if (has_packet && packet.stream_index != m_libav->stream) {
+    av_packet_unref(&packet);
+    return;
+  }
+  if (has_packet && packet.pts != AV_NOPTS_VALUE && (packet.flags & AV_PKT_FLAG_DISCARD) == 0)
+    m_pending.insert(packet.pts);
+  // A damaged packet is an error here; its place in m_pending is reported when a later picture
+  // comes.
+  avcodec_send_packet(&codec, has_packet ? &packet : nullptr);
+  av_packet_unref(&packet);
+  while (avcodec_receive_frame(&codec, m_libav->frame.get()) >= 0) {
+    take(*m_libav->frame);
+    av_frame_unref(m_libav->frame.get());
+  }
+  if (!has_packet) {
+    reportLost(std::numeric_limits<std::int64_t>::max());
+    m_is_at_end = true;
+  }
+}
+
+std::int64_t VideoDecoder::stampOf(std::int64_t pts)
+{
+  const AVStream &stream = *m_libav->format->streams[m_libav->stream];
+  const AVRational nanoseconds{1, 1'000'000'000};
+  const double rate = av_q2d(stream.avg_frame_rate);
+  const std::int64_t after_last =
+      m_last_stamp_ns < 0 ? 0 : m_last_stamp_ns + std::llround(1e9 / (rate > 0 ? rate : 25));
+  std::int64_t stamp_ns = after_last;
+  if (pts != AV_NOPTS_VALUE) {
+    if (!m_has_first) {
+      m_first_pts = pts;
+      m_has_first = true;
+    }
+    stamp_ns = av_rescale_q(pts - m_first_pts, stream.time_base, nanoseconds);
+  }
+  if (stamp_ns <= m_last_stamp_ns)
+    stamp_ns = m_last_stamp_ns + 1; // a file whose times go back: keep the order of presentation
+  m_last_stamp_ns = stamp_ns;
+  return stamp_ns;
+}
+
+void VideoDecoder::reportLost(std::int64_t before)
+{
+  while (!m_pending.empty() && *m_pending.begin() < before) {
+    Picture lost;
+    lost.stamp_ns = stampOf(*m_pending.begin());
+    lost.is_damaged = true;
+    lost.message = "could not be decoded";
+    m_ready.push_back(std::move(lost));
+    m_pending.erase(m_pending.begin());
+  }
+}
+
+void VideoDecoder::take(const AVFrame &frame)
+{
+  const std::int64_t pts = frame.best_effort_timestamp;
+  if (pts != AV_NOPTS_VALUE) {
+    reportLost(pts);
+    m_pending.erase(pts);
+  }
+  Picture picture;
+  picture.stamp_ns = stampOf(pts);
+  picture.is_damaged = (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
+  if (picture.is_damaged)
+    picture.message = "damaged data, concealed by the decoder";
+  const cv::Mat grey = m_libav->grey(frame);
+  if (grey.empty()) {
+    picture.is_damaged = true;
+    picture.message = "pixel format cannot be converted to grey";
+  }
+  else {
+    picture.image.resize(static_cast<unsigned>(grey.rows), static_cast<unsigned>(grey.cols));
+    cv::Mat target(grey.rows, grey.cols, CV_8UC1, picture.image.bitmap);
+    grey.copyTo(target);
+  }
+  m_ready.push_back(std::move(picture));
+}
+} // namespace bole

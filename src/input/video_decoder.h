@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Grey pictures with their times out of a video file (libavformat, libavcodec).
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <set>
+#include <string>
+#include <visp3/core/vpImage.h>
+
+struct AVFrame;
+struct AVPacket;
+
+namespace bole
+{
+/// A picture, or the place of one that could not be decoded (then the image is empty).
+struct Picture
+{
+  std::int64_t stamp_ns = 0; ///< since the first picture
+  bool is_damaged = false;
+  std::string message;
+  vpImage<unsigned char> image;
+};
+
+/// Decodes the best video stream of a file, in the order of presentation, one thread.
+///
+/// Every packet of the stream must end in a picture: one that does not (lost reference, damaged
+/// data) is reported in its place as damaged, so that nothing is skipped silently. Pictures the
+/// decoder had to conceal are damaged too. A rotation by quarter turns that the file asks for is
+/// applied.
+class VideoDecoder
+{
+public:
+  /// Throws vpException when the file is no video that can be decoded.
+  explicit VideoDecoder(const std::string &path);
+  ~VideoDecoder();
+  VideoDecoder(const VideoDecoder &) = delete;
+  VideoDecoder &operator=(const VideoDecoder &) = delete;
+
+  /// False at the end.
+  bool next(Picture &picture);
+  /// By the file's own count, 0 when it does not say.
+  std::size_t frames() const;
+
+private:
+  struct Libav;
+
+  void decodeMore();
+  void take(const AVFrame &frame);
+  void reportLost(std::int64_t before);
+  std::int64_t stampOf(std::int64_t pts);
+
+  std::string m_path;
+  std::unique_ptr<Libav> m_libav;
+  std::deque<Picture> m_ready;
+  std::set<std::int64_t> m_pending; ///< times of packets that have not become a picture yet
+  std::int64_t m_first_pts = 0;
+  bool m_has_first = false;
+  std::int64_t m_last_stamp_ns = -1;
+  bool m_is_at_end = false;
+};
+} // namespace bole

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "flight_folder.h"
+#include "messages.h"
+
+#include <bole/geometry/so3.h>
+#include <bole/input/open_source.h>
+#include <bole/input/sequence_source.h>
+#include <bole/input/trajectory.h>
+#include <bole/input/truth.h>
+#include <bole/input/video_source.h>
+
+#include <gmock/gmock.h>
+#include <opencv2/videoio.hpp>
+
+using namespace bole;
+using bole::test::FlightFolder;
+using bole::test::messageOf;
+using bole::test::readAll;
+using testing::HasSubstr;
+
+namespace
+{
+cv::Mat picture(std::size_t index, int width = 96, int height = 64)
+{
+  cv::Mat image(height, width, CV_8UC3);
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u) {
+      const auto value = static_cast<unsigned char>(
+          128 + 60 * std::sin(0.2 * u + 0.7 * static_cast<double>(index)) * std::cos(0.1 * v));
+      image.at<cv::Vec3b>(v, u) = {value, value, value};
+    }
+  return image;
+}
+
+/// A folder of its own with what tests put into it.
+class Sources : public testing::Test
+{
+protected:
+  Sources() : m_flight(1) {}
+  std::string path(const std::string &name) const { return m_flight.path() + "/" + name; }
+
+  void writeImages(const std::string &pattern, const std::vector<int> &numbers) const
+  {
+    for (const int number : numbers)
+      cv::imwrite(path(cv::format(pattern.c_str(), number)),
+                  picture(static_cast<std::size_t>(number)));
+  }
+  void writeVideo(const std::string &name, std::size_t frames, double rate) const
+  {
+    cv::VideoWriter writer(path(name), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), rate,
+                           cv::Size(96, 64));
+    ASSERT_TRUE(writer.isOpened());
+    for (std::size_t i = 0; i < frames; ++i)
+      writer.write(picture(i));
+  }
+  FlightFolder m_flight;
+};
+} // namespace
+
+TEST_F(Sources, ASequenceKeepsThePlaceOfImagesThatAreMissing)
+{
+  writeImages("image%04d.png", {3, 4, 6, 7});
+  m_flight.write("image0005.txt", "no image");
+  SourceOptions options;
+  options.frame_rate_hz = 20;
+  SequenceSource source(path("image%04d.png"), options);
+  const auto frames = readAll(source);
+
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_EQ(source.size(), 5u);
+  EXPECT_EQ(frames[2].status, FrameStatus::missing);
+  EXPECT_EQ(frames[2].stamp_ns, 100000000);
+  EXPECT_EQ(frames[3].status, FrameStatus::ok);
+  EXPECT_EQ(frames[3].stamp_ns, 150000000);
+  EXPECT_EQ(frames[3].index, 3u);
+}
+
+TEST_F(Sources, AFolderOfNumberedImagesIsASequence)
+{
+  std::filesystem::create_directories(path("tree.d"));
+  writeImages("tree.d/v2_%05d.jpg", {0, 1, 2});
+  const auto source = openSource(path("tree.d"));
+  EXPECT_EQ(readAll(*source).size(), 3u);
+  EXPECT_THAT(source->name(), HasSubstr("v2_%05d.jpg"));
+
+  std::filesystem::create_directories(path("plain"));
+  writeImages("plain/a%d.ppm", {8, 9, 10, 11});
+  EXPECT_EQ(readAll(*openSource(path("plain"))).size(), 4u);
+  EXPECT_EQ(readAll(*openSource(path("plain/a%d.ppm"))).size(), 4u);
+}
+
+TEST_F(Sources, ATruncatedJpegIsCorrupt)
+{
+  writeImages("a%02d.jpg", {0, 1, 2});
+  std::filesystem::resize_file(path("a01.jpg"), std::filesystem::file_size(path("a01.jpg")) / 2);
+  SequenceSource source(path("a%02d.jpg"));
+  const auto frames = readAll(source);
+  EXPECT_EQ(frames[0].status, FrameStatus::ok);
+  EXPECT_EQ(frames[1].status, FrameStatus::corrupt);
+  EXPECT_EQ(frames[2].status, FrameStatus::ok);
+}
+
+TEST_F(Sources, AVideoGivesEveryFrameWithItsTime)
+{
+  writeVideo("v.avi", 12, 8);
+  VideoSource source(path("v.avi"));
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 12u);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].status, FrameStatus::ok);
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 125000000);
+    const cv::Mat truth = picture(i);
+    EXPECT_NEAR(frames[i].image[20][30], truth.at<cv::Vec3b>(20, 30)[0], 8);
+  }
+}
+
+TEST_F(Sources, DamagedFramesOfAVideoAreReportedInTheirPlace)
+{
+  writeVideo("v.avi", 12, 10);
+  {
+    // Wipe out the compressed picture of one frame in the middle.
+    std::fstream file(path("v.avi"), std::ios::in | std::ios::out | std::ios::binary);
+    std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    std::size_t at = bytes.find("movi");
+    for (int i = 0; i <= 5; ++i)
+      at = bytes.find("00dc", at + 4);
+    file.clear();
+    file.seekp(static_cast<std::streamoff>(at + 8));
+    for (int i = 0; i < 400; ++i)
+      file.put('\0');
+  }
+  VideoSource source(path("v.avi"));
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 12u);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].status, i == 5 ? FrameStatus::corrupt : FrameStatus::ok)
+        << i << frames[i].message;
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 100000000);
+  }
+}
+
+TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
+{
+  writeVideo("v.avi", 10, 10);
+  const auto size = std::filesystem::file_size(path("v.avi"));
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::filesystem::copy_file(path("v.avi"), path("w.avi"),
+                               std::filesystem::copy_options::overwrite_existing);
+    {
+      std::fstream file(path("w.avi"), std::ios::in | std::ios::out | std::ios::binary);
+      std::srand(seed);
+      for (int i = 0; i < 30; ++i) {
+        file.seekp(static_cast<std::streamoff>(6000 + static_cast<std::uintmax_t>(std::rand()) %
+                                                          (size - 6000)));
+        file.put(static_cast<char>(std::rand()));
+      }
+    }
+    VideoSource source(path("w.avi"));
+    std::int64_t last_ns = -1;
+    for (const Frame &frame : readAll(source)) {
+      EXPECT_GT(frame.stamp_ns, last_ns);
+      last_ns = frame.stamp_ns;
+    }
+  }
+}
+
+TEST_F(Sources, OdometryOfATumFileIsInterpolatedWithItsOffset)
+{
+  writeVideo("v.avi", 5, 10);
+  m_flight.write("odometry.tum",
+                 "# t x y z q\n100.0 0 0 1 0 0 0 1\n100.2 2 0 1 0 0 0 1\n1.004e2 4 0 1 0 0 0 1\n");
+  SourceOptions options;
+  options.odometry_path = path("odometry.tum");
+  options.odometry_offset_s = -100;
+  const auto source = openSource(path("v.avi"), options);
+  EXPECT_TRUE(source->hasOdometry());
+  const auto frames = readAll(*source);
+  for (std::size_t i = 0; i < 5; ++i) {
+    ASSERT_TRUE(frames[i].wMb_odometry);
+    EXPECT_NEAR(frames[i].wMb_odometry->t.x(), static_cast<double>(i), 1e-9);
+  }
+}
+
+TEST_F(Sources, SaysWhatIsWrongInOneLine)
+{
+  writeImages("i%02d.png", {0, 1});
+  m_flight.write("o.tum", "5 0 0 0 0 0 0 1\n4 0 0 0 0 0 0 1\n");
+  m_flight.write("late.tum", "500 0 0 0 0 0 0 1\n501 0 0 0 0 0 0 1\n");
+  m_flight.write("nan.tum", "0 0 0 nan 0 0 0 1\n");
+  m_flight.write("video.mp4", "this is no video");
+  m_flight.write("camera.yaml", "resolution: [640, 480]\nintrinsics: [500, 500, 320, 240]\n");
+  std::filesystem::create_directories(path("empty"));
+  const auto open = [&](const std::string &input, const std::string &odometry,
+                        const std::string &camera) {
+    SourceOptions options;
+    options.odometry_path = odometry.empty() ? odometry : path(odometry);
+    options.camera_path = camera.empty() ? camera : path(camera);
+    return messageOf([&] { openSource(path(input), options); });
+  };
+  EXPECT_THAT(open("none.mp4", "", ""), HasSubstr("none.mp4: no such file"));
+  EXPECT_THAT(open("video.mp4", "", ""), HasSubstr("video.mp4: no video"));
+  EXPECT_THAT(open("empty", "", ""), HasSubstr("empty: must be an ASL folder"));
+  EXPECT_THAT(open("j%02d.png", "", ""), HasSubstr("j%02d.png: no such image"));
+  EXPECT_THAT(open("i%02d%d.png", "", ""), HasSubstr("one number"));
+  EXPECT_THAT(open("i%02d.png", "o.tum", ""), HasSubstr("o.tum:2: timestamp"));
+  EXPECT_THAT(open("i%02d.png", "nan.tum", ""), HasSubstr("nan.tum:1: z = \"nan\""));
+  EXPECT_THAT(open("i%02d.png", "late.tum", ""), HasSubstr("never meet"));
+  EXPECT_THAT(open("i%02d.png", "", "camera.yaml"),
+              HasSubstr("resolution = 640x480, must be 96x64"));
+}
+
+TEST_F(Sources, SaysThatTheCameraIsAssumed)
+{
+  writeImages("i%02d.png", {0, 1});
+  SourceOptions options;
+  options.field_of_view_deg = 90;
+  const auto source = openSource(path("i%02d.png"), options);
+  EXPECT_THAT(source->note(), HasSubstr("assuming a field of view of 90 degrees"));
+  EXPECT_NEAR(source->camera().fx, 48, 1e-9);
+}
+
+TEST(SourceOptions, NameTheValueThatIsOutOfRange)
+{
+  SourceOptions options;
+  options.max_width_px = 10;
+  EXPECT_THAT(messageOf([&] { options.validate(); }), HasSubstr("max_width_px = 10, must be"));
+  options = {};
+  options.frame_rate_hz = 0;
+  EXPECT_THAT(messageOf([&] { options.validate(); }), HasSubstr("frame_rate_hz = 0, must be"));
+}
+
+TEST(Trajectory, InterpolatesOnSe3)
+{
+  const Pose a(expSo3({0.1, 0.2, 0.3}), {1, 2, 3}), b(expSo3({0.4, -0.2, 1.3}), {2, 2, 5});
+  const Trajectory trajectory = {{0, a}, {1000, b}, {5000000000, a}};
+  EXPECT_LT(interpolate(trajectory, 0)->minus(a).norm(), 1e-12);
+  EXPECT_LT(interpolate(trajectory, 1000)->minus(b).norm(), 1e-12);
+  EXPECT_LT(interpolate(trajectory, 500)->minus(a.plus(b.minus(a) / 2)).norm(), 1e-12);
+  EXPECT_FALSE(interpolate(trajectory, -1));
+  EXPECT_FALSE(interpolate(trajectory, 5000000001));
+  EXPECT_FALSE(interpolate(trajectory, 2000000000)); // the gap is 5 s
+  EXPECT_TRUE(interpolate(trajectory, 2000000000, 6000000000));
+}
+
+TEST_F(Sources, TruthTrunksNearAndFar)
+{
+  m_flight.write("trees.csv", "id,x [m],y [m],radius [m],lean [deg]\n3,1.5,-2,0.2,9\n");
+  m_flight.write("trees_far.csv", "id,x [m],y [m]\n10000,40,5\n");
+  const auto trunks = readTruthTrunks(m_flight.path());
+  ASSERT_EQ(trunks.size(), 2u);
+  EXPECT_EQ(trunks[0].id, 3);
+  EXPECT_NEAR(trunks[0].lean, M_PI / 20, 1e-12);
+  EXPECT_EQ(trunks[1].radius, 0);
+  m_flight.write("trees_far.csv", "id,x [m],y [m]\n3,40,5\n");
+  EXPECT_THAT(messageOf([&] { readTruthTrunks(m_flight.path()); }),
+              HasSubstr("trees_far.csv:2: id = 3"));
+}
