@@ -15,23 +15,14 @@ double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b,
                        const Eigen::Matrix3d &aRb, const Eigen::Vector3d &direction,
                        Eigen::Matrix<double, 1, 5> *J)
 {
-  const Eigen::Vector3d p = aRb * x_b;
-  const Eigen::Vector3d line_a = direction.cross(p);                     // E x_b
-  const Eigen::Vector3d line_b = aRb.transpose() * x_a.cross(direction); // E^T x_a
-  const double algebraic = x_a.dot(line_a);
-  const double S = line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24;
-  const double inverse_root = 1 / std::sqrt(S);
-  if (J != nullptr) {
-    const Matrix32d B = directionBasis(direction);
-    Eigen::Matrix<double, 3, 5> d_line_a, d_line_b;
-    const Eigen::Matrix3d d_p = -aRb * skew(x_b);
-    d_line_a << skew(direction) * d_p, -skew(p) * B;
-    d_line_b << skew(line_b), aRb.transpose() * skew(x_a) * B;
-    const Eigen::Matrix<double, 1, 5> d_S = line_a.head<2>().transpose() * d_line_a.topRows<2>() +
-                                            line_b.head<2>().transpose() * d_line_b.topRows<2>();
-    *J = inverse_root * (x_a.transpose() * d_line_a - (algebraic / S) * d_S);
+  const motion::Epipolar epipolar({aRb, direction});
+  if (J == nullptr) {
+    return epipolar.residual(x_a, x_b);
   }
-  return algebraic * inverse_root;
+  Vector5d gradient;
+  const double residual = epipolar.residual(x_a, x_b, gradient);
+  *J = gradient.transpose();
+  return residual;
 }
 } // namespace bole
 
@@ -171,9 +162,10 @@ double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, 
               const RelativePoseOptions &options)
 {
   double cost = 0;
+  const Epipolar epipolar(motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    cost += costOf(sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction) / sigma,
-                   options.kernel);
+    cost += epipolar.trust(rays.a[i]) *
+            costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, options.kernel);
   }
   return cost / options.inflation + priorCost(motion, prior);
 }
@@ -184,14 +176,13 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, double kern
 {
   H.setZero();
   g.setZero();
+  const Epipolar epipolar(motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    Eigen::Matrix<double, 1, 5> J;
-    const double r =
-        sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction, &J) / sigma;
-    const double w = weightOf(r, kernel);
-    J /= sigma;
-    H += w * J.transpose() * J;
-    g += (w * r) * J.transpose();
+    Vector5d J;
+    const double r = epipolar.residual(rays.a[i], rays.b[i], J) / sigma;
+    const double w = epipolar.trust(rays.a[i]) * weightOf(r, kernel);
+    H.noalias() += (w / (sigma * sigma)) * J * J.transpose();
+    g += (w * r / sigma) * J;
   }
 }
 
@@ -230,7 +221,8 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior,
         fit.cost = cost;
       }
     }
-    if (!better || step.norm() < 1e-6) {
+    // What a further step could still gain, in units of the cost.
+    if (!better || -g.dot(step) < 1e-3) {
       break;
     }
   }
@@ -246,8 +238,9 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
     descend(rays, fit, prior, options);
+    const Epipolar epipolar(fit.motion);
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      residuals[i] = sampsonResidual(rays.a[i], rays.b[i], fit.motion.aRb, fit.motion.direction);
+      residuals[i] = epipolar.residual(rays.a[i], rays.b[i]);
     }
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
@@ -264,6 +257,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel)
 {
   double along = 0, across = 0, sum = 0, agreement = 0, squares = 0;
+  const Epipolar epipolar(motion);
   std::vector<double> lengths;
   lengths.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -277,8 +271,7 @@ Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double
     // A point of positive depth is seen from a further along the direction than from b.
     const Eigen::Vector2d line =
         (motion.direction.head<2>() - at * motion.direction.z()).normalized();
-    const double w = weightOf(
-        sampsonResidual(rays.a[i], rays.b[i], motion.aRb, motion.direction) / sigma, kernel);
+    const double w = weightOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, kernel);
     const double u = flow.dot(line) / sigma,
                  v = (flow.x() * line.y() - flow.y() * line.x()) / sigma;
     along += w * std::min(u * u, 400.0);
@@ -369,7 +362,7 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
     if (!seen) {
       starts.push_back(motion);
     }
-    if (starts.size() == (rotation_known ? 3u : 5u)) {
+    if (starts.size() == (rotation_known ? 2u : 5u)) {
       break;
     }
   }

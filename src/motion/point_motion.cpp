@@ -16,7 +16,8 @@ void PointMotionOptions::validate() const
     motion::require(back >= 1 && back < points.history, "motion.frames_back", back,
                     "in 1 .. points.history - 1");
   }
-  motion::require(odometry_sigma.minCoeff() > 0, "motion.odometry_sigma", odometry_sigma.minCoeff(),
+  motion::require(odometry_walk > 0, "motion.odometry_walk", odometry_walk, "above 0");
+  motion::require(odometry_height_sigma > 0, "motion.odometry_height_sigma", odometry_height_sigma,
                   "above 0");
   motion::require(odometry_relative_sigma > 0, "motion.odometry_relative_sigma",
                   odometry_relative_sigma, "above 0");
@@ -98,7 +99,10 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
     const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
     step.odometry = (wMa.inverse() * wMb).t;
     prior.translation = step.odometry;
-    const Eigen::Matrix3d world = m_options.odometry_sigma.cwiseAbs2().asDiagonal();
+    const double walk2 =
+        m_options.odometry_walk * m_options.odometry_walk * 1e-9 * double(b.stamp_ns - a.stamp_ns);
+    const double height2 = m_options.odometry_height_sigma * m_options.odometry_height_sigma;
+    const Eigen::Matrix3d world = Eigen::Vector3d(walk2, walk2, height2).asDiagonal();
     const double relative = m_options.odometry_relative_sigma * step.odometry->norm();
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();

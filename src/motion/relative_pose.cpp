@@ -140,8 +140,8 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const double focal = std::sqrt(camera.fx * camera.fy);
   const double min_sigma = options.min_sigma_px / focal;
   const Rays rays(matches, camera);
-  const RotationFit rotation = motion::fitRotation(rays, prior, min_sigma, options);
-  const Eigen::Matrix3d start_rotation = prior.has_rotation ? prior.aRb : rotation.aRb;
+  const Eigen::Matrix3d start_rotation =
+      prior.has_rotation ? prior.aRb : motion::fitRotation(rays, prior, min_sigma, options).aRb;
   const double start_sigma = std::max(min_sigma, 0.4 / focal);
   const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma, options);
   bool ambiguous = false;
@@ -160,7 +160,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   }
   if (parallax.ratio < options.min_parallax_ratio || parallax.score < 3) {
     estimate.status = RelativePoseStatus::no_parallax;
-    takeRotation(estimate, rotation);
+    takeRotation(estimate, motion::fitRotation(rays, prior, min_sigma, options));
     return estimate;
   }
   estimate.status =
@@ -168,10 +168,10 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.aRb = fit.motion.aRb;
   estimate.direction = fit.motion.direction;
   estimate.covariance = covarianceOf(fit, prior, parallax.ratio, options.inflation);
+  const motion::Epipolar epipolar(fit.motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    estimate.weights[i] = motion::weightOf(
-        sampsonResidual(rays.a[i], rays.b[i], fit.motion.aRb, fit.motion.direction) / fit.sigma,
-        options.kernel);
+    estimate.weights[i] =
+        motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, options.kernel);
   }
   return estimate;
 }

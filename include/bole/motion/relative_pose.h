@@ -47,7 +47,7 @@ struct RelativePoseOptions
   /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent.
   /// Chosen so that the normalised error squared of the rendered flights is near its degrees of
   /// freedom.
-  double inflation = 2;
+  double inflation = 3;
   unsigned seed = 1; ///< of the draws
 
   /// Throws vpException: "relative_pose.name = value, must be ...".
