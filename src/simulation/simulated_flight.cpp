@@ -49,13 +49,6 @@ void SceneOptions::validate() const
   requireRange("h264_kbps", h264_kbps, 0, 20000);
 }
 
-Pose forwardCamera()
-{
-  Eigen::Matrix3d bRc;
-  bRc << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {bRc, Eigen::Vector3d::Zero()};
-}
-
 void recordFlight(const SceneOptions &scene, const RecordOptions &options,
                   const std::function<void(int)> &progress)
 {

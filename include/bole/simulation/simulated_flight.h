@@ -3,6 +3,7 @@
 /// \file
 /// A whole recorded flight from a few options: forest, path, camera, sensors; and its file.
 
+#include <bole/input/camera_file.h>
 #include <bole/simulation/flight_path.h>
 #include <bole/simulation/flight_sensors.h>
 #include <bole/simulation/forest_renderer.h>
@@ -51,6 +52,4 @@ struct RecordOptions
 void recordFlight(const SceneOptions &scene, const RecordOptions &options,
                   const std::function<void(int)> &progress = {});
 
-/// Camera in the body frame: looks along x of the body, at its origin.
-Pose forwardCamera();
 } // namespace bole
