@@ -68,16 +68,6 @@ Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, 
   return S * xi;
 }
 
-Eigen::Matrix<double, 3, 2> directionBasis(const Vector3d &direction)
-{
-  Vector3d::Index smallest;
-  direction.cwiseAbs().minCoeff(&smallest);
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = direction.cross(Vector3d::Unit(smallest)).normalized();
-  basis.col(1) = direction.cross(basis.col(0));
-  return basis;
-}
-
 Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc,
                   const Pose &wMa, const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b)
 {

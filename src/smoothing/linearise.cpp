@@ -8,6 +8,9 @@ namespace bole
 {
 namespace
 {
+constexpr std::size_t kFactorsProbed =
+    6; ///< of a trunk, newest to oldest, for their linearisation error
+
 template <int Rows, int Columns> using Block = Eigen::Map<Eigen::Matrix<double, Rows, Columns>>;
 
 /// Writes [J_a J_b -r] with the square root of the loss' weight; returns rho / 2.
@@ -185,15 +188,82 @@ Vector5d Smoother::State::limitedTrunkStep(const TrunkState &trunk, const Vector
   return step * std::min({1.0, limit / std::max(move, 1e-9), 0.7 / std::max(resize, 1e-9)});
 }
 
+/// Whitened residual that the linearisation predicts at the estimates.
+Vector6d Smoother::State::linearPrediction(const Factor &factor) const
+{
+  const int rows = rowCount(factor.kind);
+  Vector6d r = Vector6d::Zero();
+  const double *column = factor.linear;
+  for (const int v : {factor.a, factor.b}) {
+    if (v < 0)
+      continue;
+    for (int c = 0; c < variables[v].dim; ++c, column += rows)
+      for (int i = 0; i < rows; ++i)
+        r(i) += column[i] * variables[v].delta(c);
+  }
+  for (int i = 0; i < rows; ++i)
+    r(i) -= column[i];
+  return r;
+}
+
+/// How far, in standard deviations, the true residual at the estimates is from its linear model;
+/// the loss' weight is part of the model.
+double Smoother::State::linearisationError(const Factor &factor) const
+{
+  if (factor.stale)
+    return 0;
+  if (factor.kind == FactorKind::observation) {
+    const Vector4d r = residual(observations[factor.data].root, options.bMc,
+                                estimate(poses[variables[factor.a].number]),
+                                estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
+    const double root = std::sqrt(options.summary_loss.weight(r.squaredNorm()));
+    return (root * r - linearPrediction(factor).head<4>()).norm();
+  }
+  if (factor.kind == FactorKind::odometry) {
+    const OdometryData &data = odometry[factor.data];
+    const Vector6d r = residual(data.factor, data.S, estimate(poses[variables[factor.a].number]),
+                                estimate(poses[variables[factor.b].number]), nullptr, nullptr);
+    return (r - linearPrediction(factor)).norm();
+  }
+  if (factor.kind == FactorKind::relative_pose) {
+    const RelativePoseData &data = relative_poses[factor.data];
+    const Vector5d r =
+        residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
+                 estimate(poses[variables[factor.b].number]), nullptr, nullptr);
+    const double root = std::sqrt(options.direction_loss.weight(r.squaredNorm()));
+    return (root * r - linearPrediction(factor).head<5>()).norm();
+  }
+  return 0;
+}
+
+/// Pose priors are linear enough never to ask for more than their pose's own factors do.
 bool Smoother::State::movedTooFar(const Variable &variable) const
 {
   const Vector6d &d = variable.delta;
-  if (variable.is_pose)
-    return d.head<3>().cwiseAbs().maxCoeff() > options.relinearise_position ||
-           d.tail<3>().cwiseAbs().maxCoeff() > options.relinearise_rotation;
-  return d.head<2>().cwiseAbs().maxCoeff() > options.relinearise_position ||
-         std::abs(d(2)) > options.relinearise_log_radius ||
-         d.segment<2>(3).cwiseAbs().maxCoeff() > options.relinearise_lean;
+  const bool moved_little =
+      variable.is_pose ? d.head<3>().cwiseAbs().maxCoeff() <= options.relinearise_position &&
+                             d.tail<3>().cwiseAbs().maxCoeff() <= options.relinearise_rotation
+                       : d.head<2>().cwiseAbs().maxCoeff() <= options.relinearise_position &&
+                             std::abs(d(2)) <= options.relinearise_log_radius &&
+                             d.segment<2>(3).cwiseAbs().maxCoeff() <= options.relinearise_lean;
+  if (moved_little)
+    return false;
+  const std::size_t count = variable.factors.size();
+  const std::size_t every = variable.is_pose ? 1 : std::max<std::size_t>(1, count / kFactorsProbed);
+  for (std::size_t i = 0; i < count; i += every)
+    if (linearisationError(factors[variable.factors[count - 1 - i]]) >
+        options.linearisation_tolerance)
+      return true;
+  return false;
+}
+
+/// Has the estimate changed since those eliminated before last saw it?
+bool Smoother::State::worthPassing(const Variable &variable) const
+{
+  const Vector6d change = (variable.delta - variable.passed).cwiseAbs();
+  const int metres = variable.is_pose ? 3 : 2;
+  return change.head(metres).maxCoeff() > options.propagation_threshold ||
+         change.tail(6 - metres).maxCoeff() > 0.2 * options.propagation_threshold;
 }
 
 void Smoother::State::relinearise(int v)

@@ -35,6 +35,7 @@ void SmootherOptions::validate() const
   positive("relinearise_rotation", relinearise_rotation);
   positive("relinearise_log_radius", relinearise_log_radius);
   positive("relinearise_lean", relinearise_lean);
+  positive("linearisation_tolerance", linearisation_tolerance);
   positive("summary_loss.width", summary_loss.width);
   positive("direction_loss.width", direction_loss.width);
   positive("prior_radius", prior_radius);

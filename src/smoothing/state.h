@@ -173,6 +173,9 @@ public:
   double costAtEstimate() const;
   void relinearise(int variable);
   bool movedTooFar(const Variable &variable) const;
+  double linearisationError(const Factor &factor) const;
+  bool worthPassing(const Variable &variable) const;
+  Vector6d linearPrediction(const Factor &factor) const;
   Pose estimate(const PoseState &pose) const;
   Trunk estimate(const TrunkState &trunk) const;
   Vector5d limitedTrunkStep(const TrunkState &trunk, const Vector5d &step) const;

@@ -112,7 +112,7 @@ void Smoother::State::backSubstitute(UpdateResult &result)
       v.delta.setZero();
       ++held_directions;
     }
-    if ((v.delta - v.passed).cwiseAbs().maxCoeff() > options.propagation_threshold) {
+    if (worthPassing(v)) {
       v.changed = change_stamp;
       v.passed = v.delta;
     }

@@ -55,6 +55,7 @@ TEST(Smoother, UpdatesWithTightThresholdsReachTheBatchSolve)
   SmootherOptions options = smootherFor(o);
   options.relinearise_position = options.relinearise_rotation = 1e-5;
   options.relinearise_log_radius = options.relinearise_lean = 1e-5;
+  options.linearisation_tolerance = 1e-5;
   options.propagation_threshold = 0;
   options.max_iterations = 20;
   Replay replay(flight, options);

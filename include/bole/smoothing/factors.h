@@ -8,6 +8,7 @@
 /// Laws (each a test): every Jacobian agrees with central differences; a measurement equal to the
 /// prediction has residual 0.
 
+#include <bole/geometry/direction.h>
 #include <bole/smoothing/loss.h>
 #include <bole/summary/square_root.h>
 
@@ -48,9 +49,6 @@ struct RelativePoseMeasurement
   Matrix5d covariance = Matrix5d::Identity(); ///< (phi [rad], directionBasis angles [rad])
 };
 constexpr double kMinBaseline = 1e-4; ///< [m]
-
-/// Two unit vectors that make a right-handed frame (b0, b1, direction).
-Eigen::Matrix<double, 3, 2> directionBasis(const Eigen::Vector3d &direction);
 
 /// Height of the body over the world's z = 0, as a sonar gives it.
 struct Height

@@ -50,18 +50,22 @@ struct SmootherOptions
   /// Camera in the body frame. Default: forward-looking (z of the camera along x of the body).
   Pose bMc = forwardCamera();
 
-  // Linearisation: a variable whose estimate is further than this from the point where its factors
-  // were linearised is linearised again. All > 0. Defaults: the relative trunk is curved on the
-  // scale of the distance (metres) and of a radian; a few per cent of it leave errors of a
-  // thousandth.
-  double relinearise_position = 0.05;   ///< [m], poses and trunks
-  double relinearise_rotation = 0.02;   ///< [rad]
-  double relinearise_log_radius = 0.05; ///< relative
-  double relinearise_lean = 0.02;       ///< tan
-  /// Changes of a variable below this [m, rad, relative] are not passed on to the variables
-  /// eliminated before it. >= 0; 0 passes all. Default: a tenth of what any user of a map or a pose
-  /// could notice.
-  double propagation_threshold = 1e-4;
+  // Linearisation. A variable that moved less than this from the point of its linearisation is not
+  // looked at: > 0. Defaults: far below what curves a relative trunk, whose scale is the distance
+  // (metres) and a radian.
+  double relinearise_position = 0.02;   ///< [m], poses and trunks
+  double relinearise_rotation = 0.005;  ///< [rad]
+  double relinearise_log_radius = 0.02; ///< relative
+  double relinearise_lean = 0.005;      ///< tan
+  /// One that moved farther is linearised again when some factor's true residual is off its linear
+  /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
+  /// stretch of the flight, and changes no view in it, costs nothing. Default: errors of a view
+  /// stay far below its noise.
+  double linearisation_tolerance = 0.05;
+  /// Changes of a variable below this are not passed on to the variables eliminated before it: [m]
+  /// for positions, a fifth of it [rad, relative] for rotations, log radius and lean. >= 0; 0
+  /// passes all. Default: no user of a map notices a millimetre.
+  double propagation_threshold = 1e-3;
   /// Gauss-Newton iterations in one update(), >= 1. Default: new trunks settle in 2 or 3.
   int max_iterations = 5;
 
