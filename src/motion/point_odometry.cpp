@@ -1,0 +1,577 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/motion/point_odometry.h>
+
+#include "bundle.h"
+#include "epipolar.h"
+#include "require.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <unordered_map>
+
+namespace bole
+{
+namespace
+{
+using motion::BundleFrame;
+using motion::BundleOptions;
+using motion::BundlePoint;
+using motion::BundleResult;
+
+using Seen = std::unordered_map<std::uint64_t, Eigen::Vector2d>; ///< normalised positions by track
+
+struct KeyFrame
+{
+  std::size_t frame = 0; ///< index of all frames
+  Pose wMc;
+  Seen seen;
+  std::optional<GyroRotation> turned; ///< since the key frame before
+};
+
+struct Landmark
+{
+  std::size_t anchor = 0; ///< frame index of its key frame
+  Eigen::Vector2d xy;     ///< in the anchor
+  double inverse_depth = 0, information = 0;
+  int misses = 0; ///< windows in which most of its observations were rejected
+};
+
+/// A frame as it hangs on its key frame.
+struct Record
+{
+  std::int64_t stamp_ns = 0;
+  std::size_t key = 0; ///< frame index of the key frame
+  Pose keyMc;
+  PointOdometryStatus status = PointOdometryStatus::starting;
+};
+
+constexpr double kDegree = M_PI / 180;
+constexpr double kHeldSigma =
+    1.0; // of a translation that was not seen, in units of the first baseline
+constexpr double kRestSigma = 1e-2; // prior on an unseen depth: as wide as the depth itself
+
+double medianOf(std::vector<double> values)
+{
+  if (values.empty()) {
+    return 0;
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+} // namespace
+
+struct PointOdometry::State
+{
+  PinholeCamera camera;
+  PointOdometryOptions options;
+  std::deque<KeyFrame> window;
+  std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
+  std::unordered_map<std::uint64_t, Landmark> landmarks;
+  std::vector<Record> records;
+  std::optional<GyroRotation> turned; ///< since the last key frame
+  Pose wMc, velocity;                 ///< current pose, motion of the last frame
+  Seen seen;
+  double sigma = 1.5e-3;
+  bool started = false;
+
+  double focal() const { return std::sqrt(camera.fx * camera.fy); }
+  PointOdometryResult begin(const PointTracker &tracker);
+  bool start(const PointTracker &tracker, const RelativePoseEstimate &first, int back);
+  PointOdometryResult place(bool turned_known);
+  void assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
+                std::vector<std::uint64_t> &ids) const;
+  void disassemble(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points,
+                   const std::vector<std::uint64_t> &ids);
+  bool wantsKeyFrame() const;
+  void addKeyFrame();
+  void dropOldest();
+  void addLandmarks();
+  int known() const;
+  double typicalInverseDepth() const;
+};
+
+const char *toString(PointOdometryStatus status)
+{
+  switch (status) {
+  case PointOdometryStatus::starting:
+    return "starting";
+  case PointOdometryStatus::ok:
+    return "ok";
+  case PointOdometryStatus::rotation_only:
+    return "rotation_only";
+  case PointOdometryStatus::lost:
+    return "lost";
+  }
+  return "?";
+}
+
+void PointOdometryOptions::validate() const
+{
+  using motion::require;
+  require(key_frames >= 3 && key_frames <= 30, "point_odometry.key_frames", key_frames,
+          "in 3 .. 30");
+  require(held_key_frames >= 2 && held_key_frames < key_frames, "point_odometry.held_key_frames",
+          held_key_frames, "in 2 .. key_frames - 1");
+  require(key_parallax_deg > 0, "point_odometry.key_parallax_deg", key_parallax_deg, "above 0");
+  require(key_shared >= 0 && key_shared <= 1, "point_odometry.key_shared", key_shared, "in 0 .. 1");
+  require(start_parallax_deg > 0, "point_odometry.start_parallax_deg", start_parallax_deg,
+          "above 0");
+  require(start_sigma_deg > 0, "point_odometry.start_sigma_deg", start_sigma_deg, "above 0");
+  require(min_points >= 6, "point_odometry.min_points", min_points, "6 or more");
+  require(iterations >= 1 && iterations <= 100, "point_odometry.iterations", iterations,
+          "in 1 .. 100");
+  require(min_sigma_px > 0, "point_odometry.min_sigma_px", min_sigma_px, "above 0");
+  require(inflation >= 1, "point_odometry.inflation", inflation, "1 or more");
+  relative_pose.validate();
+}
+
+PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options)
+    : m_state(new State)
+{
+  options.validate();
+  m_state->camera = camera;
+  m_state->options = options;
+}
+PointOdometry::~PointOdometry() = default;
+PointOdometry::PointOdometry(PointOdometry &&) noexcept = default;
+PointOdometry &PointOdometry::operator=(PointOdometry &&) noexcept = default;
+
+PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int64_t stamp_ns,
+                                           const std::optional<GyroRotation> &turned)
+{
+  State &state = *m_state;
+  const Pose before = state.wMc;
+  state.seen.clear();
+  for (const PointTrack &track : tracker.tracks()) {
+    state.seen[track.id] = state.camera.ray(track.current()).head<2>();
+  }
+  if (turned && (state.turned || state.records.empty() ||
+                 state.window.back().frame + 1 == state.records.size())) {
+    state.turned = state.turned ? state.turned->then(*turned) : *turned;
+  }
+  else {
+    state.turned.reset();
+  }
+  Record record;
+  record.stamp_ns = stamp_ns;
+  state.records.push_back(record);
+  if (turned) {
+    state.velocity.R = turned->R;
+  }
+  PointOdometryResult result =
+      state.started ? state.place(turned.has_value()) : state.begin(tracker);
+  result.wMc = state.wMc;
+  result.previousMc = before.inverse() * state.wMc;
+  if (state.started && result.status == PointOdometryStatus::ok) {
+    state.velocity = result.previousMc;
+  }
+  Record &last = state.records.back();
+  last.status = result.status;
+  if (state.started) {
+    last.key = state.window.back().frame;
+    last.keyMc = state.window.back().wMc.inverse() * state.wMc;
+  }
+  return result;
+}
+
+/// Before there is a unit of length: rotation against the first key frame, until the parallax is
+/// enough.
+PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
+{
+  PointOdometryResult result;
+  const std::size_t now = records.size() - 1;
+  const auto restart = [&] {
+    window.clear();
+    window.push_back({now, wMc, seen, std::nullopt});
+    key_poses[now] = wMc;
+    turned.reset();
+    records[now].key = now;
+    records[now].keyMc = Pose();
+  };
+  if (window.empty()) {
+    restart();
+    return result;
+  }
+  const int back = static_cast<int>(now - window.front().frame);
+  const auto matches = tracker.matches(back);
+  RelativePosePrior prior;
+  if (turned) {
+    prior.aRb = turned->R;
+    prior.rotation_covariance = turned->covariance();
+  }
+  const auto estimate = estimateRelativePose(matches, camera, prior, options.relative_pose);
+  if (estimate.hasRotation()) {
+    wMc.R = window.front().wMc.R * estimate.aRb;
+  }
+  records[now].key = window.front().frame;
+  records[now].keyMc = window.front().wMc.inverse() * wMc;
+  result.covariance.topLeftCorner<3, 3>() = kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
+  result.covariance.bottomRightCorner<3, 3>() = estimate.covariance.topLeftCorner<3, 3>();
+  result.sigma_px = estimate.sigma_px;
+  const double direction_sigma =
+      std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
+  if (estimate.hasDirection() && direction_sigma < options.start_sigma_deg * kDegree &&
+      estimate.parallax_px > options.start_parallax_deg * kDegree * focal() &&
+      start(tracker, estimate, back)) {
+    result.status = PointOdometryStatus::ok;
+    result.points = known();
+    result.key_frame = true;
+    return result;
+  }
+  // Too little is left of what the first key frame saw: go on from here.
+  if (matches.size() <
+      static_cast<std::size_t>(std::max(2 * options.relative_pose.min_matches, 30))) {
+    restart();
+  }
+  return result;
+}
+
+bool PointOdometry::State::start(const PointTracker &tracker, const RelativePoseEstimate &first,
+                                 int back)
+{
+  const KeyFrame &origin = window.front();
+  wMc = origin.wMc * Pose(first.aRb, first.direction);
+  landmarks.clear();
+  // Inverse depths from the two frames, then both and the frames between in one adjustment.
+  for (const auto &[id, xy_a] : origin.seen) {
+    const auto found = seen.find(id);
+    if (found == seen.end()) {
+      continue;
+    }
+    double q = 0.05;
+    for (int iteration = 0; iteration < 5; ++iteration) {
+      Eigen::Vector2d J;
+      const Eigen::Vector2d e =
+          motion::reprojection(origin.wMc, wMc, xy_a, q, found->second, nullptr, nullptr, &J);
+      q -= J.dot(e) / (J.squaredNorm() + 1e-12);
+    }
+    landmarks[id] = {origin.frame, xy_a, std::max(q, 0.0), 0, 0};
+  }
+  const std::size_t now = records.size() - 1;
+  window.push_back({now, wMc, seen, turned});
+  key_poses[now] = wMc;
+  turned.reset();
+  started = true;
+  std::vector<BundleFrame> frames;
+  std::vector<BundlePoint> points;
+  std::vector<std::uint64_t> ids;
+  assemble(frames, points, ids);
+  BundleOptions bundle;
+  bundle.iterations = 20;
+  bundle.sigma = std::max(sigma, 1.5 * first.sigma_px / focal());
+  bundle.min_sigma = options.min_sigma_px / focal();
+  bundle.first_baseline = 1;
+  const BundleResult solved = motion::solveBundle(frames, points, bundle);
+  if (!solved.solved || known() < 0) {
+    window.pop_back();
+    started = false;
+    return false;
+  }
+  sigma = solved.sigma;
+  disassemble(frames, points, ids);
+  wMc = window.back().wMc;
+  key_poses[now] = wMc;
+  // The frames between, each placed on its own against the points.
+  for (int k = back - 1; k >= 1; --k) {
+    const double along = double(back - k) / back;
+    std::vector<BundleFrame> pair{{origin.wMc, true, std::nullopt, {}}, {}};
+    const Pose step = origin.wMc.inverse() * wMc;
+    pair[1].wMc = origin.wMc * Pose(expSo3(along * logSo3(step.R)), along * step.t);
+    std::vector<BundlePoint> seen_between;
+    for (const PointTrack &track : tracker.tracks()) {
+      const auto landmark = landmarks.find(track.id);
+      if (landmark != landmarks.end() && track.age() >= k) {
+        BundlePoint point;
+        point.xy = landmark->second.xy;
+        point.inverse_depth = point.prior = landmark->second.inverse_depth;
+        point.prior_information = 1e8;
+        point.seen.push_back({1, camera.ray(*(track.positions_px.rbegin() + k)).head<2>(), 1});
+        seen_between.push_back(point);
+      }
+    }
+    bundle.first_baseline.reset();
+    if (seen_between.size() >= 6 && motion::solveBundle(pair, seen_between, bundle).solved) {
+      Record &record = records[now - static_cast<std::size_t>(k)];
+      record.key = origin.frame;
+      record.keyMc = origin.wMc.inverse() * pair[1].wMc;
+      record.status = PointOdometryStatus::ok;
+    }
+  }
+  addLandmarks();
+  velocity = Pose(expSo3(logSo3(first.aRb) / back), first.direction / back);
+  return true;
+}
+
+void PointOdometry::State::assemble(std::vector<BundleFrame> &frames,
+                                    std::vector<BundlePoint> &points,
+                                    std::vector<std::uint64_t> &ids) const
+{
+  std::map<std::size_t, int> index;
+  const int held =
+      window.size() <= 3 ? 1 : std::min<int>(options.held_key_frames, int(window.size()) - 2);
+  for (const KeyFrame &key : window) {
+    BundleFrame frame;
+    frame.wMc = key.wMc;
+    frame.fixed = static_cast<int>(frames.size()) < held;
+    if (key.turned && !frames.empty()) {
+      frame.previousRthis = key.turned->R;
+      frame.rotation_information = key.turned->covariance().inverse();
+    }
+    index[key.frame] = static_cast<int>(frames.size());
+    frames.push_back(frame);
+  }
+  const bool current = window.back().frame + 1 != records.size();
+  if (current) {
+    BundleFrame frame;
+    frame.wMc = wMc;
+    if (turned) {
+      frame.previousRthis = turned->R;
+      frame.rotation_information = turned->covariance().inverse();
+    }
+    frames.push_back(frame);
+  }
+  const double typical = typicalInverseDepth();
+  for (const auto &[id, landmark] : landmarks) {
+    BundlePoint point;
+    point.anchor = index.at(landmark.anchor);
+    point.xy = landmark.xy;
+    point.inverse_depth = landmark.inverse_depth;
+    point.prior = typical;
+    point.prior_information = 1 / (4 * typical * typical + kRestSigma * kRestSigma);
+    for (std::size_t k = 0; k < window.size(); ++k) {
+      if (static_cast<int>(k) == point.anchor) {
+        continue;
+      }
+      const auto found = window[k].seen.find(id);
+      if (found != window[k].seen.end()) {
+        point.seen.push_back({static_cast<int>(k), found->second, 1});
+      }
+    }
+    const auto found = seen.find(id);
+    if (current && found != seen.end()) {
+      point.seen.push_back({static_cast<int>(frames.size()) - 1, found->second, 1});
+    }
+    if (!point.seen.empty()) {
+      points.push_back(point);
+      ids.push_back(id);
+    }
+  }
+}
+
+void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames,
+                                       const std::vector<BundlePoint> &points,
+                                       const std::vector<std::uint64_t> &ids)
+{
+  for (std::size_t k = 0; k < window.size(); ++k) {
+    window[k].wMc = frames[k].wMc;
+    key_poses[window[k].frame] = frames[k].wMc;
+  }
+  if (frames.size() > window.size()) {
+    wMc = frames.back().wMc;
+  }
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    Landmark &landmark = landmarks[ids[k]];
+    landmark.inverse_depth = points[k].inverse_depth;
+    landmark.information = points[k].information;
+    double good = 0;
+    for (const auto &observation : points[k].seen) {
+      good += observation.weight > 0.4;
+    }
+    const bool bad = good < 0.5 * double(points[k].seen.size()) ||
+                     points[k].inverse_depth * std::sqrt(points[k].information) < -4;
+    landmark.misses = bad ? landmark.misses + 1 : 0;
+  }
+  for (auto landmark = landmarks.begin(); landmark != landmarks.end();) {
+    landmark = landmark->second.misses > 2 ? landmarks.erase(landmark) : std::next(landmark);
+  }
+}
+
+PointOdometryResult PointOdometry::State::place(bool turned_known)
+{
+  PointOdometryResult result;
+  Pose step = velocity;
+  wMc = wMc * step;
+  int common = 0;
+  for (const auto &[id, landmark] : landmarks) {
+    common += seen.count(id) > 0;
+  }
+  result.points = known();
+  if (common < options.min_points) {
+    // Nothing to hold on to: the map ends here and a new one begins, its unit the old one by the
+    // held velocity.
+    result.status = PointOdometryStatus::lost;
+    result.covariance.diagonal() << Eigen::Vector3d::Constant(kHeldSigma * kHeldSigma),
+        Eigen::Vector3d::Constant(turned_known ? 1e-6 : 1e-2);
+    addKeyFrame();
+    return result;
+  }
+  std::vector<BundleFrame> frames;
+  std::vector<BundlePoint> points;
+  std::vector<std::uint64_t> ids;
+  assemble(frames, points, ids);
+  BundleOptions bundle;
+  bundle.iterations = options.iterations;
+  bundle.sigma = sigma;
+  bundle.min_sigma = options.min_sigma_px / focal();
+  if (window.size() <= 3) {
+    bundle.first_baseline = (window[1].wMc.t - window[0].wMc.t).norm();
+  }
+  const BundleResult solved = motion::solveBundle(frames, points, bundle);
+  result.sigma_px = solved.sigma * focal();
+  if (solved.solved && solved.inliers > 0.3) {
+    sigma = 0.9 * sigma + 0.1 * solved.sigma;
+    disassemble(frames, points, ids);
+    result.points = known();
+    result.status = result.points >= options.min_points ? PointOdometryStatus::ok
+                                                        : PointOdometryStatus::rotation_only;
+    result.covariance = options.inflation * solved.last_covariance;
+    if (result.status == PointOdometryStatus::rotation_only) {
+      result.covariance.topLeftCorner<3, 3>() +=
+          kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
+    }
+  }
+  else {
+    result.status = PointOdometryStatus::lost;
+  }
+  if (wantsKeyFrame()) {
+    addKeyFrame();
+    result.key_frame = true;
+  }
+  return result;
+}
+
+bool PointOdometry::State::wantsKeyFrame() const
+{
+  const KeyFrame &key = window.back();
+  const Eigen::Matrix3d keyRc = key.wMc.R.transpose() * wMc.R;
+  std::vector<double> flow;
+  for (const auto &[id, xy] : key.seen) {
+    const auto found = seen.find(id);
+    if (found != seen.end()) {
+      const Eigen::Vector3d turned_ray = keyRc * found->second.homogeneous();
+      flow.push_back((xy - turned_ray.head<2>() / std::max(0.1, turned_ray.z())).norm());
+    }
+  }
+  return double(flow.size()) < options.key_shared * double(key.seen.size()) ||
+         medianOf(flow) > options.key_parallax_deg * kDegree;
+}
+
+void PointOdometry::State::addKeyFrame()
+{
+  const std::size_t now = records.size() - 1;
+  window.push_back({now, wMc, seen, turned});
+  key_poses[now] = wMc;
+  turned.reset();
+  if (static_cast<int>(window.size()) > options.key_frames) {
+    dropOldest();
+  }
+  addLandmarks();
+}
+
+/// Points anchored in the frame that leaves move to the next frame of the window that saw them.
+void PointOdometry::State::dropOldest()
+{
+  const KeyFrame oldest = window.front();
+  window.pop_front();
+  for (auto it = landmarks.begin(); it != landmarks.end();) {
+    Landmark &landmark = it->second;
+    if (landmark.anchor != oldest.frame) {
+      ++it;
+      continue;
+    }
+    const auto next =
+        std::find_if(window.begin(), window.end(),
+                     [id = it->first](const KeyFrame &key) { return key.seen.count(id) > 0; });
+    if (next == window.end()) {
+      it = landmarks.erase(it);
+      continue;
+    }
+    const Eigen::Vector3d y =
+        next->wMc.R.transpose() * (oldest.wMc.R * landmark.xy.homogeneous() +
+                                   landmark.inverse_depth * (oldest.wMc.t - next->wMc.t));
+    if (y.z() < 0.05) {
+      it = landmarks.erase(it);
+      continue;
+    }
+    landmark.anchor = next->frame;
+    landmark.xy = next->seen.at(it->first);
+    landmark.inverse_depth /= y.z();
+    ++it;
+  }
+}
+
+void PointOdometry::State::addLandmarks()
+{
+  const double typical = typicalInverseDepth();
+  for (const auto &[id, xy] : window.back().seen) {
+    if (landmarks.count(id) == 0) {
+      landmarks[id] = {window.back().frame, xy, typical, 0, 0};
+    }
+  }
+}
+
+int PointOdometry::State::known() const
+{
+  int n = 0;
+  for (const auto &[id, landmark] : landmarks) {
+    n += seen.count(id) > 0 && landmark.information > 0 &&
+         landmark.inverse_depth * std::sqrt(landmark.information) > 4;
+  }
+  return n;
+}
+
+double PointOdometry::State::typicalInverseDepth() const
+{
+  std::vector<double> depths;
+  for (const auto &[id, landmark] : landmarks) {
+    if (landmark.information > 0 && landmark.inverse_depth * std::sqrt(landmark.information) > 3) {
+      depths.push_back(landmark.inverse_depth);
+    }
+  }
+  return depths.size() < 5 ? 0.05 : medianOf(depths);
+}
+
+std::vector<PlacedFrame> PointOdometry::trajectory() const
+{
+  std::vector<PlacedFrame> placed;
+  placed.reserve(m_state->records.size());
+  for (const Record &record : m_state->records) {
+    const auto key = m_state->key_poses.find(record.key);
+    const Pose wMk = key == m_state->key_poses.end() ? Pose() : key->second;
+    placed.push_back({record.stamp_ns, wMk * record.keyMc, record.status});
+  }
+  return placed;
+}
+
+std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
+{
+  std::vector<PointDepth> depths;
+  for (const auto &[id, landmark] : m_state->landmarks) {
+    const auto seen = m_state->seen.find(id);
+    const auto anchor = m_state->key_poses.find(landmark.anchor);
+    if (seen == m_state->seen.end() || anchor == m_state->key_poses.end() ||
+        landmark.information <= 0) {
+      continue;
+    }
+    const Pose cMa = m_state->wMc.inverse() * anchor->second;
+    const Eigen::Vector3d y = cMa.R * landmark.xy.homogeneous() + landmark.inverse_depth * cMa.t;
+    if (y.z() < 0.05) {
+      continue;
+    }
+    const double sigma = 1 / std::sqrt(landmark.information) / y.z();
+    const double inverse_depth = landmark.inverse_depth / y.z();
+    if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma) {
+      depths.push_back(
+          {m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
+    }
+  }
+  std::sort(depths.begin(), depths.end(),
+            [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });
+  return depths;
+}
+} // namespace bole
