@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/ardrone_source.h>
+
+#include "socket.h"
+
+#include <atomic>
+#include <cmath>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr double kShapeTolerance = 0.01;
+
+/// \p camera for images of \p width x \p height: its own size, or the same shape larger or smaller.
+CameraModel fitted(CameraModel camera, int width, int height, const std::string &where)
+{
+  const double factor = static_cast<double>(width) / camera.pinhole.width;
+  if (std::abs(factor * camera.pinhole.height - height) > kShapeTolerance * height)
+    throw vpException(vpException::dimensionError, fmt::format("{}: resolution = {}x{}, must be of the shape of the drone's images, {}x{}", where, camera.pinhole.width, camera.pinhole.height, width, height));
+  camera.pinhole = camera.pinhole.scaled(factor);
+  camera.pinhole.width = width;
+  camera.pinhole.height = height;
+  return camera;
+}
+} // namespace
+
+MountedCamera publishedArDroneCamera(int generation, int width, int height)
+{
+  MountedCamera camera;
+  camera.bMc = forwardCamera();
+  if (generation == 1) {
+    camera.model.pinhole = {215.1, 215.8, 160.7, 123.3, 320, 240};
+    camera.model.distortion = Distortion::fov;
+    camera.model.coefficients = {0.272, 0, 0, 0};
+  }
+  else {
+    camera.model.pinhole = {569.9, 568.0, 331.4, 135.9, 640, 360};
+    camera.model.distortion = Distortion::radial_tangential;
+    camera.model.coefficients = {-0.527, 0.274, 0.0211, -0.0064};
+  }
+  camera.model = fitted(camera.model, width, height, fmt::format("published camera of the AR.Drone {}", generation));
+  return camera;
+}
+
+struct ArDroneSource::State
+{
+  State(const ArDroneAddress &a, const Options &o, LinkTap tap) : address(a), options(o), grabber(a, o.grabber, std::move(tap)) {}
+
+  ArDroneAddress address;
+  Options options;
+  vpArDroneGrabber grabber;
+  MountedCamera mounted;
+  std::unique_ptr<Rectifier> rectifier;
+  std::atomic<bool> running{true};
+  bool first_is_waiting = true; // the frame that the constructor waited for
+  std::size_t index = 0;
+  std::int64_t last_stamp_ns = 0, last_new_ns = 0;
+
+  void chooseCamera(const vpImage<unsigned char> &first)
+  {
+    const int width = static_cast<int>(first.getWidth()), height = static_cast<int>(first.getHeight());
+    if (address.camera_path.empty()) {
+      mounted = publishedArDroneCamera(grabber.getLink().generation(), width, height);
+    }
+    else {
+      mounted = readCamera(address.camera_path, width, height);
+      mounted.model = fitted(mounted.model, width, height, address.camera_path);
+    }
+    rectifier = std::make_unique<Rectifier>(mounted.model, options.max_width_px);
+  }
+
+  /// What came off the air as a frame of the pipeline.
+  void fill(Frame &frame, vpImage<unsigned char> &image)
+  {
+    const LiveFrame &live = grabber.getFrame();
+    frame = {};
+    frame.index = index++;
+    frame.status = live.status;
+    frame.message = live.message;
+    frame.arrival_ns = live.arrival_ns;
+    frame.stamp_ns = std::max(live.stamp_ns, last_stamp_ns + 1);
+    if (live.status == FrameStatus::missing) // says when, on the drone's clock
+      frame.stamp_ns = std::max(frame.stamp_ns, live.stamp_ns + steadyNowNs() - live.arrival_ns - static_cast<std::int64_t>(options.grabber.frame_timeout_s * 5e8));
+    last_stamp_ns = frame.stamp_ns;
+    const bool usable = live.status == FrameStatus::ok || live.status == FrameStatus::stale;
+    if (usable) {
+      frame.image = image;
+      rectifier->apply(frame.image);
+    }
+    frame.gyro = live.gyro;
+    frame.odometry_covariance = live.odometry_covariance;
+    if (live.body) {
+      frame.wMb_odometry = live.body->wMb;
+      if (live.body->height > 0)
+        frame.height = live.body->height;
+    }
+  }
+};
+
+void ArDroneSource::Options::validate() const
+{
+  grabber.validate();
+  if (!(give_up_s > 0.5 && give_up_s < 86400))
+    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0.5, 86400) s", give_up_s);
+  if (max_width_px != 0 && max_width_px < 64)
+    throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px", max_width_px);
+}
+
+ArDroneSource::ArDroneSource(const std::string &address) : ArDroneSource(ArDroneAddress::parse(address), Options{}) {}
+
+ArDroneSource::ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap)
+{
+  options.validate();
+  m_state = std::make_unique<State>(address, options, std::move(tap));
+  if (!address.camera_path.empty())
+    readCamera(address.camera_path); // a fault in the file is said before the drone is waited for
+  vpImage<unsigned char> first;
+  m_state->grabber.open(first);
+  m_state->chooseCamera(first);
+  m_state->last_new_ns = steadyNowNs();
+}
+
+ArDroneSource::~ArDroneSource() = default;
+
+bool ArDroneSource::next(Frame &frame)
+{
+  State &state = *m_state;
+  if (!state.running)
+    return false;
+  vpImage<unsigned char> image;
+  if (state.first_is_waiting)
+    state.grabber.getFrame().picture.toGrey(image);
+  else
+    state.grabber.acquire(image);
+  state.first_is_waiting = false;
+
+  const std::int64_t now_ns = steadyNowNs();
+  if (state.grabber.getStatus() != FrameStatus::missing)
+    state.last_new_ns = now_ns;
+  else if (static_cast<double>(now_ns - state.last_new_ns) * 1e-9 > state.options.give_up_s)
+    return false;
+  if (!state.running)
+    return false;
+  state.fill(frame, image);
+  return true;
+}
+
+PinholeCamera ArDroneSource::camera() const { return m_state->rectifier->camera(); }
+Pose ArDroneSource::bMc() const { return m_state->mounted.bMc; }
+std::string ArDroneSource::name() const { return m_state->address.toString(); }
+bool ArDroneSource::hasGyro() const { return m_state->options.grabber.link.full_navdata; }
+void ArDroneSource::stop() noexcept { m_state->running = false; }
+LinkCounters ArDroneSource::counters() const { return m_state->grabber.getCounters(); }
+vpArDroneGrabber &ArDroneSource::grabber() { return m_state->grabber; }
+const MountedCamera &ArDroneSource::mountedCamera() const { return m_state->mounted; }
+const LiveFrame &ArDroneSource::liveFrame() const { return m_state->grabber.getFrame(); }
+} // namespace bole

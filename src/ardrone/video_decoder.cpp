@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/uvlc.h>
+#include <bole/ardrone/video_decoder.h>
+
+#include <fmt/format.h>
+
+namespace bole
+{
+VideoDecoder::VideoDecoder(int generation) : m_generation(generation) {}
+
+void VideoDecoder::restart()
+{
+  m_parser.reset();
+  m_h264.flush();
+  m_needs_key = true;
+}
+
+DecodedFrame VideoDecoder::decodePave(const PaveFrame &frame)
+{
+  DecodedFrame out;
+  out.number = frame.header.frame_number;
+  out.timestamp_ms = frame.header.timestamp_ms;
+  const bool is_key = frame.header.frame_type == PaveFrameType::idr;
+  m_needs_key = (m_needs_key || frame.after_gap) && !is_key;
+  if (m_needs_key) {
+    out.status = FrameStatus::corrupt;
+    out.message = "waits for a key frame";
+    return out;
+  }
+  const auto result = m_h264.decode(frame.payload, frame.header.display_width, frame.header.display_height, out.picture);
+  if (result != H264Decoder::Result::picture) {
+    m_needs_key = true;
+    m_h264.flush();
+    out.status = FrameStatus::corrupt;
+    out.message = result == H264Decoder::Result::nothing ? "the decoder gave no picture" : m_h264.message();
+  }
+  out.picture.number = out.number;
+  return out;
+}
+
+void VideoDecoder::judge(DecodedFrame &frame)
+{
+  if (frame.status == FrameStatus::ok) {
+    if (m_width == 0) {
+      m_width = frame.picture.width;
+      m_height = frame.picture.height;
+    }
+    if (frame.picture.width != m_width || frame.picture.height != m_height) {
+      frame.status = FrameStatus::resized;
+      frame.message = fmt::format("{}x{} after {}x{}", frame.picture.width, frame.picture.height, m_width, m_height);
+    }
+    else if (frame.picture.y == m_last.y) {
+      frame.status = FrameStatus::stale;
+      frame.message = fmt::format("the picture of frame {} again", m_last.number);
+    }
+    else {
+      m_last = frame.picture;
+    }
+  }
+  ++m_counters.frames;
+  m_counters.ok += frame.status == FrameStatus::ok ? 1 : 0;
+  m_counters.corrupt += frame.status == FrameStatus::corrupt ? 1 : 0;
+  m_counters.stale += frame.status == FrameStatus::stale ? 1 : 0;
+  m_counters.resized += frame.status == FrameStatus::resized ? 1 : 0;
+}
+
+std::vector<DecodedFrame> VideoDecoder::decode(const std::uint8_t *data, std::size_t size)
+{
+  std::vector<DecodedFrame> out;
+  if (m_generation == 1) {
+    UvlcResult result = decodeUvlc(data, size);
+    DecodedFrame frame;
+    frame.status = result.whole ? FrameStatus::ok : FrameStatus::corrupt;
+    frame.message = std::move(result.message);
+    frame.number = result.picture.number;
+    frame.picture = std::move(result.picture);
+    judge(frame);
+    out.push_back(std::move(frame));
+    return out;
+  }
+  m_parser.push(data, size);
+  std::vector<PaveFrame> waiting;
+  while (auto frame = m_parser.next()) {
+    if (frame->header.frame_type == PaveFrameType::idr) {
+      m_counters.skipped += waiting.size();
+      waiting.clear();
+    }
+    waiting.push_back(std::move(*frame));
+  }
+  for (const PaveFrame &frame : waiting) {
+    out.push_back(decodePave(frame));
+    judge(out.back());
+  }
+  m_counters.resyncs = m_parser.resyncs();
+  m_counters.skipped_bytes = m_parser.skippedBytes();
+  return out;
+}
+} // namespace bole
