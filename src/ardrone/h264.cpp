@@ -36,6 +36,16 @@ void copyPlane(const std::uint8_t *from, int stride, int width, int height, std:
     std::copy_n(from + static_cast<std::ptrdiff_t>(row) * stride, width, to.begin() + static_cast<std::ptrdiff_t>(row) * width);
 }
 
+/// libavcodec writes to stderr about every damaged block; damage is counted and reported by us.
+void silenceLibav()
+{
+  static const bool done = [] {
+    av_log_set_level(AV_LOG_QUIET);
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
 std::uint8_t clampToByte(double value)
 {
   return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0));
@@ -82,9 +92,9 @@ H264Decoder::H264Decoder() : m_state(std::make_unique<State>())
   context.thread_count = 1; // frame threads would delay by a frame each
   context.err_recognition = AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_AGGRESSIVE | AV_EF_EXPLODE;
   context.max_pixels = 2048 * 2048;
+  silenceLibav();
   if (avcodec_open2(&context, codec, nullptr) < 0)
     throw vpException(vpException::fatalError, "libavcodec could not open its H.264 decoder");
-  av_log_set_level(AV_LOG_QUIET); // damage is counted and reported by us
 }
 
 H264Decoder::~H264Decoder() = default;
@@ -160,7 +170,8 @@ H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate,
   av_opt_set(context.priv_data, "preset", "veryfast", 0);
   av_opt_set(context.priv_data, "tune", "zerolatency", 0);
   av_opt_set(context.priv_data, "profile", "baseline", 0);
-  av_opt_set(context.priv_data, "x264-params", fmt::format("keyint={0}:min-keyint={0}:scenecut=0:log-level=-1", key_interval).c_str(), 0);
+  av_opt_set(context.priv_data, "x264-params", fmt::format("keyint={0}:min-keyint={0}:scenecut=0", key_interval).c_str(), 0);
+  silenceLibav();
   if (avcodec_open2(&context, codec, nullptr) < 0)
     throw vpException(vpException::fatalError, fmt::format("libavcodec could not open its H.264 encoder for {}x{} at {} Hz and {} bit/s", width, height, rate_hz, bit_rate));
   AVFrame &frame = *m_state->frame;

@@ -146,22 +146,12 @@ bool Socket::sendTo(const void *data, std::size_t size, const sockaddr_in &peer)
   return ::sendto(m_descriptor, data, size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr *>(&peer), sizeof(peer)) == static_cast<ssize_t>(size);
 }
 
-bool Socket::sendAll(const std::uint8_t *data, std::size_t size, Milliseconds timeout) const
+std::int64_t Socket::sendSome(const std::uint8_t *data, std::size_t size) const
 {
-  while (size > 0) {
-    const ssize_t count = ::send(m_descriptor, data, size, MSG_NOSIGNAL);
-    if (count > 0) {
-      data += count;
-      size -= static_cast<std::size_t>(count);
-    }
-    else if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) {
-      return false;
-    }
-    else if (!waitFor(m_descriptor, POLLOUT, timeout)) {
-      return false;
-    }
-  }
-  return true;
+  const ssize_t count = ::send(m_descriptor, data, size, MSG_NOSIGNAL);
+  if (count < 0)
+    return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
+  return count;
 }
 
 Socket Socket::accept() const

@@ -49,8 +49,8 @@ public:
   Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender, Milliseconds timeout) const;
   bool send(const void *data, std::size_t size) const; ///< false on any failure
   bool sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const;
-  /// Sends all of it on a stream within \p timeout; false when the peer does not take it.
-  bool sendAll(const std::uint8_t *data, std::size_t size, Milliseconds timeout) const;
+  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is gone.
+  std::int64_t sendSome(const std::uint8_t *data, std::size_t size) const;
   Socket accept() const;
 
 private:

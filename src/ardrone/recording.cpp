@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/ardrone/emulator.h>
+#include <bole/ardrone/recording.h>
+
+#include "bytes.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <unistd.h>
+#include <utility>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+const std::string kTitle = "bole raw flight 1\n";
+constexpr std::uint32_t kMagic = 0x45434542;
+constexpr std::size_t kHead = 20, kTail = 4, kLargestPiece = 1 << 20;
+
+/// CRC-32 of IEEE 802.3 (reflected, 0xEDB88320).
+std::uint32_t crc32(const std::uint8_t *data, std::size_t size)
+{
+  static const auto table = [] {
+    std::array<std::uint32_t, 256> t{};
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      std::uint32_t value = i;
+      for (int bit = 0; bit < 8; ++bit)
+        value = (value >> 1) ^ ((value & 1) != 0 ? 0xEDB88320u : 0u);
+      t[i] = value;
+    }
+    return t;
+  }();
+  std::uint32_t crc = 0xFFFFFFFFu;
+  for (std::size_t i = 0; i < size; ++i)
+    crc = (crc >> 8) ^ table[(crc ^ data[i]) & 0xff];
+  return ~crc;
+}
+
+std::filesystem::path rawPath(const std::string &folder)
+{
+  const std::filesystem::path path(folder);
+  return std::filesystem::is_directory(path) ? path / "raw.bin" : path;
+}
+
+class RecordingFeed : public PacketFeed
+{
+public:
+  explicit RecordingFeed(const std::string &folder) : m_reader(folder), m_generation(recordedGeneration(folder)) {}
+
+  int generation() const override { return m_generation; }
+  double frameRateHz() const override { return m_generation == 1 ? 15 : 30; }
+  bool next(FeedPacket &packet) override
+  {
+    RecordedPiece piece;
+    if (!m_reader.next(piece))
+      return false;
+    if (m_first_ns < 0)
+      m_first_ns = m_last_ns = piece.arrival_ns;
+    m_last_ns = std::max(m_last_ns, piece.arrival_ns); // two threads wrote: nearly in order
+    packet = {};
+    packet.sent_ns = packet.stamp_ns = m_last_ns - m_first_ns;
+    packet.bytes = std::move(piece.bytes);
+    packet.kind = piece.channel == LinkChannel::video     ? FeedPacket::Kind::raw_video
+                  : piece.channel == LinkChannel::navdata ? FeedPacket::Kind::raw_navdata
+                                                          : FeedPacket::Kind::video_connected;
+    if (packet.kind == FeedPacket::Kind::video_connected && std::exchange(m_is_first_connection, false))
+      packet.sent_ns = 0;
+    return true;
+  }
+
+private:
+  RecordingReader m_reader;
+  int m_generation;
+  std::int64_t m_first_ns = -1, m_last_ns = 0;
+  bool m_is_first_connection = true;
+};
+} // namespace
+
+RecordingWriter::RecordingWriter(const std::string &folder)
+{
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  m_path = (std::filesystem::path(folder) / "raw.bin").string();
+  m_descriptor = ::open(m_path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
+  if (m_descriptor < 0)
+    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, std::strerror(errno)));
+  if (::write(m_descriptor, kTitle.data(), kTitle.size()) != static_cast<ssize_t>(kTitle.size()))
+    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, std::strerror(errno)));
+  m_bytes = kTitle.size();
+}
+
+RecordingWriter::~RecordingWriter()
+{
+  ::fsync(m_descriptor);
+  ::close(m_descriptor);
+}
+
+void RecordingWriter::write(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)
+{
+  std::vector<std::uint8_t> piece;
+  piece.reserve(kHead + size + kTail);
+  appendLittleEndian(piece, kMagic);
+  piece.push_back(static_cast<std::uint8_t>(channel));
+  piece.resize(8, 0);
+  appendLittleEndian(piece, arrival_ns);
+  appendLittleEndian(piece, static_cast<std::uint32_t>(size));
+  piece.insert(piece.end(), data, data + size);
+  appendLittleEndian(piece, crc32(piece.data(), piece.size()));
+  const std::lock_guard<std::mutex> lock(m_mutex);
+  const ssize_t written = ::write(m_descriptor, piece.data(), piece.size());
+  if (written != static_cast<ssize_t>(piece.size()) && m_error.empty())
+    m_error = fmt::format("{}: {}", m_path, written < 0 ? std::strerror(errno) : "the disk is full");
+  m_bytes += written > 0 ? static_cast<std::size_t>(written) : 0;
+}
+
+std::size_t RecordingWriter::bytes() const
+{
+  const std::lock_guard<std::mutex> lock(m_mutex);
+  return m_bytes;
+}
+
+std::string RecordingWriter::error() const
+{
+  const std::lock_guard<std::mutex> lock(m_mutex);
+  return m_error;
+}
+
+RecordingReader::RecordingReader(const std::string &folder)
+{
+  const auto path = rawPath(folder);
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw vpException(vpException::ioError, fmt::format("{}: {}, must be a recording", path.string(), std::strerror(errno)));
+  m_bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  if (m_bytes.size() < kTitle.size() || !std::equal(kTitle.begin(), kTitle.end(), m_bytes.begin()))
+    throw vpException(vpException::ioError, fmt::format("{}:1: the first line must be \"{}\"", path.string(), kTitle.substr(0, kTitle.size() - 1)));
+  m_at = kTitle.size();
+}
+
+RecordingReader::RecordingReader(std::vector<std::uint8_t> bytes) : m_bytes(std::move(bytes)) {}
+
+bool RecordingReader::next(RecordedPiece &piece)
+{
+  for (; m_at + kHead + kTail <= m_bytes.size(); ++m_at, ++m_skipped) {
+    const std::uint8_t *p = m_bytes.data() + m_at;
+    if (readLittleEndian<std::uint32_t>(p) != kMagic)
+      continue;
+    const std::size_t size = readLittleEndian<std::uint32_t>(p + 16);
+    const std::size_t left = m_bytes.size() - m_at;
+    if (p[4] < 1 || p[4] > 3 || size > kLargestPiece || kHead + size + kTail > left ||
+        readLittleEndian<std::uint32_t>(p + kHead + size) != crc32(p, kHead + size))
+      continue;
+    piece.channel = static_cast<LinkChannel>(p[4]);
+    piece.arrival_ns = readLittleEndian<std::int64_t>(p + 8);
+    piece.bytes.assign(p + kHead, p + kHead + size);
+    m_at += kHead + size + kTail;
+    return true;
+  }
+  m_skipped += m_bytes.size() - m_at;
+  m_at = m_bytes.size();
+  return false;
+}
+
+int recordedGeneration(const std::string &folder)
+{
+  RecordingReader reader(folder);
+  for (RecordedPiece piece; reader.next(piece);)
+    if (piece.channel == LinkChannel::video && !piece.bytes.empty()) {
+      static constexpr std::array<std::uint8_t, 4> signature = {'P', 'a', 'V', 'E'};
+      const auto end = piece.bytes.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(piece.bytes.size(), 4096));
+      if (std::search(piece.bytes.begin(), end, signature.begin(), signature.end()) != end)
+        return 2;
+      if (piece.bytes.size() > 3 && piece.bytes[2] == 0 && piece.bytes[3] == 0)
+        return 1; // the start code of a picture
+    }
+  return 2;
+}
+
+std::unique_ptr<PacketFeed> makeRecordingFeed(const std::string &folder) { return std::make_unique<RecordingFeed>(folder); }
+} // namespace bole
