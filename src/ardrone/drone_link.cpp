@@ -51,7 +51,7 @@ struct DroneLink::State
 
   // The video thread's own.
   std::optional<ClockUnwrapper> pave_time;
-  std::int64_t stamp_shift_ns = 0, last_stamp_ns = 0, last_arrival_ns = 0;
+  std::int64_t stamp_shift_ns = 0, last_stamp_ns = 0, last_arrival_ns = 0, fresh_stamp_ns = 0;
   bool has_stamp = false;
   struct Jump
   {
@@ -203,6 +203,10 @@ struct DroneLink::State
     frame.picture = std::move(decoded.picture);
     frame.number = decoded.number;
     frame.arrival_ns = arrival_ns;
+    if (decoded.unchanged)
+      frame.unchanged_since_ns = fresh_stamp_ns;
+    else if (decoded.status == FrameStatus::ok)
+      fresh_stamp_ns = frame.stamp_ns;
     counters.dropped += newest ? 1 : 0;
     newest = std::move(frame);
     frame_came.notify_one();
@@ -289,6 +293,21 @@ struct DroneLink::State
     return navdata_clock.toDrone(video_clock.toHost(stamp_ns) - static_cast<std::int64_t>(address.video_delay_s * 1e9));
   }
 
+  /// A picture that stays while the body moves is no picture of now.
+  void checkFrozen(LiveFrame &frame) const
+  {
+    if (frame.status != FrameStatus::ok || !frame.unchanged_since_ns || !frame.body)
+      return;
+    const auto then = odometry.at(videoToNavdata(*frame.unchanged_since_ns));
+    if (!then)
+      return;
+    const Vector6d moved = frame.body->wMb.minus(then->wMb);
+    if (moved.head<3>().norm() > options.frozen_m || moved.tail<3>().norm() > options.frozen_rad) {
+      frame.status = FrameStatus::stale;
+      frame.message = "the picture stays though the body moves";
+    }
+  }
+
   void addNavdata(LiveFrame &frame) const
   {
     if (!navdata_clock.isReady() || !video_clock.isReady())
@@ -315,6 +334,10 @@ void DroneLink::Options::validate() const
     throw vpException(vpException::badValue, "silence_s = %g, must be in (0.1, 30) s", silence_s);
   if (!(retry_s > 0.01 && retry_s < 5))
     throw vpException(vpException::badValue, "retry_s = %g, must be in (0.01, 5) s", retry_s);
+  if (!(frozen_m > 0 && frozen_m < 10))
+    throw vpException(vpException::badValue, "frozen_m = %g, must be in (0, 10) m", frozen_m);
+  if (!(frozen_rad > 0 && frozen_rad < 3))
+    throw vpException(vpException::badValue, "frozen_rad = %g, must be in (0, 3) rad", frozen_rad);
   odometry.validate();
   clock.validate();
 }
@@ -346,6 +369,8 @@ bool DroneLink::next(LiveFrame &frame, double timeout_s)
   frame = std::move(*m_state->newest);
   m_state->newest.reset();
   m_state->addNavdata(frame);
+  m_state->checkFrozen(frame);
+  m_state->counters.frozen += frame.status == FrameStatus::stale ? 1 : 0;
   m_state->last_given_stamp_ns = frame.stamp_ns;
   ++m_state->counters.delivered;
   return true;

@@ -364,8 +364,7 @@ struct ArDroneEmulator::State
   {
     const int width = static_cast<int>(image.getWidth()), height = static_cast<int>(image.getHeight());
     if (!encoder) {
-      const double bit_rate = options.bit_rate > 0 ? options.bit_rate : options.bits_per_pixel * width * height * feed->frameRateHz();
-      encoder = std::make_unique<H264Encoder>(width, height, feed->frameRateHz(), bit_rate, options.key_interval);
+      encoder = std::make_unique<H264Encoder>(width, height, feed->frameRateHz(), options.bit_rate, options.key_interval);
     }
     const auto encoded = encoder->encode(image, force_key);
     force_key = false;
@@ -425,8 +424,7 @@ void ArDroneEmulator::Options::validate() const
       throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
   };
   require("speed", speed, 1, 20);
-  require("bits_per_pixel", bits_per_pixel, 0.01, 4);
-  require("bit_rate", bit_rate, 0, 1e8);
+  require("bit_rate", bit_rate, 1e4, 1e8);
   require("key_interval", key_interval, 1, 300);
   require("loss", loss, 0, 0.99);
   require("jitter_s", jitter_s, 0, 1);

@@ -4,8 +4,32 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 namespace bole
 {
+namespace
+{
+constexpr double kUnchanged = 0.7; // grey levels
+constexpr int kBlock = 16;
+
+/// Mean over the blocks of 16x16 pixels of the change of their mean.
+double blockChange(const YuvPicture &a, const YuvPicture &b)
+{
+  double total = 0;
+  int blocks = 0;
+  for (int top = 0; top + kBlock <= a.height; top += kBlock)
+    for (int left = 0; left + kBlock <= a.width; left += kBlock, ++blocks) {
+      int sum = 0;
+      for (int v = top; v < top + kBlock; ++v)
+        for (int u = left; u < left + kBlock; ++u)
+          sum += a.y[static_cast<std::size_t>(v) * a.width + u] - b.y[static_cast<std::size_t>(v) * a.width + u];
+      total += std::abs(sum) / static_cast<double>(kBlock * kBlock);
+    }
+  return blocks > 0 ? total / blocks : 0;
+}
+} // namespace
+
 VideoDecoder::VideoDecoder(int generation) : m_generation(generation) {}
 
 void VideoDecoder::restart()
@@ -51,7 +75,11 @@ void VideoDecoder::judge(DecodedFrame &frame)
     }
     else if (frame.picture.y == m_last.y) {
       frame.status = FrameStatus::stale;
+      frame.unchanged = true;
       frame.message = fmt::format("the picture of frame {} again", m_last.number);
+    }
+    else if (!m_last.empty() && blockChange(frame.picture, m_last) < kUnchanged) {
+      frame.unchanged = true; // m_last stays: slow changes add up
     }
     else {
       m_last = frame.picture;

@@ -23,6 +23,7 @@ struct LiveFrame
   std::uint32_t number = 0;      ///< as the drone counts
   std::int64_t stamp_ns = 0;     ///< drone's video clock, unwrapped; rises over reboots too
   std::int64_t arrival_ns = 0;   ///< host's steady clock, last byte of the frame
+  std::optional<std::int64_t> unchanged_since_ns; ///< stamp of the picture from which this hardly differs
   std::optional<BodyState> body; ///< navdata interpolated at the exposure, stamp as above
   std::vector<GyroSample> gyro;  ///< since the frame given out before, stamps as above
   std::optional<Matrix6d> odometry_covariance; ///< of the motion since the frame given out before
@@ -32,6 +33,7 @@ struct LinkCounters
 {
   VideoDecoder::Counters video;
   std::size_t delivered = 0;       ///< frames given out
+  std::size_t frozen = 0;          ///< of them, stale
   std::size_t dropped = 0;         ///< decoded, but a newer frame came before anyone asked
   std::size_t connections = 0;     ///< of the video, the first one too
   std::size_t clock_jumps = 0;     ///< of the video's clock: reboots
@@ -52,6 +54,8 @@ using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const s
 /// but keeps only the newest frame for the consumer: a slow consumer gets fewer frames, never old ones. A second
 /// thread integrates navdata. The two streams have clocks of their own; each is fitted to the host's (ClockFit), and
 /// a frame exposed video_delay_s before its fastest arrival finds its navdata that way.
+/// A picture that hardly differs from an earlier one although the navdata say that the body moved on by more than
+/// frozen_m or frozen_rad is `stale`: the camera is frozen.
 /// A link silent for silence_s is opened anew, every retry_s.
 ///
 /// Thread-safe. Cost: H.264 640x360 about 2 ms a frame on its own thread.
@@ -63,6 +67,8 @@ public:
     bool full_navdata = true;  ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
     double silence_s = 0.8;    ///< [s], (0.1, 30): a link this long silent is opened anew
     double retry_s = 0.1;      ///< [s], (0.01, 5): pause between attempts
+    double frozen_m = 0.1;     ///< [m], (0, 10): a motion that no scene among trees can hide
+    double frozen_rad = 0.02;  ///< [rad], (0, 3): 4 px at 320 columns
     NavdataOdometry::Options odometry;
     ClockFit::Options clock;
     void validate() const;

@@ -65,8 +65,7 @@ public:
     std::string host = "127.0.0.1";
     std::uint16_t navdata_port = 0, video_port = 0, at_port = 0; ///< 0: any free one
     double speed = 1;          ///< [1, 20]: flight seconds a second
-    double bits_per_pixel = 0.18; ///< (0.01, 4): as in a captured stream of 640x360 at 30 Hz
-    double bit_rate = 0;       ///< [bit/s], 0: from bits_per_pixel
+    double bit_rate = 1.3e6;   ///< [bit/s], [1e4, 1e8]: of a captured stream of an AR.Drone 2; its most is 4e6
     int key_interval = 15;     ///< frames, [1, 300]; 15 on the drone
     // Faults.
     double loss = 0;           ///< share of datagrams and TCP frames that are not sent, [0, 1)

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The live path against the emulator. Nothing here measures time; limits are for machines that hang.
+#include "flight.h"
+
+#include <gtest/gtest.h>
+#include <map>
+#include <set>
+#include <visp3/core/vpException.h>
+
+using namespace bole;
+using test::addressOf;
+using test::emulate;
+using test::eventually;
+
+namespace
+{
+/// All frames until the emulated flight is over and the source has given what it has.
+std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t> *numbers = nullptr, LinkCounters *counters = nullptr)
+{
+  ArDroneSource::Options options;
+  options.give_up_s = 2; // longer than the reboot below
+  options.grabber.open_timeout_s = test::kPatience_s;
+  ArDroneSource source(address, options);
+  std::vector<Frame> frames;
+  for (Frame frame; source.next(frame);) {
+    frames.push_back(frame);
+    if (numbers != nullptr)
+      numbers->push_back(source.liveFrame().number);
+  }
+  if (counters != nullptr)
+    *counters = source.counters();
+  return frames;
+}
+
+std::map<FrameStatus, int> countByStatus(const std::vector<Frame> &frames)
+{
+  std::map<FrameStatus, int> count;
+  for (const Frame &frame : frames)
+    ++count[frame.status];
+  return count;
+}
+
+void expectRisingStamps(const std::vector<Frame> &frames)
+{
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    ASSERT_GT(frames[i].stamp_ns, frames[i - 1].stamp_ns) << i;
+}
+} // namespace
+
+class Live : public testing::TestWithParam<int>
+{
+};
+INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2), [](const auto &generation) { return "ArDrone" + std::to_string(generation.param); });
+
+TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
+{
+  const auto emulator = emulate(GetParam(), 60);
+  std::vector<std::uint32_t> numbers;
+  const auto frames = fly(addressOf(*emulator), &numbers);
+  expectRisingStamps(frames);
+  const double largest_error_m = 0.25; // 1 m/s: a quarter of a second of a machine that stumbles
+  int checked = 0;
+  std::optional<Pose> first_seen, first_flown;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].status != FrameStatus::ok || !frames[i].wMb_odometry)
+      continue;
+    const Pose flown = test::MadeUpFlight::pose((numbers[i] - 1) * 0.05);
+    EXPECT_EQ(frames[i].image.getWidth(), 160u);
+    EXPECT_TRUE(frames[i].height);
+    if (!first_seen) {
+      first_seen = frames[i].wMb_odometry;
+      first_flown = flown;
+    }
+    const Vector6d error = (first_seen->inverse() * *frames[i].wMb_odometry).minus(first_flown->inverse() * flown);
+    EXPECT_LT(error.head<3>().norm(), largest_error_m);
+    EXPECT_LT(error.tail<3>().norm(), 0.1);
+    EXPECT_NEAR(frames[i].wMb_odometry->t.z(), flown.t.z(), 0.05); // the sonar knows the height itself
+    ++checked;
+  }
+  EXPECT_GT(checked, 5);
+}
+
+TEST_P(Live, ReadingSendsNoFlightCommand)
+{
+  const auto emulator = emulate(GetParam(), 40);
+  fly(addressOf(*emulator));
+  std::set<std::string> names;
+  for (const AtCommand &command : emulator->commands())
+    names.insert(command.name);
+  EXPECT_TRUE(names.count("CONFIG"));
+  for (const std::string &name : names)
+    EXPECT_TRUE(name == "CONFIG" || name == "CTRL" || name == "COMWDG") << name;
+  EXPECT_EQ(emulator->counters().out_of_sequence, 0u);
+}
+
+TEST_P(Live, ASlowConsumerGetsTheNewestFrameAndTheOthersAreCounted)
+{
+  const auto emulator = emulate(GetParam(), 60);
+  DroneLink link(emulator->address());
+  LiveFrame frame;
+  ASSERT_TRUE(emulator->wait(test::kPatience_s));
+  ASSERT_TRUE(eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
+  ASSERT_TRUE(eventually([&] {
+    const auto a = link.counters().video.frames;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    return a == link.counters().video.frames;
+  }));
+  ASSERT_TRUE(link.next(frame, 1));
+  EXPECT_EQ(frame.number, 60u);
+  EXPECT_FALSE(link.next(frame, 0.01));
+  const LinkCounters counters = link.counters();
+  EXPECT_EQ(counters.delivered, 1u);
+  EXPECT_EQ(counters.dropped + counters.delivered, counters.video.frames);
+}
+
+TEST_P(Live, ComesBackByItselfAfterAReboot)
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  options.reboot_at_s = 1.5;
+  options.reboot_for_s = 0.5;
+  const auto emulator = emulate(GetParam(), 120, options);
+  LinkCounters counters;
+  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
+  expectRisingStamps(frames);
+  EXPECT_EQ(emulator->counters().reboots, 1u);
+  EXPECT_GE(counters.connections, GetParam() == 2 ? 2u : 1u);
+  EXPECT_EQ(counters.navdata_restarts, 1u);
+  // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was flown.
+  const auto last = std::find_if(frames.rbegin(), frames.rend(), [](const Frame &f) { return f.status == FrameStatus::ok; });
+  ASSERT_NE(last, frames.rend());
+  EXPECT_GT(last->stamp_ns - frames.front().stamp_ns, 3'000'000'000);
+  ASSERT_TRUE(last->wMb_odometry);
+  EXPECT_LT((last->wMb_odometry->t - frames.front().wMb_odometry->t).norm(), 8);
+}
+
+TEST_P(Live, ClocksThatWrapAreNotNoticed)
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  options.clock_wrap = true; // both clocks wrap after 3 s
+  const auto emulator = emulate(GetParam(), 120, options);
+  LinkCounters counters;
+  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
+  expectRisingStamps(frames);
+  EXPECT_EQ(counters.clock_jumps, 0u);
+  EXPECT_EQ(counters.navdata_restarts, 0u);
+  double travelled = 0;
+  const Frame *before = nullptr;
+  for (const Frame &frame : frames)
+    if (frame.wMb_odometry) {
+      if (before != nullptr)
+        travelled += (frame.wMb_odometry->t - before->wMb_odometry->t).norm();
+      before = &frame;
+    }
+  EXPECT_GT(travelled, 2);
+  EXPECT_LT(travelled, 9);
+}
+
+TEST_P(Live, LosesAndJittersPacketsWithoutLosingTheThread)
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  options.loss = 0.1;
+  options.jitter_s = 0.03;
+  const auto emulator = emulate(GetParam(), 80, options);
+  LinkCounters counters;
+  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
+  expectRisingStamps(frames);
+  EXPECT_GT(emulator->counters().lost, 0u);
+  EXPECT_GT(countByStatus(frames)[FrameStatus::ok], 5);
+  if (GetParam() == 2) {
+    EXPECT_GT(counters.video.corrupt, 0u); // frames that refer to lost ones
+  }
+}
+
+TEST_P(Live, CorruptionNeitherCrashesNorStopsIt)
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  options.corrupt = 0.2;
+  options.key_interval = 5;
+  const auto emulator = emulate(GetParam(), 120, options);
+  LinkCounters counters;
+  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
+  expectRisingStamps(frames);
+  EXPECT_GT(emulator->counters().corrupted_navdata, 0u);
+  EXPECT_EQ(counters.navdata_restarts, 0u);
+  EXPECT_GT(counters.navdata_refused, 0u);
+  EXPECT_GT(counters.video.corrupt, 0u);
+  EXPECT_GT(counters.video.ok, 0u);
+}
+
+TEST_P(Live, AFrozenCameraIsStale)
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  options.freeze_at_s = 1;
+  options.freeze_for_s = 1.5; // frames 21 to 50
+  const auto emulator = emulate(GetParam(), 80, options);
+  std::vector<std::uint32_t> numbers;
+  const auto frames = fly(addressOf(*emulator), &numbers);
+  int stale = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].status == FrameStatus::missing)
+      continue;
+    const bool frozen = numbers[i] > 25 && numbers[i] <= 50; // the body must have moved on a little first
+    if (frozen) {
+      EXPECT_NE(frames[i].status, FrameStatus::ok) << "frame " << numbers[i];
+    }
+    stale += frames[i].status == FrameStatus::stale ? 1 : 0;
+  }
+  EXPECT_GT(stale, 0);
+}
+
+TEST_P(Live, SilenceIsMissingFramesAndThenAnEnd)
+{
+  const auto emulator = emulate(GetParam(), 30);
+  const auto frames = fly(addressOf(*emulator));
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().status, FrameStatus::missing);
+  EXPECT_EQ(frames.back().image.getSize(), 0u);
+  EXPECT_FALSE(frames.back().message.empty());
+}
+
+TEST(LiveSource, SaysWhenNobodyAnswersOrTheCameraDoesNotFit)
+{
+  ArDroneAddress nobody;
+  nobody.host = "127.0.0.1";
+  nobody.navdata_port = nobody.video_port = nobody.at_port = 1;
+  ArDroneSource::Options options;
+  options.grabber.open_timeout_s = 0.3;
+  EXPECT_THROW(ArDroneSource(nobody, options), vpException);
+  const auto emulator = emulate(2, 40);
+  options.grabber.open_timeout_s = test::kPatience_s;
+  EXPECT_THROW(ArDroneSource(emulator->address(), options), vpException); // 160x120 is not the shape of 640x360
+}
+
+TEST(LiveSource, FindsTheGenerationOut)
+{
+  for (const int generation : {1, 2}) {
+    const auto emulator = emulate(generation, 40);
+    ArDroneAddress address = emulator->address();
+    address.generation = 0;
+    vpArDroneGrabber::Options options;
+    options.open_timeout_s = test::kPatience_s;
+    vpArDroneGrabber grabber(address, options);
+    vpImage<vpRGBa> image;
+    grabber.open(image);
+    EXPECT_EQ(grabber.getLink().generation(), generation);
+    EXPECT_EQ(image.getWidth(), 160u);
+    EXPECT_EQ(grabber.getWidth(), 160u);
+    EXPECT_NEAR(image[60][80].R, image[60][80].B, 12); // grey
+  }
+}
