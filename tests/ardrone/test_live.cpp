@@ -129,7 +129,7 @@ TEST_P(Live, ComesBackByItselfAfterAReboot)
   // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was flown.
   const auto last = std::find_if(frames.rbegin(), frames.rend(), [](const Frame &f) { return f.status == FrameStatus::ok; });
   ASSERT_NE(last, frames.rend());
-  EXPECT_GT(last->stamp_ns - frames.front().stamp_ns, 3'000'000'000);
+  EXPECT_GT(last->stamp_ns - frames.front().stamp_ns, 2'000'000'000); // the reboot was in the first 1.5 s
   ASSERT_TRUE(last->wMb_odometry);
   EXPECT_LT((last->wMb_odometry->t - frames.front().wMb_odometry->t).norm(), 8);
 }
