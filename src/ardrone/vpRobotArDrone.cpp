@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/vpRobotArDrone.h>
+#include <bole/geometry/pose.h>
+#include <bole/input/camera_file.h>
+
+#include "socket.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <thread>
+#include <visp3/core/vpVelocityTwistMatrix.h>
+#include <visp3/robot/vpRobotException.h>
+
+namespace
+{
+constexpr std::chrono::milliseconds kPeriod{33}; // commands every 30 ms fly smoothly, says the manufacturer
+constexpr int kRepeats = 3;                      // single datagrams get lost
+
+void require(const char *name, double value, double low, double high)
+{
+  if (!(value > low && value < high))
+    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
+}
+} // namespace
+
+struct vpRobotArDrone::State
+{
+  State(vpArDroneGrabber &g, const Options &o) : grabber(g), options(o) {}
+
+  vpArDroneGrabber &grabber;
+  const Options options;
+  std::thread thread;
+  std::atomic<bool> running{false};
+  mutable std::mutex mutex; // guards all below
+  bool in_air = false;
+  int emergency_pulses = 0;
+  Eigen::Vector4d wanted = Eigen::Vector4d::Zero(); // vx, vy, vz, wz of the body
+  bool has_wanted = false;
+  std::int64_t renewed_ns = 0;
+  Watchdog watchdog = Watchdog::idle;
+  std::optional<bole::Pose> last_position;
+
+  float share(double value) const { return static_cast<float>(std::clamp(value, -options.largest_share, options.largest_share)); }
+
+  void run()
+  {
+    while (running) {
+      step();
+      std::this_thread::sleep_for(kPeriod);
+    }
+  }
+
+  void step()
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    bole::AtChannel &commands = grabber.getLink().commands();
+    const auto body = grabber.getLink().body();
+    if (emergency_pulses > 0) {
+      commands.reference(false, emergency_pulses-- > 1); // a rising edge changes the state, so it must fall again
+      return;
+    }
+    if (!in_air) {
+      watchdog = Watchdog::idle;
+      commands.reference(false, false);
+      return;
+    }
+    const double age_s = static_cast<double>(bole::steadyNowNs() - renewed_ns) * 1e-9;
+    if (age_s > options.land_after_s) {
+      watchdog = Watchdog::lands;
+      in_air = false;
+      has_wanted = false;
+      commands.reference(false, false);
+      return;
+    }
+    commands.reference(true, false);
+    const bool fresh = has_wanted && age_s <= options.hover_after_s && body;
+    watchdog = fresh || !has_wanted ? Watchdog::content : Watchdog::hovers;
+    if (!fresh) {
+      commands.move(false, 0, 0, 0, 0);
+      return;
+    }
+    // Forward needs the nose down and leftward the left side down: both negative for the drone.
+    const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body->velocity.head<2>());
+    commands.move(true, share(-tilt.y()), share(-tilt.x()), share(wanted.z() / options.largest_climb), share(-wanted.w() / options.largest_turn));
+  }
+
+  void requireOpen() const
+  {
+    if (!running)
+      throw vpRobotException(vpRobotException::notInitialized, "the robot was not opened with the permission to fly: nothing was sent");
+  }
+};
+
+vpRobotArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) {}
+
+void vpRobotArDrone::Options::validate() const
+{
+  require("hover_after_s", hover_after_s, 0.05, 2);
+  require("land_after_s", land_after_s, hover_after_s, 60);
+  require("gain", gain, 0, 2);
+  require("largest_share", largest_share, 0, 1.0001);
+  require("largest_climb", largest_climb, 0, 5);
+  require("largest_turn", largest_turn, 0, 7);
+}
+
+vpRobotArDrone::vpRobotArDrone(vpArDroneGrabber &grabber) : vpRobotArDrone(grabber, Options()) {}
+
+vpRobotArDrone::vpRobotArDrone(vpArDroneGrabber &grabber, const Options &options)
+{
+  options.validate();
+  nDof = 4;
+  m_state = std::make_unique<State>(grabber, options);
+}
+
+vpRobotArDrone::~vpRobotArDrone() { close(); }
+
+void vpRobotArDrone::open(Permission permission)
+{
+  if (permission != Permission::fly || m_state->running)
+    return;
+  m_state->grabber.getLink(); // throws when the grabber is not open
+  m_state->running = true;
+  m_state->thread = std::thread([this] { m_state->run(); });
+}
+
+void vpRobotArDrone::close()
+{
+  if (!m_state->running)
+    return;
+  m_state->running = false;
+  m_state->thread.join();
+  if (m_state->in_air)
+    for (int i = 0; i < kRepeats; ++i)
+      m_state->grabber.getLink().commands().reference(false, false);
+  m_state->in_air = false;
+}
+
+bool vpRobotArDrone::isOpen() const { return m_state->running; }
+
+void vpRobotArDrone::takeOff()
+{
+  m_state->requireOpen();
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->in_air = true;
+  m_state->has_wanted = false;
+  m_state->renewed_ns = bole::steadyNowNs();
+}
+
+void vpRobotArDrone::land()
+{
+  m_state->requireOpen();
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->in_air = false;
+  m_state->has_wanted = false;
+  m_state->grabber.getLink().commands().reference(false, false);
+}
+
+void vpRobotArDrone::hover()
+{
+  m_state->requireOpen();
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->has_wanted = false;
+  m_state->renewed_ns = bole::steadyNowNs();
+}
+
+void vpRobotArDrone::emergency()
+{
+  m_state->requireOpen();
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->in_air = false;
+  m_state->has_wanted = false;
+  m_state->emergency_pulses = 2;
+  m_state->grabber.getLink().commands().reference(false, true);
+}
+
+void vpRobotArDrone::trim()
+{
+  m_state->requireOpen();
+  m_state->grabber.getLink().commands().trimFlat();
+}
+
+void vpRobotArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
+{
+  m_state->requireOpen();
+  if (v.size() != 6)
+    throw vpRobotException(vpRobotException::dimensionError, "velocity of %u numbers, must be 6", v.size());
+  if (frame != vpRobot::CAMERA_FRAME && frame != vpRobot::REFERENCE_FRAME)
+    throw vpRobotException(vpRobotException::wrongStateError, "frame, must be CAMERA_FRAME or REFERENCE_FRAME");
+  for (unsigned i = 0; i < 6; ++i)
+    if (!std::isfinite(v[i]))
+      throw vpRobotException(vpRobotException::wrongStateError, "velocity %u is not finite", i);
+  vpColVector saturation(6, getMaxTranslationVelocity());
+  for (unsigned i = 3; i < 6; ++i)
+    saturation[i] = getMaxRotationVelocity();
+  vpColVector body = vpRobot::saturateVelocities(v, saturation, false);
+  if (frame == vpRobot::CAMERA_FRAME)
+    body = vpVelocityTwistMatrix(m_state->options.bMc) * body;
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->wanted = {body[0], body[1], body[2], body[5]};
+  m_state->has_wanted = true;
+  m_state->renewed_ns = bole::steadyNowNs();
+}
+
+vpRobotArDrone::Watchdog vpRobotArDrone::watchdog() const
+{
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  return m_state->watchdog;
+}
+
+void vpRobotArDrone::get_eJe(vpMatrix &jacobian)
+{
+  jacobian.resize(6, 4, true);
+  jacobian[0][0] = jacobian[1][1] = jacobian[2][2] = jacobian[5][3] = 1;
+}
+
+void vpRobotArDrone::get_fJe(vpMatrix &)
+{
+  throw vpRobotException(vpRobotException::notImplementedError, "a flying body has no fixed frame to be moved in");
+}
+
+void vpRobotArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector &q)
+{
+  const auto body = m_state->grabber.getLink().body();
+  if (!body)
+    throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
+  const vpHomogeneousMatrix wMb = body->wMb.toVisp();
+  const vpThetaUVector turn(wMb.getRotationMatrix());
+  q.resize(6, false);
+  for (unsigned i = 0; i < 3; ++i) {
+    q[i] = wMb[i][3];
+    q[i + 3] = turn[i];
+  }
+}
+
+void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVector &q)
+{
+  const auto body = m_state->grabber.getLink().body();
+  if (!body)
+    throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  const bole::Vector6d moved = m_state->last_position ? body->wMb.minus(*m_state->last_position) : bole::Vector6d::Zero().eval();
+  m_state->last_position = body->wMb;
+  q.resize(6, false);
+  for (unsigned i = 0; i < 6; ++i)
+    q[i] = moved[i];
+}
+
+void vpRobotArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)
+{
+  throw vpRobotException(vpRobotException::notImplementedError, "an AR.Drone obeys velocities, not positions");
+}
