@@ -10,4 +10,7 @@ namespace bole::apps
 {
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addSimulate(CLI::App &app);
+void addRecord(CLI::App &app);  ///< a live flight to disk
+void addReplay(CLI::App &app);  ///< a recorded flight, served again
+void addEmulate(CLI::App &app); ///< a sequence, served as an AR.Drone would
 } // namespace bole::apps

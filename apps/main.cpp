@@ -12,6 +12,9 @@ int main(int argc, char **argv)
   app.require_subcommand(1);
   bole::apps::addEvaluate(app);
   bole::apps::addSimulate(app);
+  bole::apps::addRecord(app);
+  bole::apps::addReplay(app);
+  bole::apps::addEmulate(app);
   try {
     app.parse(argc, argv);
   }

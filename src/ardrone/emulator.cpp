@@ -97,17 +97,18 @@ struct ArDroneEmulator::State
     bool has_packet = false, has_more = true;
     while (running && (has_more || !queue.empty() || !pending.empty())) {
       service();
+      if (!has_packet && has_more) {
+        has_packet = has_more = feed->next(packet);
+        if (has_packet)
+          prepare(packet); // encoding must not delay the sending
+      }
       const std::int64_t now_ns = steadyNowNs();
       if (start_ns < 0 && readyToStart(now_ns))
         start_ns = now_ns;
-      if (start_ns >= 0) {
-        if (!has_packet && has_more)
-          has_packet = has_more = feed->next(packet);
-        if (has_packet && flightTime(now_ns) >= packet.sent_ns) {
-          launch(packet);
-          has_packet = false;
-          continue; // the next may be due already
-        }
+      if (has_packet && start_ns >= 0 && flightTime(now_ns) >= packet.sent_ns) {
+        launch(packet);
+        has_packet = false;
+        continue; // the next may be due already
       }
       wait(has_packet && start_ns >= 0 ? packet.sent_ns : -1);
     }
@@ -222,8 +223,11 @@ struct ArDroneEmulator::State
     const std::int64_t now_ns = packet.sent_ns;
     if (!rebooted && options.reboot_at_s >= 0 && now_ns >= seconds(options.reboot_at_s))
       goDown(now_ns);
-    if (rebooting(now_ns))
+    if (rebooting(now_ns)) {
+      frame_number = stream_position = 0;
+      force_key = true;
       return;
+    }
     if (!video_socket.valid())
       listenVideo();
     {
@@ -342,8 +346,10 @@ struct ArDroneEmulator::State
     pending.erase(pending.begin(), pending.begin() + static_cast<std::ptrdiff_t>(sent));
   }
 
-  void sendPicture(const FeedPacket &packet)
+  void prepare(FeedPacket &packet)
   {
+    if (packet.kind != FeedPacket::Kind::picture)
+      return;
     vpImage<unsigned char> image = packet.image;
     if (within(packet.stamp_ns, options.freeze_at_s, options.freeze_for_s)) {
       if (frozen.getSize() == 0)
@@ -352,11 +358,14 @@ struct ArDroneEmulator::State
       count(&Counters::frozen);
     }
     ++frame_number;
-    const bool stalled = within(packet.stamp_ns, options.stall_at_s, options.stall_for_s);
-    const auto bytes = generation == 1 ? encodeUvlc(image, frame_number) : encodeFrame(image, packet.stamp_ns);
-    if (stalled)
+    packet.bytes = generation == 1 ? encodeUvlc(image, frame_number) : encodeFrame(image, packet.stamp_ns);
+  }
+
+  void sendPicture(const FeedPacket &packet)
+  {
+    if (within(packet.stamp_ns, options.stall_at_s, options.stall_for_s))
       return count(&Counters::stalled);
-    post(Port::video, bytes);
+    post(Port::video, packet.bytes);
     count(&Counters::frames);
   }
 
