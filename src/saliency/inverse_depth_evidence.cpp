@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "fast_math.h"
 #include "plane_warp.h"
 
 #include <bole/saliency/flow_matrix.h>
@@ -11,6 +12,9 @@ namespace bole
 {
 namespace
 {
+constexpr float kOutside = 1;        // residual where the older image ends: as bad as any, so that it says nothing
+constexpr double kUnrelatedPx = 2.5; // two unrelated places of the same texture differ as if so far apart
+
 std::size_t index(int i, int j, int width, int count)
 {
   return (static_cast<std::size_t>(i) * static_cast<std::size_t>(width) + static_cast<std::size_t>(j)) *
@@ -99,28 +103,14 @@ void InverseDepthEvidence::squaredResiduals(const PyramidLevel &older, const Pyr
       const Eigen::Vector3f base = warp.H * Eigen::Vector3f(static_cast<float>(j), static_cast<float>(i), 1);
       const float here = current.image[i][j];
       float *out = &m_residuals[index(i, j, width, m_count)];
-      float sum = 0;
-      int inside = 0;
       for (int k = 0; k < m_count; ++k) {
         const float z = base.z() + m_rho[k] * warp.e.z();
         const float inverse_z = z > 0.1f ? 1 / z : 1e9f;
         const Bilinear sample((base.x() + m_rho[k] * warp.e.x()) * inverse_z,
                               (base.y() + m_rho[k] * warp.e.y()) * inverse_z, width, height);
-        if (!sample.inside) {
-          out[k] = -1;
-          continue;
-        }
-        const float r = here - sample(older.image);
+        const float r = sample.inside ? here - sample(older.image) : kOutside;
         out[k] = r * r;
-        sum += out[k];
-        ++inside;
       }
-      if (inside == m_count)
-        continue;
-      // A step that leaves the image is neither liked nor disliked.
-      const float mean = inside > 0 ? sum / inside : 0.f;
-      for (int k = 0; k < m_count; ++k)
-        out[k] = out[k] < 0 ? mean : out[k];
     }
   }
 }
@@ -185,15 +175,19 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
     const double shift = f * m_rho[k] * noise.translation, turn = f * noise.rotation;
     flow_variance[k] = static_cast<float>(quantisation * quantisation + shift * shift + turn * turn);
   }
-  // Student's t on the mean square of a window: a likelihood that outliers do not own.
+  // log of the likelihood of the window's residual, a Student's t, over that of an unrelated window; never below 0:
+  // where no step matches (the place was hidden, or left the image) none is preferred.
   const float weight = static_cast<float>(m_options.evidence_scale * 2.5);
   const float intensity = static_cast<float>(m_intensity_variance);
+  constexpr float kUnrelated = static_cast<float>(kUnrelatedPx * kUnrelatedPx);
   for (std::size_t p = 0; p < g2.size(); ++p) {
     const float *r2 = &m_residuals[p * static_cast<std::size_t>(m_count)];
     float *out = &m_evidence[p * static_cast<std::size_t>(m_count)];
+    const float unrelated = intensity + g2[p] * kUnrelated;
     for (int k = 0; k < m_count; ++k) {
       const float variance = intensity + g2[p] * flow_variance[k];
-      out[k] -= weight * (0.5f * std::log(variance / intensity) + std::log1p(r2[k] / variance));
+      const float ratio = 2 * std::sqrt(unrelated * variance) / (variance + r2[k]);
+      out[k] += weight * std::max(0.f, fastLog(ratio));
     }
   }
 }
@@ -208,7 +202,7 @@ vpImage<float> InverseDepthEvidence::logOddsNear() const
       best = std::max(best, e[k]);
     float near = 1e-20f, far = 1e-20f;
     for (int k = 0; k < m_count; ++k)
-      (m_rho[k] * m_options.near_range > 1 ? near : far) += std::exp(e[k] - best + m_log_prior[k]);
+      (m_rho[k] * m_options.near_range > 1 ? near : far) += fastExp(e[k] - best + m_log_prior[k]);
     result.bitmap[p] = std::log(near / far);
   }
   return result;
@@ -222,7 +216,7 @@ vpImage<float> InverseDepthEvidence::inverseDepth() const
     const float best = *std::max_element(e, e + m_count);
     float sum = 0, weighted = 0;
     for (int k = 0; k < m_count; ++k) {
-      const float w = std::exp(e[k] - best + m_log_prior[k]);
+      const float w = fastExp(e[k] - best + m_log_prior[k]);
       sum += w;
       weighted += w * m_rho[k];
     }
