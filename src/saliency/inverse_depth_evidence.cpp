@@ -23,63 +23,99 @@ std::size_t index(int i, int j, int width, int count)
 } // namespace
 
 InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int level, const SaliencyOptions &options)
-  : m_camera(camera), m_options(options), m_count(options.inverse_depths)
+  : m_camera(camera), m_options(options), m_count(options.inverse_depths),
+    m_rows((camera.height + kRowStep - 1) / kRowStep), m_window_rows(options.window_height_px / kRowStep | 1)
 {
   const double sigma = options.sigma_intensity * std::max(std::ldexp(1.0, -level), 0.25);
   m_intensity_variance = 2 * sigma * sigma;
   const double rho_max = 1 / options.min_range;
-  int near_count = 0;
   for (int k = 0; k < m_count; ++k) {
     const double share = static_cast<double>(k) / (m_count - 1);
     m_rho.push_back(static_cast<float>(rho_max * share * share));
-    near_count += m_rho.back() * options.near_range > 1;
+    m_first_near += m_rho.back() * options.near_range <= 1;
   }
-  for (float rho : m_rho) {
-    const bool near = rho * options.near_range > 1;
-    m_log_prior.push_back(static_cast<float>(
-        near ? std::log(options.near_prior / near_count)
-             : std::log((1 - options.near_prior) / (m_count - near_count))));
-  }
+  const double far_count = static_cast<double>(m_first_near), near_count = m_count - far_count;
+  for (std::size_t k = 0; k < m_rho.size(); ++k)
+    m_log_prior.push_back(static_cast<float>(k < m_first_near ? std::log((1 - options.near_prior) / far_count)
+                                                              : std::log(options.near_prior / near_count)));
   m_prior_log_odds = static_cast<float>(std::log(options.near_prior / (1 - options.near_prior)));
   clear();
 }
 
 void InverseDepthEvidence::clear()
 {
-  m_evidence.assign(index(m_camera.height, 0, m_camera.width, m_count), 0.f);
+  m_evidence.assign(index(m_rows, 0, m_camera.width, m_count), 0.f);
   m_scratch.assign(m_evidence.size(), 0.f);
   m_residuals.assign(m_evidence.size(), 0.f);
 }
 
+namespace
+{
+/// Where the steps of one pixel come from in the older image.
+class StepPositions
+{
+public:
+  StepPositions(const PinholeCamera &camera, const Pose &oMc, const std::vector<float> &rho)
+    : m_warp(camera, oMc), m_rho(rho), m_max_x(static_cast<float>(camera.width) - 1.001f),
+      m_max_y(static_cast<float>(camera.height) - 1.001f), x(rho.size()), y(rho.size()), inverse_z(rho.size())
+  {}
+
+  void at(int u, int v)
+  {
+    const Eigen::Vector3f base = m_warp.H * Eigen::Vector3f(static_cast<float>(u), static_cast<float>(v), 1);
+    const float bx = base.x(), by = base.y(), bz = base.z(), ex = m_warp.e.x(), ey = m_warp.e.y(), ez = m_warp.e.z();
+    const std::size_t count = m_rho.size();
+    const float *rho = m_rho.data();
+    float *px = x.data(), *py = y.data(), *pz = inverse_z.data();
+    for (std::size_t k = 0; k < count; ++k) {
+      const float z = bz + rho[k] * ez;
+      // Behind the older camera: far outside.
+      pz[k] = z > 0.1f ? 1 / z : -1e9f;
+      px[k] = (bx + rho[k] * ex) * pz[k];
+      py[k] = (by + rho[k] * ey) * pz[k];
+    }
+    // The steps lie on a segment, in order, so that its ends speak for all.
+    all_inside = pz[0] > 0 && pz[count - 1] > 0 && inside(0) && inside(count - 1);
+  }
+  bool inside(std::size_t k) const
+  {
+    return x[k] >= 0 && y[k] >= 0 && x[k] <= m_max_x && y[k] <= m_max_y && inverse_z[k] > 0; // false for NaN
+  }
+
+private:
+  PlaneWarp m_warp;
+  const std::vector<float> &m_rho;
+  float m_max_x, m_max_y;
+
+public:
+  std::vector<float> x, y, inverse_z;
+  bool all_inside = false;
+};
+} // namespace
+
 void InverseDepthEvidence::predict(const Pose &pMc)
 {
-  const PlaneWarp warp(m_camera, pMc);
-  const int width = m_camera.width, height = m_camera.height;
-  const float decay = static_cast<float>(m_options.evidence_decay);
-  const float index_scale = (m_count - 1) / std::sqrt(m_rho.back());
-  const std::size_t next_row = index(1, 0, width, m_count), next = static_cast<std::size_t>(m_count);
-  for (int i = 0; i < height; ++i) {
+  StepPositions from(m_camera, pMc, m_rho);
+  const int width = m_camera.width;
+  const std::size_t count = m_rho.size();
+  const float decay = static_cast<float>(m_options.evidence_decay), last_step = static_cast<float>(count) - 1.001f;
+  for (int i = 0; i < m_rows; ++i) {
     for (int j = 0; j < width; ++j) {
-      const Eigen::Vector3f base = warp.H * Eigen::Vector3f(static_cast<float>(j), static_cast<float>(i), 1);
+      from.at(j, i * kRowStep);
       float *out = &m_scratch[index(i, j, width, m_count)];
-      for (int k = 0; k < m_count; ++k) {
-        out[k] = 0;
-        const float z = base.z() + m_rho[k] * warp.e.z();
-        if (z < 0.1f)
+      for (std::size_t k = 0; k < count; ++k) {
+        if (!from.all_inside && !from.inside(k)) {
+          out[k] = 0;
           continue;
-        const float inverse_z = 1 / z;
-        const Bilinear sample((base.x() + m_rho[k] * warp.e.x()) * inverse_z,
-                              (base.y() + m_rho[k] * warp.e.y()) * inverse_z, width, height);
-        if (!sample.inside)
-          continue;
-        const float position = std::min(std::sqrt(m_rho[k] * inverse_z) * index_scale, m_count - 1.001f);
-        const int step = static_cast<int>(position);
-        const float c = position - step;
-        const float *p = &m_evidence[index(sample.i, sample.j, width, m_count) + static_cast<std::size_t>(step)];
-        const auto at = [c](const float *v) { return v[0] + c * (v[1] - v[0]); };
-        const float upper = at(p) + sample.a * (at(p + next) - at(p));
-        const float lower = at(p + next_row) + sample.a * (at(p + next_row + next) - at(p + next_row));
-        out[k] = decay * (upper + sample.b * (lower - upper));
+        }
+        // Steps go with the square root of the inverse depth, which in the older frame is rho / z.
+        const float position = std::min(static_cast<float>(k) * std::sqrt(from.inverse_z[k]), last_step);
+        const int step = static_cast<int>(position), column = static_cast<int>(from.x[k]);
+        const int row = std::min(static_cast<int>(from.y[k] * (1.f / kRowStep) + 0.5f), m_rows - 1);
+        const float a = from.x[k] - static_cast<float>(column), c = position - static_cast<float>(step);
+        const float *p = &m_evidence[index(row, column, width, m_count) + static_cast<std::size_t>(step)];
+        const float left = p[0] + c * (p[1] - p[0]), right = p[count] + c * (p[count + 1] - p[count]);
+        out[k] = decay * (left + a * (right - left));
       }
     }
   }
@@ -96,19 +132,24 @@ void InverseDepthEvidence::add(const PyramidLevel &older, const PyramidLevel &cu
 
 void InverseDepthEvidence::squaredResiduals(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc)
 {
-  const PlaneWarp warp(m_camera, oMc);
-  const int width = m_camera.width, height = m_camera.height;
-  for (int i = 0; i < height; ++i) {
+  StepPositions from(m_camera, oMc, m_rho);
+  const int width = m_camera.width;
+  const std::size_t count = m_rho.size(), stride = older.image.getWidth();
+  for (int i = 0; i < m_rows; ++i) {
+    const float *here = current.image[static_cast<unsigned>(i * kRowStep)];
     for (int j = 0; j < width; ++j) {
-      const Eigen::Vector3f base = warp.H * Eigen::Vector3f(static_cast<float>(j), static_cast<float>(i), 1);
-      const float here = current.image[i][j];
+      from.at(j, i * kRowStep);
       float *out = &m_residuals[index(i, j, width, m_count)];
-      for (int k = 0; k < m_count; ++k) {
-        const float z = base.z() + m_rho[k] * warp.e.z();
-        const float inverse_z = z > 0.1f ? 1 / z : 1e9f;
-        const Bilinear sample((base.x() + m_rho[k] * warp.e.x()) * inverse_z,
-                              (base.y() + m_rho[k] * warp.e.y()) * inverse_z, width, height);
-        const float r = sample.inside ? here - sample(older.image) : kOutside;
+      for (std::size_t k = 0; k < count; ++k) {
+        if (!from.all_inside && !from.inside(k)) {
+          out[k] = kOutside * kOutside;
+          continue;
+        }
+        const int column = static_cast<int>(from.x[k]), row = static_cast<int>(from.y[k]);
+        const float a = from.x[k] - static_cast<float>(column), b = from.y[k] - static_cast<float>(row);
+        const float *p = older.image.bitmap + static_cast<std::size_t>(row) * stride + column, *q = p + stride;
+        const float upper = p[0] + a * (p[1] - p[0]), lower = q[0] + a * (q[1] - q[0]);
+        const float r = here[j] - upper - b * (lower - upper);
         out[k] = r * r;
       }
     }
@@ -140,30 +181,31 @@ void runningMean(const float *in, float *out, int n, std::size_t stride, int cou
 
 void InverseDepthEvidence::averageOverWindow()
 {
-  const int width = m_camera.width, height = m_camera.height;
+  const int width = m_camera.width, height = m_rows;
   const std::size_t row = index(1, 0, width, m_count), pixel = static_cast<std::size_t>(m_count);
   std::vector<float> sum(row);
   for (int i = 0; i < height; ++i)
     runningMean(&m_residuals[static_cast<std::size_t>(i) * row], &m_scratch[static_cast<std::size_t>(i) * row], width,
                 pixel, m_count, m_options.window_width_px, sum.data());
   // down the image, a whole row at a time
-  runningMean(m_scratch.data(), m_residuals.data(), height, row, static_cast<int>(row), m_options.window_height_px,
+  runningMean(m_scratch.data(), m_residuals.data(), height, row, static_cast<int>(row), m_window_rows,
               sum.data());
 }
 
 void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose &oMc, const MotionNoise &noise)
 {
-  const int width = m_camera.width, height = m_camera.height;
+  const int width = m_camera.width, height = m_rows;
   std::vector<float> g2(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)), mean(g2.size());
   std::vector<float> sum(static_cast<std::size_t>(width));
-  for (std::size_t p = 0; p < g2.size(); ++p) {
-    const float gx = current.gradient_x.bitmap[p], gy = current.gradient_y.bitmap[p];
-    g2[p] = gx * gx + gy * gy;
+  for (int i = 0; i < height; ++i) {
+    const float *gx = current.gradient_x[i * kRowStep], *gy = current.gradient_y[i * kRowStep];
+    for (int j = 0; j < width; ++j)
+      g2[static_cast<std::size_t>(i * width + j)] = gx[j] * gx[j] + gy[j] * gy[j];
   }
   for (int i = 0; i < height; ++i)
     runningMean(&g2[static_cast<std::size_t>(i * width)], &mean[static_cast<std::size_t>(i * width)], width, 1, 1,
                 m_options.window_width_px, sum.data());
-  runningMean(mean.data(), g2.data(), height, static_cast<std::size_t>(width), width, m_options.window_height_px,
+  runningMean(mean.data(), g2.data(), height, static_cast<std::size_t>(width), width, m_window_rows,
               sum.data());
 
   const double f = 0.5 * (m_camera.fx + m_camera.fy);
@@ -192,35 +234,25 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   }
 }
 
-vpImage<float> InverseDepthEvidence::logOddsNear() const
+InverseDepthPosterior InverseDepthEvidence::posterior() const
 {
-  vpImage<float> result(m_camera.height, m_camera.width);
-  for (unsigned p = 0; p < result.getSize(); ++p) {
-    const float *e = &m_evidence[p * static_cast<std::size_t>(m_count)];
-    float best = e[0];
-    for (int k = 1; k < m_count; ++k)
-      best = std::max(best, e[k]);
-    float near = 1e-20f, far = 1e-20f;
-    for (int k = 0; k < m_count; ++k)
-      (m_rho[k] * m_options.near_range > 1 ? near : far) += fastExp(e[k] - best + m_log_prior[k]);
-    result.bitmap[p] = std::log(near / far);
-  }
-  return result;
-}
-
-vpImage<float> InverseDepthEvidence::inverseDepth() const
-{
-  vpImage<float> result(m_camera.height, m_camera.width);
-  for (unsigned p = 0; p < result.getSize(); ++p) {
-    const float *e = &m_evidence[p * static_cast<std::size_t>(m_count)];
-    const float best = *std::max_element(e, e + m_count);
-    float sum = 0, weighted = 0;
-    for (int k = 0; k < m_count; ++k) {
-      const float w = fastExp(e[k] - best + m_log_prior[k]);
-      sum += w;
-      weighted += w * m_rho[k];
+  InverseDepthPosterior result;
+  result.log_odds_near.resize(static_cast<unsigned>(m_rows), static_cast<unsigned>(m_camera.width));
+  result.inverse_depth.resize(static_cast<unsigned>(m_rows), static_cast<unsigned>(m_camera.width));
+  const std::size_t count = m_rho.size();
+  std::vector<float> weight(count);
+  for (unsigned p = 0; p < result.log_odds_near.getSize(); ++p) {
+    const float *e = &m_evidence[p * count];
+    const float best = *std::max_element(e, e + count);
+    for (std::size_t k = 0; k < count; ++k)
+      weight[k] = fastExp(e[k] - best + m_log_prior[k]);
+    float far = 1e-20f, near = 1e-20f, weighted = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      (k < m_first_near ? far : near) += weight[k];
+      weighted += weight[k] * m_rho[k];
     }
-    result.bitmap[p] = weighted / sum;
+    result.log_odds_near.bitmap[p] = fastLog(near / far);
+    result.inverse_depth.bitmap[p] = weighted / (near + far);
   }
   return result;
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "fast_math.h"
 #include "plane_warp.h"
 
 #include <bole/geometry/so3.h>
@@ -58,7 +59,7 @@ float logRatio(const PixelMeasurement &m, const LevelNoise &noise, bool zero_mea
   var_b = noise.intensity + g2 * noise.background;
   var_f = noise.intensity + g2 * noise.foreground;
   const float rf = zero_mean ? m.r - m.zero_flow : m.r;
-  return 0.5f * (std::log(var_f / var_b) - m.r * m.r / var_b + rf * rf / var_f);
+  return 0.5f * (fastLog(var_f / var_b) - m.r * m.r / var_b + rf * rf / var_f);
 }
 
 class LevelPass
@@ -117,7 +118,7 @@ private:
       ++sums.used;
       sums.textured += m.gx * m.gx + m.gy * m.gy > kTextureGradient * kTextureGradient;
       // M-step (Eq. 16): expected negative log-likelihood; a foreground of mean zero does not depend on omega.
-      const float p_b = 1.f / (1.f + std::exp(-(ratio + m_noise.prior_logit)));
+      const float p_b = 1.f / (1.f + fastExp(-(ratio + m_noise.prior_logit)));
       const float weight = p_b / var_b + (m_options.foreground_mean_zero ? 0.f : (1 - p_b) / var_f);
       const float wr = weight * m.r;
       H[0] += weight * m.j[0] * m.j[0], H[1] += weight * m.j[0] * m.j[1], H[2] += weight * m.j[0] * m.j[2];

@@ -42,9 +42,9 @@ PinholeCamera workingCamera(const PinholeCamera &camera, int level)
 }
 
 /// \p small at the size of the full image, bilinear; pixel centres respected.
-vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCamera &camera)
+vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCamera &camera, int row_step = 1)
 {
-  if (level == 0)
+  if (level == 0 && row_step == 1)
     return small;
   vpImage<float> result(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width));
   const float scale = std::ldexp(1.f, -level);
@@ -57,7 +57,7 @@ vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCam
     share[static_cast<std::size_t>(j)] = x - std::floor(x);
   }
   for (int i = 0; i < camera.height; ++i) {
-    const float y = std::clamp((i + 0.5f) * scale - 0.5f, 0.f, rows - 1.001f);
+    const float y = std::clamp(((i + 0.5f) * scale - 0.5f) / row_step, 0.f, rows - 1.001f);
     const int row = static_cast<int>(y);
     const float b = y - row, *p = small[row], *q = small[row + 1];
     float *out = result[i];
@@ -231,8 +231,10 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
     break;
   }
   result.asks_for_range = true;
-  result.inverse_depth = enlarged(m_evidence.inverseDepth(), level, m_camera);
-  fill(enlarged(m_evidence.logOddsNear(), level, m_camera), m_evidence.priorLogOdds(), result);
+  const InverseDepthPosterior posterior = m_evidence.posterior();
+  constexpr int step = InverseDepthEvidence::kRowStep;
+  result.inverse_depth = enlarged(posterior.inverse_depth, level, m_camera, step);
+  fill(enlarged(posterior.log_odds_near, level, m_camera, step), m_evidence.priorLogOdds(), result);
 }
 
 void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &result) const

@@ -5,7 +5,7 @@
 #include <bole/saliency/saliency.h>
 
 #include <Eigen/LU>
-#include <chrono>
+#include <ctime>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -39,7 +39,7 @@ int main(int argc, char **argv)
       continue;
     const ForestFlight flight = readForestFlight(name, 0, static_cast<std::size_t>(mode["last"]));
     SaliencyEstimator estimator(flight.camera, o);
-    RocCurve roc, known_roc;
+    RocCurve roc, known_roc, rho_roc;
     double unknown = 0, n = 0, turn_error = 0, gyro_error = 0, frames = 0, ms = 0, nees = 0, apart = 0, parallax = 0;
     std::vector<double> errors;
     for (std::size_t i = 0; i < flight.size(); ++i) {
@@ -55,9 +55,9 @@ int main(int argc, char **argv)
         if (mode["odo"] > 0)
           translation = TranslationPrior{odo.t, Eigen::Matrix3d::Identity() * mode["st"] * mode["st"]};
       }
-      const auto t0 = std::chrono::steady_clock::now();
+      timespec t0, t1; clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t0);
       const Saliency s = estimator.update(flight.images[i], gyro, translation);
-      ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - t0).count();
+      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t1); ms += (t1.tv_sec - t0.tv_sec) * 1e3 + (t1.tv_nsec - t0.tv_nsec) * 1e-6;
       if (i < mode["first"])
         continue;
       const Eigen::Matrix3d truth = (flight.wMc_truth(i - 1).inverse() * flight.wMc_truth(i)).R;
@@ -92,6 +92,7 @@ int main(int argc, char **argv)
             const bool near = flight.depths_m[i][v][u] < o.near_range;
             roc.add(1 - s.p_background[v][u], near);
             ++n;
+            if (s.inverse_depth.getSize()) rho_roc.add(s.inverse_depth[v][u] * 1.2f, near);
             if (s.isKnown(v, u))
               known_roc.add(1 - s.p_background[v][u], near);
             else
@@ -99,8 +100,8 @@ int main(int argc, char **argv)
           }
     }
     std::sort(errors.begin(), errors.end());
-    std::printf("%-13s AUC %.3f known %.3f unknown %.2f | rot mean %.3f med %.3f p90 %.3f gyro %.3f nees/3 %.2f | apart %.1f par %.1f | %.2f ms\n", name.c_str(),
-                roc.area(), known_roc.area(), unknown / n, turn_error / frames, errors[errors.size() / 2], errors[errors.size() * 9 / 10], gyro_error / frames, nees / frames / 3,
+    std::printf("%-13s AUC %.3f known %.3f rho %.3f unknown %.2f | rot mean %.3f med %.3f p90 %.3f gyro %.3f nees/3 %.2f | apart %.1f par %.1f | %.2f ms\n", name.c_str(),
+                roc.area(), known_roc.area(), rho_roc.area(), unknown / n, turn_error / frames, errors[errors.size() / 2], errors[errors.size() * 9 / 10], gyro_error / frames, nees / frames / 3,
                 apart / frames, parallax / frames, ms / static_cast<double>(flight.size()));
   }
 }

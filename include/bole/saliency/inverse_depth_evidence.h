@@ -29,9 +29,18 @@ struct MotionNoise
   double translation = 0.01; ///< an axis [m]
 };
 
+/// One value a pixel of the working level, but only each kRowStep-th row: trunks are upright, and windows taller than wide.
+struct InverseDepthPosterior
+{
+  vpImage<float> log_odds_near; ///< log p(nearer than near_range) - log p(farther)
+  vpImage<float> inverse_depth; ///< mean [1/m]
+};
+
 class InverseDepthEvidence
 {
 public:
+  static constexpr int kRowStep = 2; ///< rows of the working level to a row of evidence
+
   /// \p camera is that of the working level, \p level its level in the pyramid.
   InverseDepthEvidence(const PinholeCamera &camera, int level, const SaliencyOptions &options);
 
@@ -40,10 +49,7 @@ public:
   void predict(const Pose &pMc);
   /// Adds what \p older says about \p current, both at the working level; \p oMc is the current camera in the older.
   void add(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc, const MotionNoise &noise);
-  /// log p(nearer than near_range) - log p(farther), with the prior.
-  vpImage<float> logOddsNear() const;
-  /// Inverse depth [1/m] in the middle of the posterior.
-  vpImage<float> inverseDepth() const;
+  InverseDepthPosterior posterior() const;
   /// log odds before any evidence.
   float priorLogOdds() const { return m_prior_log_odds; }
   const std::vector<float> &inverseDepths() const { return m_rho; }
@@ -56,7 +62,8 @@ private:
   PinholeCamera m_camera;
   SaliencyOptions m_options;
   double m_intensity_variance;
-  int m_count;
+  int m_count, m_rows, m_window_rows;
+  std::size_t m_first_near = 0; ///< first step nearer than near_range
   float m_prior_log_odds;
   std::vector<float> m_rho;       ///< [1/m], rising from 0
   std::vector<float> m_log_prior; ///< of each step
