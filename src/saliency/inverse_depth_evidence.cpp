@@ -26,7 +26,7 @@ InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int leve
   : m_camera(camera), m_options(options), m_count(options.inverse_depths),
     m_rows((camera.height + kRowStep - 1) / kRowStep), m_window_rows(options.window_height_px / kRowStep | 1)
 {
-  const double sigma = options.sigma_intensity * std::max(std::ldexp(1.0, -level), 0.25);
+  const double sigma = options.sigma_residual * std::max(std::ldexp(1.0, -level), 0.25);
   m_intensity_variance = 2 * sigma * sigma;
   const double rho_max = 1 / options.min_range;
   for (int k = 0; k < m_count; ++k) {
@@ -228,7 +228,9 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
     const float unrelated = intensity + g2[p] * kUnrelated;
     for (int k = 0; k < m_count; ++k) {
       const float variance = intensity + g2[p] * flow_variance[k];
-      const float ratio = 2 * std::sqrt(unrelated * variance) / (variance + r2[k]);
+      // Without texture both variances are the same, and even a perfect match says nothing.
+      const float gain = std::max(2 - variance / unrelated, 0.5f);
+      const float ratio = gain * std::sqrt(unrelated * variance) / (variance + r2[k]);
       out[k] += weight * std::max(0.f, fastLog(ratio));
     }
   }

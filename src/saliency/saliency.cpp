@@ -226,7 +226,7 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
     if (result.parallax_px < enough && apart + 1 < m_views.size())
       continue;
     const MotionNoise noise{meanDeviation(result.covariance) * std::sqrt(static_cast<double>(apart)),
-                            meanDeviation(m_translation->covariance)};
+                            m_options.translation_noise_scale * meanDeviation(m_translation->covariance)};
     m_evidence.add(m_views[apart].pyramid[level], now, oMc, noise);
     break;
   }

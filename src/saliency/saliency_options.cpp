@@ -59,6 +59,8 @@ void SaliencyOptions::validate() const
   requireWithin("finest_level", finest_level, 0, levels - 1);
   requireWithin("sigma_rotation_pull", sigma_rotation_pull, 0, 1);
   requireWithin("sample_correlation", sample_correlation, 1, 1e4);
+  requireInside("sigma_residual", sigma_residual, 0, 1);
+  requireWithin("translation_noise_scale", translation_noise_scale, 0, 10);
   requireWithin("near_range", near_range, 0.1, 1000);
   requireInside("min_range", min_range, 0.05, near_range);
   requireWithin("inverse_depths", inverse_depths, 4, 64);

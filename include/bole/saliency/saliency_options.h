@@ -25,10 +25,12 @@ struct SaliencyOptions
 
   // --- labels that ask about inverse depth, where the translation is given
   bool use_translation = true;     ///< off: labels by EM alone even where odometry gives the translation
+  double sigma_residual = 0.05;    ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
+  double translation_noise_scale = 0.5; ///< of the prior's deviation in the sweep; [0, 10]. Its error moves all depths alike
   double near_range = 6;           ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
-  double min_range = 1.2;          ///< nearest range of the sweep [m]; (0.05, near_range)
-  int inverse_depths = 15;         ///< steps of the sweep from infinity to min_range; [4, 64]
-  int window_width_px = 5;         ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
+  double min_range = 2;            ///< nearest range of the sweep [m]; (0.05, near_range)
+  int inverse_depths = 16;         ///< steps of the sweep from infinity to min_range; [4, 64]
+  int window_width_px = 3;         ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
   int window_height_px = 9;        ///< trunks are upright: taller than wide; odd, [1, 31]
   double min_parallax_px = 3;      ///< a pair of frames suffices when a point at near_range moves so much [px]; [0.1, 50]
   int max_frames_apart = 5;        ///< oldest frame that is tried; [1, 20]
