@@ -8,6 +8,7 @@
 #include <bole/ardrone/recording.h>
 
 #include <fmt/format.h>
+#include <map>
 #include <memory>
 #include <visp3/core/vpException.h>
 
@@ -23,55 +24,72 @@ struct Arguments
   bool raw_only = false, quiet = false;
 };
 
-void report(const LinkCounters &counters, std::size_t bytes, const char *end)
+using StatusCounts = std::map<FrameStatus, std::size_t>;
+
+void report(const StatusCounts &counts, const LinkCounters &link, std::size_t bytes, const std::string &end)
 {
-  fmt::print(stderr, "\r{} frames ok, {} corrupt, {} stale, {} dropped; {} navdata; {:.1f} MB{}", counters.video.ok, counters.video.corrupt,
-             counters.video.stale, counters.dropped, counters.navdata_packets, static_cast<double>(bytes) * 1e-6, end);
+  std::string frames;
+  for (const auto &[status, count] : counts)
+    frames += fmt::format("{}{} {}", frames.empty() ? "" : ", ", count, toString(status));
+  fmt::print(stderr, "\r{}; {} dropped; {} navdata, {} refused, {} late; {} connections; {:.1f} MB{}", frames, link.dropped,
+             link.navdata_packets, link.navdata_refused, link.navdata_late, link.connections, static_cast<double>(bytes) * 1e-6, end);
 }
 
 void run(const Arguments &arguments)
 {
   const ArDroneAddress address = ArDroneAddress::parse(arguments.address);
   RecordingWriter raw(arguments.folder);
-  ArDroneSource source(address, arguments.source, [&raw](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
-    raw.write(channel, arrival_ns, data, size);
-  });
+  ArDroneSource source(address, arguments.source,
+                       [&raw](LinkChannel channel, std::int64_t arrival_ns,
+                              const std::uint8_t *data,
+                              std::size_t size) { raw.write(channel, arrival_ns, data, size); });
   std::unique_ptr<FlightFolder> folder;
   if (!arguments.raw_only)
     folder = std::make_unique<FlightFolder>(arguments.folder, source.mountedCamera());
   endAtInterrupt();
   std::int64_t first_ns = -1;
+  StatusCounts counts;
   for (Frame frame; !interrupted() && source.next(frame);) {
     if (first_ns < 0)
       first_ns = frame.stamp_ns;
+    ++counts[frame.status];
     if (folder && frame.status != FrameStatus::missing)
       folder->write(source.liveFrame());
     if (!arguments.quiet && frame.index % 10 == 0)
-      report(source.counters(), raw.bytes(), "");
+      report(counts, source.counters(), raw.bytes(), "");
     if (!raw.error().empty())
       throw vpException(vpException::ioError, raw.error());
-    if (arguments.seconds > 0 && static_cast<double>(frame.stamp_ns - first_ns) * 1e-9 >= arguments.seconds)
+    if (arguments.seconds > 0 &&
+        static_cast<double>(frame.stamp_ns - first_ns) * 1e-9 >= arguments.seconds)
       break;
   }
   if (!arguments.quiet)
-    report(source.counters(), raw.bytes(), fmt::format(" in {}\n", arguments.folder).c_str());
+    report(counts, source.counters(), raw.bytes(), fmt::format(" in {}\n", arguments.folder));
 }
 } // namespace
 
 void addRecord(CLI::App &app)
 {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App *command = app.add_subcommand("record", "Record an AR.Drone's flight: raw bytes, and an ASL folder");
-  command->add_option("address", arguments->address, "ardrone://HOST[?offset=N&generation=1|2|auto&camera=FILE&video_delay_ms=N]")->required();
+  CLI::App *command =
+      app.add_subcommand("record", "Record an AR.Drone's flight: raw bytes, and an ASL folder");
+  command
+      ->add_option("address", arguments->address,
+                   "ardrone://HOST[?offset=N&generation=1|2|auto&camera=FILE&video_delay_ms=N]")
+      ->required();
   command->add_option("-o,--output", arguments->folder, "Folder to write")->required();
-  command->add_option("--seconds", arguments->seconds, "Stop after this time of flight (default: at Ctrl-C, or when the drone falls silent)");
-  command->add_option("--give-up", arguments->source.give_up_s, "Silence that ends the recording [s] (default 10)");
+  command->add_option(
+      "--seconds", arguments->seconds,
+      "Stop after this time of flight (default: at Ctrl-C, or when the drone falls silent)");
+  command->add_option("--give-up", arguments->source.give_up_s,
+                      "Silence that ends the recording [s] (default 10)");
   command->add_flag("--raw-only", arguments->raw_only, "No ASL folder");
   command->add_flag("-q,--quiet", arguments->quiet, "No progress");
-  command->footer("Examples:\n"
-                  "  bole record ardrone://192.168.1.1 -o flight\n"
-                  "  bole record 'ardrone://127.0.0.1?offset=10000&camera=my.yaml' -o flight --seconds 60\n"
-                  "Then: bole track flight, or bole replay flight");
+  command->footer(
+      "Examples:\n"
+      "  bole record ardrone://192.168.1.1 -o flight\n"
+      "  bole record 'ardrone://127.0.0.1?offset=10000&camera=my.yaml' -o flight --seconds 60\n"
+      "Then: bole track flight, or bole replay flight");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

@@ -10,15 +10,16 @@
 
 /// Sends velocities to an AR.Drone over the connection of a grabber.
 ///
-/// Idea: nothing is sent until open() gets the permission to fly; without it every command throws. The drone obeys
-/// tilts, not velocities, so a loop at 30 Hz turns the wanted horizontal velocity into tilts by a proportional law
-/// on the velocity of the navdata: tilt = gain (wanted - measured) of the largest tilt. Climb and turn are
-/// shares of the drone's largest rates. A watchdog stands in the same loop: setVelocity() not renewed within
-/// hover_after_s makes the drone hover, within land_after_s land; navdata that stay out do the same. The
-/// destructor and close() land a drone that this object took off.
+/// Idea: nothing is sent until open() gets the permission to fly; without it every command throws.
+/// The drone obeys tilts, not velocities, so a loop at 30 Hz turns the wanted horizontal velocity
+/// into tilts by a proportional law on the velocity of the navdata: tilt = gain (wanted - measured)
+/// of the largest tilt. Climb and turn are shares of the drone's largest rates. A watchdog stands
+/// in the same loop: setVelocity() not renewed within hover_after_s makes the drone hover, within
+/// land_after_s land; navdata that stay out do the same. The destructor and close() land a drone
+/// that this object took off.
 ///
-/// Degrees of freedom: vx, vy, vz, wz of the body (x forward, y left, z up); the others follow from flying and
-/// are ignored. Thread-safe.
+/// Degrees of freedom: vx, vy, vz, wz of the body (x forward, y left, z up); the others follow from
+/// flying and are ignored. Thread-safe.
 ///
 /// \code
 /// vpArDroneGrabber g("ardrone://192.168.1.1");
@@ -32,16 +33,21 @@
 class vpRobotArDrone : public vpRobot
 {
 public:
-  enum class Permission { none, fly };
+  enum class Permission
+  {
+    none,
+    fly
+  };
   struct Options
   {
-    double hover_after_s = 0.5;  ///< [s], (0.05, 2): five frames of a slow tracker
-    double land_after_s = 3;     ///< [s], (0.1, 60), more than hover_after_s
-    double gain = 0.3;           ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
-    double largest_share = 0.5;  ///< (0, 1]: of tilt, climb and turn
-    double largest_climb = 0.7;  ///< [m/s], (0, 5): the drone's setting control:control_vz_max
-    double largest_turn = 1.74;  ///< [rad/s], (0, 7): the drone's setting control:control_yaw
-    vpHomogeneousMatrix bMc;     ///< camera in the body; default: looks ahead at the body's origin
+    double hover_after_s = 0.5; ///< [s], (0.05, 2): five frames of a slow tracker
+    double land_after_s = 3;    ///< [s], (0.1, 60), more than hover_after_s
+    double gain =
+        0.3; ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
+    double largest_share = 0.5; ///< (0, 1]: of tilt, climb and turn
+    double largest_climb = 0.7; ///< [m/s], (0, 5): the drone's setting control:control_vz_max
+    double largest_turn = 1.74; ///< [rad/s], (0, 7): the drone's setting control:control_yaw
+    vpHomogeneousMatrix bMc;    ///< camera in the body; default: looks ahead at the body's origin
     Options();
     void validate() const;
   };
@@ -62,11 +68,17 @@ public:
   void emergency();
   /// Tells the standing drone that it stands level.
   void trim();
-  /// \param v six numbers, [m/s] and [rad/s]. CAMERA_FRAME: of the camera; REFERENCE_FRAME: of the body. Others
-  /// throw vpRobotException.
+  /// \param v six numbers, [m/s] and [rad/s]. CAMERA_FRAME: of the camera; REFERENCE_FRAME: of the
+  /// body. Others throw vpRobotException.
   void setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v) override;
 
-  enum class Watchdog { idle, content, hovers, lands };
+  enum class Watchdog
+  {
+    idle,
+    content,
+    hovers,
+    lands
+  };
   Watchdog watchdog() const; ///< what the loop does now
 
   // The rest of vpRobot.
@@ -75,8 +87,10 @@ public:
   void get_fJe(vpMatrix &jacobian) override; ///< throws: a flying body has no fixed frame
   /// (t, theta u) of the body in the odometry's world since take-off of the program; [m, rad].
   void getPosition(const vpRobot::vpControlFrameType frame, vpColVector &q) override;
-  void getDisplacement(const vpRobot::vpControlFrameType frame, vpColVector &q) override; ///< since the last call
-  void setPosition(const vpRobot::vpControlFrameType frame, const vpColVector &q) override; ///< throws
+  void getDisplacement(const vpRobot::vpControlFrameType frame,
+                       vpColVector &q) override; ///< since the last call
+  void setPosition(const vpRobot::vpControlFrameType frame,
+                   const vpColVector &q) override; ///< throws
 
 private:
   struct State;

@@ -97,18 +97,23 @@ void AtChannel::send(const std::string &name, const std::string &arguments)
   m_link->socket.send(line.data(), line.size());
 }
 
-void AtChannel::config(const std::string &key, const std::string &value) { send("CONFIG", fmt::format("\"{}\",\"{}\"", key, value)); }
+void AtChannel::config(const std::string &key, const std::string &value)
+{
+  send("CONFIG", fmt::format("\"{}\",\"{}\"", key, value));
+}
 void AtChannel::acknowledgeConfig() { send("CTRL", "5,0"); }
 void AtChannel::resetWatchdog() { send("COMWDG", ""); }
 void AtChannel::trimFlat() { send("FTRIM", ""); }
 
 void AtChannel::reference(bool take_off, bool emergency)
 {
-  send("REF", std::to_string(kReferenceBase | (take_off ? kTakeOff : 0) | (emergency ? kEmergency : 0)));
+  send("REF",
+       std::to_string(kReferenceBase | (take_off ? kTakeOff : 0) | (emergency ? kEmergency : 0)));
 }
 
 void AtChannel::move(bool progressive, float roll, float pitch, float gaz, float yaw)
 {
-  send("PCMD", fmt::format("{},{},{},{},{}", progressive ? 1 : 0, atFloat(roll), atFloat(pitch), atFloat(gaz), atFloat(yaw)));
+  send("PCMD", fmt::format("{},{},{},{},{}", progressive ? 1 : 0, atFloat(roll), atFloat(pitch),
+                           atFloat(gaz), atFloat(yaw)));
 }
 } // namespace bole

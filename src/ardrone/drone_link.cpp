@@ -18,8 +18,8 @@ namespace
 constexpr std::array<std::uint8_t, 4> kWakeUp = {1, 0, 0, 0};
 constexpr std::size_t kLargestRead = 1 << 16;
 constexpr Milliseconds kPoll{50}, kConnect{500};
-constexpr std::int64_t kJump_ns = 5'000'000'000;     // no link delays a packet so long
-constexpr std::int64_t kKeepAlive_ns = 250'000'000;  // the drone's watchdog bites after 2 s
+constexpr std::int64_t kJump_ns = 5'000'000'000;    // no link delays a packet so long
+constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 } // namespace
@@ -27,8 +27,14 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 struct DroneLink::State
 {
   State(const ArDroneAddress &a, const Options &o, LinkTap t)
-    : address(a), options(o), tap(std::move(t)), commands(a.host, a.at_port), generation(a.generation),
-      video_clock(o.clock), navdata_clock(o.clock), odometry(o.odometry)
+      : address(a),
+        options(o),
+        tap(std::move(t)),
+        commands(a.host, a.at_port),
+        generation(a.generation),
+        video_clock(o.clock),
+        navdata_clock(o.clock),
+        odometry(o.odometry)
   {
   }
 
@@ -64,7 +70,8 @@ struct DroneLink::State
   ClockUnwrapper navdata_time{kNavdataTimePeriod_us};
   std::optional<std::uint32_t> last_sequence;
 
-  void seen(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) const
+  void seen(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
+            std::size_t size) const
   {
     if (tap)
       tap(channel, arrival_ns, data, size);
@@ -78,7 +85,8 @@ struct DroneLink::State
     while (running) {
       const int wanted = generation;
       if (wanted != 1) {
-        if (const Socket socket = Socket::connectTcp(address.host, address.video_port, kConnect); socket.valid()) {
+        if (const Socket socket = Socket::connectTcp(address.host, address.video_port, kConnect);
+            socket.valid()) {
           generation = 2;
           receiveStream(socket, buffer);
           continue;
@@ -99,7 +107,10 @@ struct DroneLink::State
     ++counters.connections;
   }
 
-  bool silent(std::int64_t since_ns) const { return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > options.silence_s; }
+  bool silent(std::int64_t since_ns) const
+  {
+    return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > options.silence_s;
+  }
 
   VideoDecoder &decoderFor(int g)
   {
@@ -153,7 +164,8 @@ struct DroneLink::State
     }
   }
 
-  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
+  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size,
+              std::int64_t arrival_ns)
   {
     seen(LinkChannel::video, arrival_ns, data, size);
     for (DecodedFrame &decoded : video.decode(data, size))
@@ -174,7 +186,8 @@ struct DroneLink::State
       return raw_ns + stamp_shift_ns;
     }
     // One frame alone may have a damaged stamp; two that agree are a clock that started anew.
-    if (jumped && std::abs(raw_ns - jumped->raw_ns - (arrival_ns - jumped->arrival_ns)) <= kJump_ns) {
+    if (jumped &&
+        std::abs(raw_ns - jumped->raw_ns - (arrival_ns - jumped->arrival_ns)) <= kJump_ns) {
       stamp_shift_ns = expected_ns - raw_ns;
       ++counters.clock_jumps;
       jumped.reset();
@@ -248,12 +261,15 @@ struct DroneLink::State
 
   bool asksForConfig(std::uint32_t bits) const
   {
-    const auto has = [bits](DroneState bit) { return (bits & static_cast<std::uint32_t>(bit)) != 0; };
+    const auto has = [bits](DroneState bit) {
+      return (bits & static_cast<std::uint32_t>(bit)) != 0;
+    };
     return has(DroneState::bootstrap) || has(DroneState::demo_mode) == options.full_navdata;
   }
 
   /// \return the state bits of a good packet.
-  std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
+  std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size,
+                                           std::int64_t arrival_ns)
   {
     Navdata navdata;
     const NavdataError error = parseNavdata(data, size, navdata);
@@ -278,7 +294,9 @@ struct DroneLink::State
     ++counters.navdata_packets;
     if (navdata.demo) {
       // Demo packets have no time: then the arrival must do.
-      const std::int64_t stamp_ns = navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000 : arrival_ns;
+      const std::int64_t stamp_ns =
+          navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000
+                       : arrival_ns;
       if (!navdata_clock.add(stamp_ns, arrival_ns))
         odometry.restart();
       odometry.add(stamp_ns, navdata);
@@ -290,7 +308,8 @@ struct DroneLink::State
 
   std::int64_t videoToNavdata(std::int64_t stamp_ns) const
   {
-    return navdata_clock.toDrone(video_clock.toHost(stamp_ns) - static_cast<std::int64_t>(address.video_delay_s * 1e9));
+    return navdata_clock.toDrone(video_clock.toHost(stamp_ns) -
+                                 static_cast<std::int64_t>(address.video_delay_s * 1e9));
   }
 
   /// A picture that stays while the body moves is no picture of now.

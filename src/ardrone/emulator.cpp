@@ -23,16 +23,22 @@ namespace bole
 namespace
 {
 constexpr std::size_t kDatagram = 1 << 16, kMostCommands = 100'000, kMostPending = 1 << 20;
-constexpr std::int64_t kSecond_ns = 1'000'000'000, kWatchdog_ns = 2 * kSecond_ns, kClientLost_ns = 10 * kSecond_ns;
+constexpr std::int64_t kSecond_ns = 1'000'000'000, kWatchdog_ns = 2 * kSecond_ns,
+                       kClientLost_ns = 10 * kSecond_ns;
 constexpr std::int64_t kWrapSoon_ms = 3000, kDemoEvery_ns = kSecond_ns / 15;
-constexpr std::uint32_t kUsualState = 0x0f800080 | 0x10; // threads up, camera ready, altitude control
+constexpr std::uint32_t kUsualState =
+    0x0f800080 | 0x10; // threads up, camera ready, altitude control
 constexpr Milliseconds kTick{2};
 constexpr std::uint32_t kLanded = 2, kFlying = 3, kEmergencyBit = 1u << 8, kTakeOffBit = 1u << 9;
 } // namespace
 
 struct ArDroneEmulator::State
 {
-  enum class Port { video, navdata };
+  enum class Port
+  {
+    video,
+    navdata
+  };
   struct Outgoing
   {
     Port port;
@@ -62,15 +68,16 @@ struct ArDroneEmulator::State
   bool configured = false, wants_full = false, rebooted = false, ground = false, emergency = false;
   std::int64_t last_command_ns = 0, last_demo_ns = -kSecond_ns;
   std::int64_t last_sequence = 0;
-  std::int64_t start_ns = -1;  // host's clock at flight time 0
-  std::int64_t boot_ns = 0;    // flight time of the last boot
+  std::int64_t start_ns = -1; // host's clock at flight time 0
+  std::int64_t boot_ns = 0;   // flight time of the last boot
   std::int64_t clock_ms = 100'000, navdata_clock_us = 50'000'000;
   std::uint32_t frame_number = 0, navdata_sequence = 0, stream_position = 0;
   std::unique_ptr<H264Encoder> encoder;
   bool force_key = true;
   vpImage<unsigned char> frozen;
 
-  State(std::unique_ptr<PacketFeed> f, const Options &o) : feed(std::move(f)), options(o), generation(feed->generation()), random(o.seed)
+  State(std::unique_ptr<PacketFeed> f, const Options &o)
+      : feed(std::move(f)), options(o), generation(feed->generation()), random(o.seed)
   {
     navdata_socket = Socket::bindUdp(o.host, o.navdata_port);
     at_socket = Socket::bindUdp(o.host, o.at_port);
@@ -83,7 +90,8 @@ struct ArDroneEmulator::State
 
   void listenVideo()
   {
-    video_socket = generation == 2 ? Socket::listenTcp(options.host, options.video_port) : Socket::bindUdp(options.host, options.video_port);
+    video_socket = generation == 2 ? Socket::listenTcp(options.host, options.video_port)
+                                   : Socket::bindUdp(options.host, options.video_port);
     options.video_port = video_socket.localPort(); // the same again after a reboot
   }
 
@@ -126,7 +134,9 @@ struct ArDroneEmulator::State
 
   std::int64_t flightTime(std::int64_t now_ns) const
   {
-    return start_ns < 0 ? 0 : static_cast<std::int64_t>(static_cast<double>(now_ns - start_ns) * options.speed);
+    return start_ns < 0
+               ? 0
+               : static_cast<std::int64_t>(static_cast<double>(now_ns - start_ns) * options.speed);
   }
 
   /// Sleeps until something comes, or is due.
@@ -134,8 +144,10 @@ struct ArDroneEmulator::State
   {
     auto pause = std::chrono::nanoseconds(kTick);
     if (next_sent_ns >= 0) {
-      const double left_ns = static_cast<double>(next_sent_ns - flightTime(steadyNowNs())) / options.speed;
-      pause = std::min(pause, std::chrono::nanoseconds(static_cast<std::int64_t>(std::max(0.0, left_ns))));
+      const double left_ns =
+          static_cast<double>(next_sent_ns - flightTime(steadyNowNs())) / options.speed;
+      pause = std::min(pause,
+                       std::chrono::nanoseconds(static_cast<std::int64_t>(std::max(0.0, left_ns))));
     }
     if (pause.count() > 0)
       std::this_thread::sleep_for(pause);
@@ -147,7 +159,8 @@ struct ArDroneEmulator::State
     std::size_t size = 0;
     sockaddr_in sender = {};
     const std::int64_t now_ns = steadyNowNs();
-    while (navdata_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data) {
+    while (navdata_socket.receiveFrom(buffer.data(), buffer.size(), size, sender,
+                                      Milliseconds(0)) == Socket::Read::data) {
       if (isDown(now_ns))
         continue;
       navdata_client = sender;
@@ -155,11 +168,13 @@ struct ArDroneEmulator::State
       if (!configured)
         sendNavdata({}, flightTime(now_ns)); // bootstrap: says only that it is there
     }
-    while (at_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data) {
+    while (at_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
+           Socket::Read::data) {
       if (isDown(now_ns))
         continue;
       navdata_seen_ns = now_ns;
-      for (AtCommand &command : parseAtCommands(std::string(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size))))
+      for (AtCommand &command : parseAtCommands(
+               std::string(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size))))
         obey(std::move(command), now_ns);
     }
     serviceVideo(now_ns);
@@ -184,7 +199,8 @@ struct ArDroneEmulator::State
     std::array<std::uint8_t, 64> buffer{};
     std::size_t size = 0;
     sockaddr_in sender = {};
-    while (video_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data) {
+    while (video_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
+           Socket::Read::data) {
       if (!video_peer)
         video_since_ns = now_ns;
       video_peer = sender;
@@ -203,12 +219,14 @@ struct ArDroneEmulator::State
     }
     last_sequence = command.sequence;
     last_command_ns = now_ns;
-    if (command.name == "CONFIG" && command.arguments.size() == 2 && command.arguments[0] == "general:navdata_demo") {
+    if (command.name == "CONFIG" && command.arguments.size() == 2 &&
+        command.arguments[0] == "general:navdata_demo") {
       configured = true;
       wants_full = command.arguments[1] == "FALSE";
     }
     if (command.name == "REF" && !command.arguments.empty()) {
-      const auto bits = static_cast<std::uint32_t>(std::strtol(command.arguments[0].c_str(), nullptr, 10));
+      const auto bits =
+          static_cast<std::uint32_t>(std::strtol(command.arguments[0].c_str(), nullptr, 10));
       ground = (bits & kTakeOffBit) == 0;
       emergency = emergency != ((bits & kEmergencyBit) != 0);
     }
@@ -257,9 +275,15 @@ struct ArDroneEmulator::State
   }
 
   static std::int64_t seconds(double s) { return static_cast<std::int64_t>(s * 1e9); }
-  static bool within(std::int64_t now_ns, double from_s, double for_s) { return from_s >= 0 && now_ns >= seconds(from_s) && now_ns < seconds(from_s + for_s); }
+  static bool within(std::int64_t now_ns, double from_s, double for_s)
+  {
+    return from_s >= 0 && now_ns >= seconds(from_s) && now_ns < seconds(from_s + for_s);
+  }
   bool isDown(std::int64_t now_ns) const { return start_ns >= 0 && rebooting(flightTime(now_ns)); }
-  bool rebooting(std::int64_t now_ns) const { return within(now_ns, options.reboot_at_s, options.reboot_for_s * options.speed); }
+  bool rebooting(std::int64_t now_ns) const
+  {
+    return within(now_ns, options.reboot_at_s, options.reboot_for_s * options.speed);
+  }
 
   void count(std::size_t Counters::*counter)
   {
@@ -294,7 +318,8 @@ struct ArDroneEmulator::State
     if (may && options.corrupt > 0 && chance() < options.corrupt) {
       const int changes = std::uniform_int_distribution<int>(1, 4)(random);
       for (int i = 0; i < changes; ++i)
-        bytes[std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(random)] ^= static_cast<std::uint8_t>(std::uniform_int_distribution<int>(1, 255)(random));
+        bytes[std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(random)] ^=
+            static_cast<std::uint8_t>(std::uniform_int_distribution<int>(1, 255)(random));
       count(port == Port::video ? &Counters::corrupted_frames : &Counters::corrupted_navdata);
     }
     std::int64_t due_ns = steadyNowNs() + seconds(options.jitter_s * chance());
@@ -358,7 +383,8 @@ struct ArDroneEmulator::State
       count(&Counters::frozen);
     }
     ++frame_number;
-    packet.bytes = generation == 1 ? encodeUvlc(image, frame_number) : encodeFrame(image, packet.stamp_ns);
+    packet.bytes =
+        generation == 1 ? encodeUvlc(image, frame_number) : encodeFrame(image, packet.stamp_ns);
   }
 
   void sendPicture(const FeedPacket &packet)
@@ -371,9 +397,11 @@ struct ArDroneEmulator::State
 
   std::vector<std::uint8_t> encodeFrame(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
   {
-    const int width = static_cast<int>(image.getWidth()), height = static_cast<int>(image.getHeight());
+    const int width = static_cast<int>(image.getWidth()),
+              height = static_cast<int>(image.getHeight());
     if (!encoder) {
-      encoder = std::make_unique<H264Encoder>(width, height, feed->frameRateHz(), options.bit_rate, options.key_interval);
+      encoder = std::make_unique<H264Encoder>(width, height, feed->frameRateHz(), options.bit_rate,
+                                              options.key_interval);
     }
     const auto encoded = encoder->encode(image, force_key);
     force_key = false;
@@ -403,10 +431,13 @@ struct ArDroneEmulator::State
       return;
     last_demo_ns = stamp_ns;
     navdata.state = kUsualState | (ground ? 0u : 1u);
-    const auto raise = [&](DroneState bit, bool on) { navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u; };
+    const auto raise = [&](DroneState bit, bool on) {
+      navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u;
+    };
     raise(DroneState::bootstrap, !configured);
     raise(DroneState::demo_mode, configured && !wants_full);
-    raise(DroneState::command_watchdog, last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns);
+    raise(DroneState::command_watchdog,
+          last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns);
     raise(DroneState::emergency, emergency);
     navdata.sequence = ++navdata_sequence;
     if (!configured) {
@@ -430,7 +461,8 @@ void ArDroneEmulator::Options::validate() const
 {
   const auto require = [](const char *name, double value, double low, double high) {
     if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low,
+                        high);
   };
   require("speed", speed, 1, 20);
   require("bit_rate", bit_rate, 1e4, 1e8);
@@ -469,7 +501,8 @@ void ArDroneEmulator::stop()
 bool ArDroneEmulator::wait(double timeout_s)
 {
   std::unique_lock<std::mutex> lock(m_state->mutex);
-  return m_state->ended.wait_for(lock, std::chrono::duration<double>(timeout_s), [this] { return m_state->finished; });
+  return m_state->ended.wait_for(lock, std::chrono::duration<double>(timeout_s),
+                                 [this] { return m_state->finished; });
 }
 
 ArDroneAddress ArDroneEmulator::address() const

@@ -29,11 +29,13 @@ struct FreePacket
 };
 using Context = std::unique_ptr<AVCodecContext, FreeContext>;
 
-void copyPlane(const std::uint8_t *from, int stride, int width, int height, std::vector<std::uint8_t> &to)
+void copyPlane(const std::uint8_t *from, int stride, int width, int height,
+               std::vector<std::uint8_t> &to)
 {
   to.resize(static_cast<std::size_t>(width) * height);
   for (int row = 0; row < height; ++row)
-    std::copy_n(from + static_cast<std::ptrdiff_t>(row) * stride, width, to.begin() + static_cast<std::ptrdiff_t>(row) * width);
+    std::copy_n(from + static_cast<std::ptrdiff_t>(row) * stride, width,
+                to.begin() + static_cast<std::ptrdiff_t>(row) * width);
 }
 
 /// libavcodec writes to stderr about every damaged block; damage is counted and reported by us.
@@ -101,8 +103,8 @@ H264Decoder::~H264Decoder() = default;
 
 void H264Decoder::flush() { avcodec_flush_buffers(m_state->context.get()); }
 
-H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_unit, int width, int height,
-                                        YuvPicture &picture)
+H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_unit, int width,
+                                        int height, YuvPicture &picture)
 {
   m_message.clear();
   State &state = *m_state;
@@ -126,8 +128,10 @@ H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_
   picture.width = width > 0 ? std::min(width, frame.width) : frame.width;
   picture.height = height > 0 ? std::min(height, frame.height) : frame.height;
   copyPlane(frame.data[0], frame.linesize[0], picture.width, picture.height, picture.y);
-  copyPlane(frame.data[1], frame.linesize[1], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cb);
-  copyPlane(frame.data[2], frame.linesize[2], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cr);
+  copyPlane(frame.data[1], frame.linesize[1], (picture.width + 1) / 2, (picture.height + 1) / 2,
+            picture.cb);
+  copyPlane(frame.data[2], frame.linesize[2], (picture.width + 1) / 2, (picture.height + 1) / 2,
+            picture.cr);
   const bool damaged = frame.decode_error_flags != 0 || (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0;
   av_frame_unref(state.frame.get());
   if (damaged) {
@@ -146,13 +150,15 @@ struct H264Encoder::State
 };
 
 H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate, int key_interval)
-  : m_state(std::make_unique<State>())
+    : m_state(std::make_unique<State>())
 {
   const AVCodec *codec = avcodec_find_encoder_by_name("libx264");
   if (codec == nullptr)
     codec = avcodec_find_encoder(AV_CODEC_ID_H264);
   if (codec == nullptr)
-    throw vpException(vpException::fatalError, "libavcodec was built without an H.264 encoder: the emulator of the AR.Drone 2 needs one");
+    throw vpException(
+        vpException::fatalError,
+        "libavcodec was built without an H.264 encoder: the emulator of the AR.Drone 2 needs one");
   m_state->width = width;
   m_state->height = height;
   m_state->context.reset(avcodec_alloc_context3(codec));
@@ -170,10 +176,14 @@ H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate,
   av_opt_set(context.priv_data, "preset", "veryfast", 0);
   av_opt_set(context.priv_data, "tune", "zerolatency", 0);
   av_opt_set(context.priv_data, "profile", "baseline", 0);
-  av_opt_set(context.priv_data, "x264-params", fmt::format("keyint={0}:min-keyint={0}:scenecut=0", key_interval).c_str(), 0);
+  av_opt_set(context.priv_data, "x264-params",
+             fmt::format("keyint={0}:min-keyint={0}:scenecut=0", key_interval).c_str(), 0);
   silenceLibav();
   if (avcodec_open2(&context, codec, nullptr) < 0)
-    throw vpException(vpException::fatalError, fmt::format("libavcodec could not open its H.264 encoder for {}x{} at {} Hz and {} bit/s", width, height, rate_hz, bit_rate));
+    throw vpException(
+        vpException::fatalError,
+        fmt::format("libavcodec could not open its H.264 encoder for {}x{} at {} Hz and {} bit/s",
+                    width, height, rate_hz, bit_rate));
   AVFrame &frame = *m_state->frame;
   frame.format = context.pix_fmt;
   frame.width = context.width;
@@ -212,8 +222,10 @@ std::size_t nalSize(const std::vector<std::uint8_t> &bytes, std::size_t from, in
 H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, bool force_key)
 {
   State &state = *m_state;
-  if (static_cast<int>(image.getWidth()) != state.width || static_cast<int>(image.getHeight()) != state.height)
-    throw vpException(vpException::dimensionError, "image size = %ux%u, must be %dx%d as the first", image.getWidth(), image.getHeight(), state.width, state.height);
+  if (static_cast<int>(image.getWidth()) != state.width ||
+      static_cast<int>(image.getHeight()) != state.height)
+    throw vpException(vpException::dimensionError, "image size = %ux%u, must be %dx%d as the first",
+                      image.getWidth(), image.getHeight(), state.width, state.height);
   AVFrame &frame = *state.frame;
   if (av_frame_make_writable(&frame) < 0)
     throw vpException(vpException::fatalError, "no memory for the encoder's frame");
@@ -224,9 +236,12 @@ H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, boo
     std::fill(out + state.width, out + frame.width, row[state.width - 1]);
   }
   for (int plane = 1; plane < 3; ++plane)
-    std::fill_n(frame.data[plane], static_cast<std::ptrdiff_t>(frame.linesize[plane]) * frame.height / 2, std::uint8_t{128});
+    std::fill_n(frame.data[plane],
+                static_cast<std::ptrdiff_t>(frame.linesize[plane]) * frame.height / 2,
+                std::uint8_t{128});
   frame.pict_type = force_key ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
-  frame.pts += static_cast<std::int64_t>(1000.0 * state.context->framerate.den / state.context->framerate.num);
+  frame.pts += static_cast<std::int64_t>(1000.0 * state.context->framerate.den /
+                                         state.context->framerate.num);
 
   Packet packet;
   if (avcodec_send_frame(state.context.get(), &frame) < 0 ||

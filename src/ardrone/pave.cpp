@@ -133,10 +133,12 @@ std::optional<PaveFrame> PaveParser::next()
     if (!header)
       return std::nullopt;
     const std::size_t frame_size = header->header_size + header->payload_size;
-    // The length may be damaged: a header inside the payload shows where the next frame really begins.
+    // The length may be damaged: a header inside the payload shows where the next frame really
+    // begins.
     const std::size_t end = std::min(frame_size, left);
     const std::size_t inner = findHeader(m_begin + header->header_size) - m_begin;
-    if (inner + kShortHeader <= end && parsePaveHeader(m_buffer.data() + m_begin + inner, left - inner)) {
+    if (inner + kShortHeader <= end &&
+        parsePaveHeader(m_buffer.data() + m_begin + inner, left - inner)) {
       skip(inner);
       continue;
     }
@@ -145,7 +147,8 @@ std::optional<PaveFrame> PaveParser::next()
 
     PaveFrame frame;
     frame.header = *header;
-    const auto payload = m_buffer.begin() + static_cast<std::ptrdiff_t>(m_begin + header->header_size);
+    const auto payload =
+        m_buffer.begin() + static_cast<std::ptrdiff_t>(m_begin + header->header_size);
     frame.payload.assign(payload, payload + header->payload_size);
     frame.after_gap = m_gap || (m_last_number && header->frame_number != *m_last_number + 1);
     m_last_number = header->frame_number;

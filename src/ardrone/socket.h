@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Sockets that close themselves. Failures are results, not exceptions: on a radio link they are daily life.
+/// Sockets that close themselves. Failures are results, not exceptions: on a radio link they are
+/// daily life.
 
 #include <chrono>
 #include <cstddef>
@@ -17,7 +18,9 @@ using Milliseconds = std::chrono::milliseconds;
 /// [ns] of the steady clock that every arrival is stamped with.
 inline std::int64_t steadyNowNs()
 {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 class Socket
@@ -33,7 +36,8 @@ public:
   static Socket connectTcp(const std::string &host, std::uint16_t port, Milliseconds timeout);
   /// A UDP socket that talks to one peer only.
   static Socket connectUdp(const std::string &host, std::uint16_t port);
-  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when the port is taken.
+  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when
+  /// the port is taken.
   static Socket bindUdp(const std::string &host, std::uint16_t port);
   static Socket listenTcp(const std::string &host, std::uint16_t port);
 
@@ -43,13 +47,21 @@ public:
 
   /// Waits for bytes (or a connection) at most \p timeout.
   bool waitReadable(Milliseconds timeout) const;
-  enum class Read { data, timeout, closed };
+  enum class Read
+  {
+    data,
+    timeout,
+    closed
+  };
   /// One datagram, or what there is of a stream.
-  Read receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const;
-  Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender, Milliseconds timeout) const;
+  Read receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
+               Milliseconds timeout) const;
+  Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
+                   sockaddr_in &sender, Milliseconds timeout) const;
   bool send(const void *data, std::size_t size) const; ///< false on any failure
   bool sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const;
-  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is gone.
+  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is
+  /// gone.
   std::int64_t sendSome(const std::uint8_t *data, std::size_t size) const;
   Socket accept() const;
 

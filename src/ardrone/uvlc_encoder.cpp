@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The encoder is written from the published facts alone, by the definitions (direct cosine sums, a walk
-// along the diagonals), so that it can disagree with the decoder.
+// The encoder is written from the published facts alone, by the definitions (direct cosine sums, a
+// walk along the diagonals), so that it can disagree with the decoder.
 #include <bole/ardrone/uvlc.h>
 
 #include <algorithm>
@@ -20,8 +20,8 @@ public:
     for (int i = count - 1; i >= 0; --i)
       m_bits.push_back(((value >> i) & 1u) != 0);
   }
-  /// A magnitude of at least 1 as the guide's tables print it: as many zeros as it has binary digits, then
-  /// its binary digits (the first of which is the one).
+  /// A magnitude of at least 1 as the guide's tables print it: as many zeros as it has binary
+  /// digits, then its binary digits (the first of which is the one).
   void putCoarse(std::uint32_t magnitude)
   {
     int digits = 0;
@@ -78,7 +78,8 @@ double cosine(int x, int u)
   return table[static_cast<std::size_t>(x * 8 + u)];
 }
 
-/// Quantised coefficients of the 8x8 block whose pixel (x, y) is pixel(x, y), in the order of the stream.
+/// Quantised coefficients of the 8x8 block whose pixel (x, y) is pixel(x, y), in the order of the
+/// stream.
 template <typename Pixel> std::vector<int> transform(const Pixel &pixel)
 {
   static const auto walk = diagonalWalk();
@@ -127,8 +128,8 @@ void putBlock(BitSink &sink, const std::vector<int> &levels)
     sink.put(levels[i] < 0 ? 1 : 0, 1);
     run = 0;
   }
-  sink.put(1, 1);  // a run of none
-  sink.put(1, 2);  // and the end
+  sink.put(1, 1); // a run of none
+  sink.put(1, 2); // and the end
 }
 
 struct Size
@@ -144,7 +145,10 @@ Size sizeCode(unsigned width, unsigned height)
     if (width == 88u << (resolution - 1) && height == 72u << (resolution - 1))
       return {1, resolution};
   }
-  throw vpException(vpException::dimensionError, "image size = %ux%u, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width, height);
+  throw vpException(
+      vpException::dimensionError,
+      "image size = %ux%u, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
+      height);
 }
 
 void putMacroblock(BitSink &sink, const vpImage<unsigned char> &image, int left, int top)
@@ -156,7 +160,8 @@ void putMacroblock(BitSink &sink, const vpImage<unsigned char> &image, int left,
   };
   std::vector<std::vector<int>> blocks;
   for (const auto &[dx, dy] : {std::pair{0, 0}, std::pair{8, 0}, std::pair{0, 8}, std::pair{8, 8}})
-    blocks.push_back(transform([&, dx = dx, dy = dy](int x, int y) { return at(left + dx + x, top + dy + y); }));
+    blocks.push_back(
+        transform([&, dx = dx, dy = dy](int x, int y) { return at(left + dx + x, top + dy + y); }));
   for (int colour = 0; colour < 2; ++colour)
     blocks.push_back(transform([](int, int) { return 128.0; }));
   std::uint32_t description = 1u << 7;

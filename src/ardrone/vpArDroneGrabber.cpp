@@ -9,19 +9,22 @@
 void vpArDroneGrabber::Options::validate() const
 {
   if (!(open_timeout_s > 0.1 && open_timeout_s < 600))
-    throw vpException(vpException::badValue, "open_timeout_s = %g, must be in (0.1, 600) s", open_timeout_s);
+    throw vpException(vpException::badValue, "open_timeout_s = %g, must be in (0.1, 600) s",
+                      open_timeout_s);
   if (!(frame_timeout_s > 0.02 && frame_timeout_s < 60))
-    throw vpException(vpException::badValue, "frame_timeout_s = %g, must be in (0.02, 60) s", frame_timeout_s);
+    throw vpException(vpException::badValue, "frame_timeout_s = %g, must be in (0.02, 60) s",
+                      frame_timeout_s);
   link.validate();
 }
 
 vpArDroneGrabber::vpArDroneGrabber(const std::string &address)
-  : vpArDroneGrabber(bole::ArDroneAddress::parse(address), Options{})
+    : vpArDroneGrabber(bole::ArDroneAddress::parse(address), Options{})
 {
 }
 
-vpArDroneGrabber::vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options, bole::LinkTap tap)
-  : m_address(address), m_options(options), m_tap(std::move(tap))
+vpArDroneGrabber::vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options,
+                                   bole::LinkTap tap)
+    : m_address(address), m_options(options), m_tap(std::move(tap))
 {
   m_options.validate();
 }
@@ -38,7 +41,8 @@ void vpArDroneGrabber::waitForFirstImage()
 {
   close();
   connect();
-  const std::int64_t end_ns = bole::steadyNowNs() + static_cast<std::int64_t>(m_options.open_timeout_s * 1e9);
+  const std::int64_t end_ns =
+      bole::steadyNowNs() + static_cast<std::int64_t>(m_options.open_timeout_s * 1e9);
   do {
     if (m_link->next(m_frame, 0.05) && m_frame.status == bole::FrameStatus::ok) {
       width = static_cast<unsigned>(m_frame.picture.width);
@@ -49,7 +53,10 @@ void vpArDroneGrabber::waitForFirstImage()
   } while (bole::steadyNowNs() < end_ns);
   const bool answered = m_link->counters().connections > 0;
   close();
-  throw vpException(vpException::ioError, fmt::format("{}: {} within {} s", m_address.toString(), answered ? "no whole image" : "no drone answers", m_options.open_timeout_s));
+  throw vpException(vpException::ioError,
+                    fmt::format("{}: {} within {} s", m_address.toString(),
+                                answered ? "no whole image" : "no drone answers",
+                                m_options.open_timeout_s));
 }
 
 void vpArDroneGrabber::open(vpImage<unsigned char> &I)
@@ -100,11 +107,15 @@ void vpArDroneGrabber::close()
   init = false;
 }
 
-bole::LinkCounters vpArDroneGrabber::getCounters() const { return m_link ? m_link->counters() : bole::LinkCounters{}; }
+bole::LinkCounters vpArDroneGrabber::getCounters() const
+{
+  return m_link ? m_link->counters() : bole::LinkCounters{};
+}
 
 bole::DroneLink &vpArDroneGrabber::getLink()
 {
   if (!m_link)
-    throw vpException(vpException::notInitialized, "the grabber is not open: call open() or connect() first");
+    throw vpException(vpException::notInitialized,
+                      "the grabber is not open: call open() or connect() first");
   return *m_link;
 }

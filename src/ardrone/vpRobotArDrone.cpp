@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/vpRobotArDrone.h>
 #include <bole/geometry/pose.h>
 #include <bole/input/camera_file.h>
+#include <bole/vpRobotArDrone.h>
 
 #include "socket.h"
 
@@ -15,13 +15,15 @@
 
 namespace
 {
-constexpr std::chrono::milliseconds kPeriod{33}; // commands every 30 ms fly smoothly, says the manufacturer
-constexpr int kRepeats = 3;                      // single datagrams get lost
+constexpr std::chrono::milliseconds kPeriod{
+    33};                    // commands every 30 ms fly smoothly, says the manufacturer
+constexpr int kRepeats = 3; // single datagrams get lost
 
 void require(const char *name, double value, double low, double high)
 {
   if (!(value > low && value < high))
-    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
+    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low,
+                      high);
 }
 } // namespace
 
@@ -42,7 +44,10 @@ struct vpRobotArDrone::State
   Watchdog watchdog = Watchdog::idle;
   std::optional<bole::Pose> last_position;
 
-  float share(double value) const { return static_cast<float>(std::clamp(value, -options.largest_share, options.largest_share)); }
+  float share(double value) const
+  {
+    return static_cast<float>(std::clamp(value, -options.largest_share, options.largest_share));
+  }
 
   void run()
   {
@@ -58,7 +63,8 @@ struct vpRobotArDrone::State
     bole::AtChannel &commands = grabber.getLink().commands();
     const auto body = grabber.getLink().body();
     if (emergency_pulses > 0) {
-      commands.reference(false, emergency_pulses-- > 1); // a rising edge changes the state, so it must fall again
+      commands.reference(false, emergency_pulses-- >
+                                    1); // a rising edge changes the state, so it must fall again
       return;
     }
     if (!in_air) {
@@ -83,13 +89,17 @@ struct vpRobotArDrone::State
     }
     // Forward needs the nose down and leftward the left side down: both negative for the drone.
     const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body->velocity.head<2>());
-    commands.move(true, share(-tilt.y()), share(-tilt.x()), share(wanted.z() / options.largest_climb), share(-wanted.w() / options.largest_turn));
+    commands.move(true, share(-tilt.y()), share(-tilt.x()),
+                  share(wanted.z() / options.largest_climb),
+                  share(-wanted.w() / options.largest_turn));
   }
 
   void requireOpen() const
   {
     if (!running)
-      throw vpRobotException(vpRobotException::notInitialized, "the robot was not opened with the permission to fly: nothing was sent");
+      throw vpRobotException(
+          vpRobotException::notInitialized,
+          "the robot was not opened with the permission to fly: nothing was sent");
   }
 };
 
@@ -185,9 +195,11 @@ void vpRobotArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const 
 {
   m_state->requireOpen();
   if (v.size() != 6)
-    throw vpRobotException(vpRobotException::dimensionError, "velocity of %u numbers, must be 6", v.size());
+    throw vpRobotException(vpRobotException::dimensionError, "velocity of %u numbers, must be 6",
+                           v.size());
   if (frame != vpRobot::CAMERA_FRAME && frame != vpRobot::REFERENCE_FRAME)
-    throw vpRobotException(vpRobotException::wrongStateError, "frame, must be CAMERA_FRAME or REFERENCE_FRAME");
+    throw vpRobotException(vpRobotException::wrongStateError,
+                           "frame, must be CAMERA_FRAME or REFERENCE_FRAME");
   for (unsigned i = 0; i < 6; ++i)
     if (!std::isfinite(v[i]))
       throw vpRobotException(vpRobotException::wrongStateError, "velocity %u is not finite", i);
@@ -217,7 +229,8 @@ void vpRobotArDrone::get_eJe(vpMatrix &jacobian)
 
 void vpRobotArDrone::get_fJe(vpMatrix &)
 {
-  throw vpRobotException(vpRobotException::notImplementedError, "a flying body has no fixed frame to be moved in");
+  throw vpRobotException(vpRobotException::notImplementedError,
+                         "a flying body has no fixed frame to be moved in");
 }
 
 void vpRobotArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector &q)
@@ -240,7 +253,8 @@ void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVec
   if (!body)
     throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
   const std::lock_guard<std::mutex> lock(m_state->mutex);
-  const bole::Vector6d moved = m_state->last_position ? body->wMb.minus(*m_state->last_position) : bole::Vector6d::Zero().eval();
+  const bole::Vector6d moved = m_state->last_position ? body->wMb.minus(*m_state->last_position)
+                                                      : bole::Vector6d::Zero().eval();
   m_state->last_position = body->wMb;
   q.resize(6, false);
   for (unsigned i = 0; i < 6; ++i)
@@ -249,5 +263,6 @@ void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVec
 
 void vpRobotArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)
 {
-  throw vpRobotException(vpRobotException::notImplementedError, "an AR.Drone obeys velocities, not positions");
+  throw vpRobotException(vpRobotException::notImplementedError,
+                         "an AR.Drone obeys velocities, not positions");
 }

@@ -20,11 +20,16 @@ constexpr double kPatience_s = 60; // an upper limit for slow machines, never a 
 class MadeUpFlight : public FrameSource
 {
 public:
-  explicit MadeUpFlight(std::size_t frames, unsigned width = 160, unsigned height = 120) : m_frames(frames), m_width(width), m_height(height) {}
+  explicit MadeUpFlight(std::size_t frames, unsigned width = 160, unsigned height = 120)
+      : m_frames(frames), m_width(width), m_height(height)
+  {
+  }
 
   static Pose pose(double t)
   {
-    Pose wMb(expSo3(Eigen::Vector3d(0, 0, 0.2 * t)) * expSo3(Eigen::Vector3d(0.05 * std::sin(t), 0.03, 0)), {t, 0.3 * std::sin(t), 1.5 + 0.05 * t});
+    Pose wMb(expSo3(Eigen::Vector3d(0, 0, 0.2 * t)) *
+                 expSo3(Eigen::Vector3d(0.05 * std::sin(t), 0.03, 0)),
+             {t, 0.3 * std::sin(t), 1.5 + 0.05 * t});
     return wMb;
   }
   bool next(Frame &frame) override
@@ -37,17 +42,28 @@ public:
     frame.image.resize(m_height, m_width);
     for (unsigned v = 0; v < m_height; ++v)
       for (unsigned u = 0; u < m_width; ++u)
-        frame.image[v][u] = static_cast<unsigned char>(128 + 80 * std::sin(0.13 * (u + 3.0 * static_cast<double>(m_index))) * std::cos(0.1 * v));
+        frame.image[v][u] = static_cast<unsigned char>(
+            128 +
+            80 * std::sin(0.13 * (u + 3.0 * static_cast<double>(m_index))) * std::cos(0.1 * v));
     const double t = static_cast<double>(m_index) * 0.05;
     frame.wMb_odometry = pose(t);
     for (int i = 1; i <= 10 && m_index > 0; ++i) {
       const double s = t - 0.05 + 0.005 * i;
-      frame.gyro.push_back({static_cast<std::int64_t>(std::llround(s * 1e9)), logSo3(pose(s - 1e-3).R.transpose() * pose(s + 1e-3).R) / 2e-3});
+      frame.gyro.push_back({static_cast<std::int64_t>(std::llround(s * 1e9)),
+                            logSo3(pose(s - 1e-3).R.transpose() * pose(s + 1e-3).R) / 2e-3});
     }
     ++m_index;
     return true;
   }
-  PinholeCamera camera() const override { return {120, 120, (m_width - 1) / 2.0, (m_height - 1) / 2.0, static_cast<int>(m_width), static_cast<int>(m_height)}; }
+  PinholeCamera camera() const override
+  {
+    return {120,
+            120,
+            (m_width - 1) / 2.0,
+            (m_height - 1) / 2.0,
+            static_cast<int>(m_width),
+            static_cast<int>(m_height)};
+  }
   Pose bMc() const override { return forwardCamera(); }
   std::string name() const override { return "made-up flight"; }
   bool hasOdometry() const override { return true; }
@@ -58,7 +74,9 @@ private:
   unsigned m_width, m_height;
 };
 
-inline std::unique_ptr<ArDroneEmulator> emulate(int generation, std::size_t frames, const ArDroneEmulator::Options &options = {}, bool loop = false)
+inline std::unique_ptr<ArDroneEmulator> emulate(int generation, std::size_t frames,
+                                                const ArDroneEmulator::Options &options = {},
+                                                bool loop = false)
 {
   MadeUpFlight flight(frames);
   SequenceFeedOptions feed;

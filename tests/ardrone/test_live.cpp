@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The live path against the emulator. Nothing here measures time; limits are for machines that hang.
+// The live path against the emulator. Nothing here measures time; limits are for machines that
+// hang.
 #include "flight.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,8 @@ using test::eventually;
 namespace
 {
 /// All frames until the emulated flight is over and the source has given what it has.
-std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t> *numbers = nullptr, LinkCounters *counters = nullptr)
+std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t> *numbers = nullptr,
+                       LinkCounters *counters = nullptr)
 {
   ArDroneSource::Options options;
   options.give_up_s = 2; // longer than the reboot below
@@ -50,7 +52,9 @@ void expectRisingStamps(const std::vector<Frame> &frames)
 class Live : public testing::TestWithParam<int>
 {
 };
-INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2), [](const auto &generation) { return "ArDrone" + std::to_string(generation.param); });
+INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2), [](const auto &generation) {
+  return "ArDrone" + std::to_string(generation.param);
+});
 
 TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
 {
@@ -71,10 +75,12 @@ TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
       first_seen = frames[i].wMb_odometry;
       first_flown = flown;
     }
-    const Vector6d error = (first_seen->inverse() * *frames[i].wMb_odometry).minus(first_flown->inverse() * flown);
+    const Vector6d error =
+        (first_seen->inverse() * *frames[i].wMb_odometry).minus(first_flown->inverse() * flown);
     EXPECT_LT(error.head<3>().norm(), largest_error_m);
     EXPECT_LT(error.tail<3>().norm(), 0.1);
-    EXPECT_NEAR(frames[i].wMb_odometry->t.z(), flown.t.z(), 0.05); // the sonar knows the height itself
+    EXPECT_NEAR(frames[i].wMb_odometry->t.z(), flown.t.z(),
+                0.05); // the sonar knows the height itself
     ++checked;
   }
   EXPECT_GT(checked, 5);
@@ -99,7 +105,8 @@ TEST_P(Live, ASlowConsumerGetsTheNewestFrameAndTheOthersAreCounted)
   DroneLink link(emulator->address());
   LiveFrame frame;
   ASSERT_TRUE(emulator->wait(test::kPatience_s));
-  ASSERT_TRUE(eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
+  ASSERT_TRUE(eventually(
+      [&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
   ASSERT_TRUE(eventually([&] {
     const auto a = link.counters().video.frames;
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
@@ -126,10 +133,13 @@ TEST_P(Live, ComesBackByItselfAfterAReboot)
   EXPECT_EQ(emulator->counters().reboots, 1u);
   EXPECT_GE(counters.connections, GetParam() == 2 ? 2u : 1u);
   EXPECT_EQ(counters.navdata_restarts, 1u);
-  // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was flown.
-  const auto last = std::find_if(frames.rbegin(), frames.rend(), [](const Frame &f) { return f.status == FrameStatus::ok; });
+  // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was
+  // flown.
+  const auto last = std::find_if(frames.rbegin(), frames.rend(),
+                                 [](const Frame &f) { return f.status == FrameStatus::ok; });
   ASSERT_NE(last, frames.rend());
-  EXPECT_GT(last->stamp_ns - frames.front().stamp_ns, 2'000'000'000); // the reboot was in the first 1.5 s
+  EXPECT_GT(last->stamp_ns - frames.front().stamp_ns,
+            2'000'000'000); // the reboot was in the first 1.5 s
   ASSERT_TRUE(last->wMb_odometry);
   EXPECT_LT((last->wMb_odometry->t - frames.front().wMb_odometry->t).norm(), 8);
 }
@@ -204,7 +214,8 @@ TEST_P(Live, AFrozenCameraIsStale)
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].status == FrameStatus::missing)
       continue;
-    const bool frozen = numbers[i] > 25 && numbers[i] <= 50; // the body must have moved on a little first
+    const bool frozen =
+        numbers[i] > 25 && numbers[i] <= 50; // the body must have moved on a little first
     if (frozen) {
       EXPECT_NE(frames[i].status, FrameStatus::ok) << "frame " << numbers[i];
     }
@@ -233,7 +244,8 @@ TEST(LiveSource, SaysWhenNobodyAnswersOrTheCameraDoesNotFit)
   EXPECT_THROW(ArDroneSource(nobody, options), vpException);
   const auto emulator = emulate(2, 40);
   options.grabber.open_timeout_s = test::kPatience_s;
-  EXPECT_THROW(ArDroneSource(emulator->address(), options), vpException); // 160x120 is not the shape of 640x360
+  EXPECT_THROW(ArDroneSource(emulator->address(), options),
+               vpException); // 160x120 is not the shape of 640x360
 }
 
 TEST(LiveSource, FindsTheGenerationOut)

@@ -16,12 +16,12 @@ namespace bole
 /// scaled to another size of the same shape. Yours is better: calibrate and give a camera file.
 MountedCamera publishedArDroneCamera(int generation, int width, int height);
 
-/// Frames of an AR.Drone (or an emulator, or a replayed recording): grey, rectified, newest first served, with
-/// the drone's odometry, gyro and height.
+/// Frames of an AR.Drone (or an emulator, or a replayed recording): grey, rectified, newest first
+/// served, with the drone's odometry, gyro and height.
 ///
-/// next() blocks until there is a frame and never ends by itself; it ends (false) after stop(), or when the
-/// drone has been silent for \p Options::give_up_s. While the drone is silent it gives a `missing` frame every
-/// frame_timeout_s. The world of wMb_odometry is that of NavdataOdometry.
+/// next() blocks until there is a frame and never ends by itself; it ends (false) after stop(), or
+/// when the drone has been silent for \p Options::give_up_s. While the drone is silent it gives a
+/// `missing` frame every frame_timeout_s. The world of wMb_odometry is that of NavdataOdometry.
 ///
 /// One thread calls next(); stop() may be called from any thread and from a signal handler.
 ///
@@ -42,8 +42,8 @@ public:
     void validate() const;
   };
 
-  /// Connects and waits for the first whole frame; throws vpException when none comes, for a wrong address or
-  /// camera file, and for a camera of another shape.
+  /// Connects and waits for the first whole frame; throws vpException when none comes, for a wrong
+  /// address or camera file, and for a camera of another shape.
   explicit ArDroneSource(const std::string &address);
   ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap = {});
   ~ArDroneSource() override;

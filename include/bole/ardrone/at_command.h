@@ -21,13 +21,14 @@ struct AtCommand
 /// The commands of a datagram; what is not a command is left out. For the emulator and the tests.
 std::vector<AtCommand> parseAtCommands(const std::string &datagram);
 
-/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
+/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is
+/// -1085485875).
 std::string atFloat(float value);
 /// The inverse of atFloat().
 float atFloatValue(const std::string &text);
 
-/// Sends commands with rising sequence numbers. Thread-safe: the drone refuses numbers that go back, so a
-/// program must have one channel to a drone.
+/// Sends commands with rising sequence numbers. Thread-safe: the drone refuses numbers that go
+/// back, so a program must have one channel to a drone.
 class AtChannel
 {
 public:
@@ -45,8 +46,8 @@ public:
   void trimFlat();
   void reference(bool take_off, bool emergency);
   /// \param roll, pitch share of the largest tilt, in [-1, 1]: left and nose down are negative.
-  /// \param gaz, yaw share of the largest climb and turn rate: up and clockwise seen from above are positive.
-  /// \param progressive false hovers whatever the other arguments are.
+  /// \param gaz, yaw share of the largest climb and turn rate: up and clockwise seen from above are
+  /// positive. \param progressive false hovers whatever the other arguments are.
   void move(bool progressive, float roll, float pitch, float gaz, float yaw);
 
 private:

@@ -15,9 +15,9 @@ namespace bole
 /// A decoded picture in the planes of YCbCr 4:2:0, colour planes at half the size.
 struct YuvPicture
 {
-  int width = 0, height = 0;            ///< [px]
+  int width = 0, height = 0;           ///< [px]
   std::vector<std::uint8_t> y, cb, cr; ///< rows without padding; colour rows of (width + 1) / 2
-  std::uint32_t number = 0;             ///< frame number as the drone counts
+  std::uint32_t number = 0;            ///< frame number as the drone counts
 
   bool empty() const { return y.empty(); }
   void toGrey(vpImage<unsigned char> &image) const;
@@ -26,12 +26,18 @@ struct YuvPicture
 
 /// Decodes one access unit at a time, without delay.
 ///
-/// Whatever libavcodec says about damage (an error, a missing reference, concealed blocks) makes the
-/// picture `damaged`: it conceals by copying, which for a tracker is worse than nothing. Not thread-safe.
+/// Whatever libavcodec says about damage (an error, a missing reference, concealed blocks) makes
+/// the picture `damaged`: it conceals by copying, which for a tracker is worse than nothing. Not
+/// thread-safe.
 class H264Decoder
 {
 public:
-  enum class Result { picture, damaged, nothing };
+  enum class Result
+  {
+    picture,
+    damaged,
+    nothing
+  };
 
   H264Decoder();
   ~H264Decoder();
@@ -40,7 +46,8 @@ public:
 
   /// \param picture written for `picture` and, with what could be decoded, for `damaged`.
   /// \param width, height [px] part of the coded picture that is shown; 0 for all of it.
-  Result decode(const std::vector<std::uint8_t> &access_unit, int width, int height, YuvPicture &picture);
+  Result decode(const std::vector<std::uint8_t> &access_unit, int width, int height,
+                YuvPicture &picture);
   /// Forgets references: the next picture must be a key frame.
   void flush();
   const std::string &message() const { return m_message; } ///< why the last picture was not whole
@@ -51,8 +58,8 @@ private:
   std::string m_message;
 };
 
-/// Encodes as an AR.Drone 2 does: baseline profile, no delay, a key frame every \p key_interval frames with
-/// SPS and PPS in front. Throws vpException where libavcodec has no H.264 encoder.
+/// Encodes as an AR.Drone 2 does: baseline profile, no delay, a key frame every \p key_interval
+/// frames with SPS and PPS in front. Throws vpException where libavcodec has no H.264 encoder.
 class H264Encoder
 {
 public:

@@ -15,7 +15,8 @@
 namespace bole
 {
 /// Bits of the drone's state word that anyone asks for.
-enum class DroneState : std::uint32_t {
+enum class DroneState : std::uint32_t
+{
   flying = 1u << 0,
   demo_mode = 1u << 10,
   bootstrap = 1u << 11,
@@ -34,14 +35,17 @@ struct Navdata
 
   struct Demo // option 0
   {
-    std::uint32_t control_state = 0; ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
+    std::uint32_t control_state =
+        0; ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
     std::uint32_t battery_percent = 0;
-    Eigen::Vector3f phi_theta_psi_mdeg = Eigen::Vector3f::Zero(); ///< roll, pitch, yaw [milli-degree]
-    std::int32_t altitude_mm = 0;                                ///< over the ground [mm]
-    Eigen::Vector3f velocity_mm_s = Eigen::Vector3f::Zero();     ///< [mm/s], drone's axes
+    Eigen::Vector3f phi_theta_psi_mdeg =
+        Eigen::Vector3f::Zero();                             ///< roll, pitch, yaw [milli-degree]
+    std::int32_t altitude_mm = 0;                            ///< over the ground [mm]
+    Eigen::Vector3f velocity_mm_s = Eigen::Vector3f::Zero(); ///< [mm/s], drone's axes
   };
   std::optional<Demo> demo;
-  std::optional<std::uint32_t> time; ///< option 1: upper 11 bits [s], lower 21 bits [us]: wraps after 2048 s
+  std::optional<std::uint32_t>
+      time;       ///< option 1: upper 11 bits [s], lower 21 bits [us]: wraps after 2048 s
   struct Physical // option 3
   {
     Eigen::Vector3f acceleration_mg = Eigen::Vector3f::Zero(); ///< [mg], drone's axes
@@ -56,15 +60,24 @@ struct Navdata
   std::uint32_t flightPhase() const { return demo ? demo->control_state >> 16 : 0; }
 };
 
-enum class NavdataError { none, too_short, header, option_size, no_checksum, checksum };
+enum class NavdataError
+{
+  none,
+  too_short,
+  header,
+  option_size,
+  no_checksum,
+  checksum
+};
 const char *toString(NavdataError error);
 
 /// Reads one datagram. Only packets with a right checksum get through.
-/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input terminates.
+/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input
+/// terminates.
 NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
 
-/// The datagram of \p navdata: its typed options 0, 1 and 3 where they are set (with zeros for what the
-/// struct leaves out), the others as bytes, and the checksum. For the emulator and the tests.
+/// The datagram of \p navdata: its typed options 0, 1 and 3 where they are set (with zeros for what
+/// the struct leaves out), the others as bytes, and the checksum. For the emulator and the tests.
 std::vector<std::uint8_t> encodeNavdata(const Navdata &navdata);
 
 /// Name of an option, "option 42" for unknown ones.
@@ -75,9 +88,9 @@ struct NavdataField
   std::string name; ///< with index for fields of more than one number, "motor_2"
   double value;
 };
-/// Every field of the option \p id by the layout of the manufacturer's SDK 2.0 (navdata_common.h), in
-/// order and in the drone's units. Bytes behind the known layout (other firmwares append) are left alone;
-/// fields that the bytes do not hold are left out. Unknown options have no fields.
+/// Every field of the option \p id by the layout of the manufacturer's SDK 2.0 (navdata_common.h),
+/// in order and in the drone's units. Bytes behind the known layout (other firmwares append) are
+/// left alone; fields that the bytes do not hold are left out. Unknown options have no fields.
 std::vector<NavdataField> navdataFields(std::uint16_t id, const std::vector<std::uint8_t> &bytes);
 /// Size in bytes of the known layout of an option without its id and size; 0 for unknown options.
 std::size_t navdataOptionSize(std::uint16_t id);

@@ -10,10 +10,17 @@
 
 namespace bole
 {
-enum class PaveFrameType : std::uint8_t { unknown = 0, idr = 1, i = 2, p = 3, headers = 4 };
+enum class PaveFrameType : std::uint8_t
+{
+  unknown = 0,
+  idr = 1,
+  i = 2,
+  p = 3,
+  headers = 4
+};
 
-/// The fields of a PaVE header that anyone reads. All little-endian on the wire; the header is 64 or 68
-/// bytes long by firmware and says so itself.
+/// The fields of a PaVE header that anyone reads. All little-endian on the wire; the header is 64
+/// or 68 bytes long by firmware and says so itself.
 struct PaveHeader
 {
   std::uint8_t version = 2;
@@ -30,7 +37,8 @@ struct PaveHeader
   std::uint8_t header1_size = 0, header2_size = 0; ///< [byte] SPS and PPS in front of a key frame
   std::uint32_t advertised_size = 0;
 
-  /// True when the fields are such as a drone can send: the signature alone appears in payloads by chance.
+  /// True when the fields are such as a drone can send: the signature alone appears in payloads by
+  /// chance.
   bool isPlausible() const;
 };
 
@@ -44,18 +52,19 @@ struct PaveFrame
 {
   PaveHeader header;
   std::vector<std::uint8_t> payload;
-  bool after_gap = false; ///< bytes were skipped, or a frame number is missing, just before this frame
+  bool after_gap =
+      false; ///< bytes were skipped, or a frame number is missing, just before this frame
 };
 
 /// Cuts a byte stream into PaVE frames and finds its way again after damage.
 ///
 /// Idea: keep the bytes not yet used; when the front is not a plausible header, search for the next
-/// signature that is one, and say so in the next frame (after_gap). A damaged length cannot swallow the
-/// stream: payloads above 1 MiB are implausible, and a frame whose successor is not a header is searched
-/// for a header inside it.
+/// signature that is one, and say so in the next frame (after_gap). A damaged length cannot swallow
+/// the stream: payloads above 1 MiB are implausible, and a frame whose successor is not a header is
+/// searched for a header inside it.
 ///
-/// Laws (each a test): how the stream is cut into push() calls does not matter; a frame pushed whole comes
-/// out; any input terminates. Cost: linear in the bytes. Not thread-safe.
+/// Laws (each a test): how the stream is cut into push() calls does not matter; a frame pushed
+/// whole comes out; any input terminates. Cost: linear in the bytes. Not thread-safe.
 class PaveParser
 {
 public:

@@ -21,26 +21,27 @@ struct DecodedFrame
   YuvPicture picture;                        ///< empty when nothing could be decoded
   std::uint32_t number = 0;                  ///< as the drone counts
   std::optional<std::uint32_t> timestamp_ms; ///< PaVE; an AR.Drone 1 sends none
-  /// Hardly different from the picture that last was: the camera stands still, or is frozen (the encoder's
-  /// refinement of one picture changes block means by up to 0.65 grey levels, a slow flight by several).
+  /// Hardly different from the picture that last was: the camera stands still, or is frozen (the
+  /// encoder's refinement of one picture changes block means by up to 0.65 grey levels, a slow
+  /// flight by several).
   bool unchanged = false;
 };
 
 /// Decodes the video of either generation.
 ///
-/// AR.Drone 2: frames that refer to others are `corrupt` from a gap or a damaged frame on until the next key
-/// frame. When several frames have piled up, those in front of the newest key frame are skipped and counted.
-/// AR.Drone 1: each datagram is a picture by itself.
-/// Both: a picture with the pixels of the one before is `stale`, one of another size than the first `resized`.
+/// AR.Drone 2: frames that refer to others are `corrupt` from a gap or a damaged frame on until the
+/// next key frame. When several frames have piled up, those in front of the newest key frame are
+/// skipped and counted. AR.Drone 1: each datagram is a picture by itself. Both: a picture with the
+/// pixels of the one before is `stale`, one of another size than the first `resized`.
 ///
-/// Neither stream has a checksum: damage that still reads as a picture is not seen here (see the README).
-/// Not thread-safe.
+/// Neither stream has a checksum: damage that still reads as a picture is not seen here (see the
+/// README). Not thread-safe.
 class VideoDecoder
 {
 public:
   struct Counters
   {
-    std::size_t frames = 0;        ///< given out, whatever their status
+    std::size_t frames = 0; ///< given out, whatever their status
     std::size_t ok = 0, corrupt = 0, stale = 0, resized = 0;
     std::size_t skipped = 0;       ///< never decoded, since a newer key frame was there
     std::size_t resyncs = 0;       ///< times that the stream had to be searched for a header
