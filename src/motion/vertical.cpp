@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/motion/vertical.h>
+
+#include "epipolar.h"
+#include "require.h"
+
+#include <Eigen/Dense>
+#include <opencv2/imgproc.hpp>
+
+#include <cmath>
+#include <vector>
+
+namespace bole
+{
+namespace
+{
+constexpr double kDegree = M_PI / 180;
+constexpr double kPriorSigma = 20 * kDegree;
+
+struct Edge
+{
+  Eigen::Vector3d normal; ///< unit, of the plane through the camera centre and the edge
+  double weight = 1;
+};
+
+/// One straight edge a patch, where there is one: its centre and gradient direction from the
+/// moments of the gradients.
+std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
+                            const Eigen::Vector3d &up, const VerticalOptions &options)
+{
+  cv::Mat gx, gy;
+  cv::Sobel(grey, gx, CV_32F, 1, 0, 3, 1.0 / 8 / 255);
+  cv::Sobel(grey, gy, CV_32F, 0, 1, 3, 1.0 / 8 / 255);
+  std::vector<Edge> edges;
+  for (int y0 = 2; y0 + options.cell_px < grey.rows - 2; y0 += options.cell_px) {
+    for (int x0 = 2; x0 + options.cell_px < grey.cols - 2; x0 += options.cell_px) {
+      double xx = 0, xy = 0, yy = 0, mx = 0, my = 0;
+      for (int y = y0; y < y0 + options.cell_px; ++y) {
+        const float *row_x = gx.ptr<float>(y), *row_y = gy.ptr<float>(y);
+        for (int x = x0; x < x0 + options.cell_px; ++x) {
+          const double a = row_x[x], b = row_y[x], w = a * a + b * b;
+          xx += a * a;
+          xy += a * b;
+          yy += b * b;
+          mx += w * x;
+          my += w * y;
+        }
+      }
+      const double energy = xx + yy;
+      const double coherence = std::hypot(xx - yy, 2 * xy) / std::max(1e-12, energy);
+      if (energy < options.cell_px * options.cell_px * options.min_gradient * options.min_gradient *
+                       0.5 ||
+          coherence < options.min_coherence) {
+        continue;
+      }
+      const Eigen::Vector2d centre(mx / energy, my / energy);
+      const double angle = 0.5 * std::atan2(2 * xy, xx - yy); // of the gradient: across the edge
+      const Eigen::Vector2d along(-std::sin(angle), std::cos(angle));
+      // The edge must point to the expected zenith to within the tilt.
+      const Eigen::Vector3d ray = camera.ray(centre);
+      const Eigen::Vector2d zenith = Eigen::Vector2d(camera.fx * (up.x() - ray.x() * up.z()),
+                                                     camera.fy * (up.y() - ray.y() * up.z()));
+      if (std::abs(along.dot(zenith)) < std::cos(options.max_tilt_deg * kDegree) * zenith.norm()) {
+        continue;
+      }
+      const Eigen::Vector3d far = camera.ray(centre + 20 * along);
+      edges.push_back({ray.cross(far).normalized(), 1});
+    }
+  }
+  return edges;
+}
+} // namespace
+
+void VerticalOptions::validate() const
+{
+  using motion::require;
+  require(max_tilt_deg >= 1 && max_tilt_deg <= 60, "vertical.max_tilt_deg", max_tilt_deg,
+          "in 1 .. 60");
+  require(min_gradient > 0, "vertical.min_gradient", min_gradient, "above 0");
+  require(cell_px >= 4 && cell_px <= 64, "vertical.cell_px", cell_px, "in 4 .. 64");
+  require(min_coherence >= 0 && min_coherence <= 1, "vertical.min_coherence", min_coherence,
+          "in 0 .. 1");
+  require(sigma_deg > 0, "vertical.sigma_deg", sigma_deg, "above 0");
+  require(min_edges >= 3, "vertical.min_edges", min_edges, "3 or more");
+  require(inflation >= 1, "vertical.inflation", inflation, "1 or more");
+}
+
+VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image,
+                                      const PinholeCamera &camera,
+                                      const std::optional<Eigen::Vector3d> &expected_up,
+                                      const VerticalOptions &options)
+{
+  options.validate();
+  VerticalEstimate estimate;
+  const Eigen::Vector3d expected =
+      expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
+  estimate.up = expected;
+  estimate.covariance = kPriorSigma * kPriorSigma * Eigen::Matrix2d::Identity();
+  const cv::Mat grey(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
+                     const_cast<unsigned char *>(image.bitmap));
+  const std::vector<Edge> edges = findEdges(grey, camera, expected, options);
+  if (edges.size() < static_cast<std::size_t>(options.min_edges)) {
+    return estimate;
+  }
+  const double sigma = options.sigma_deg * kDegree, prior = 1 / (kPriorSigma * kPriorSigma);
+  double best = 1e300;
+  for (const double roll : {0.0, -0.25, 0.25, -0.12, 0.12}) {
+    Eigen::Vector3d up = (expSo3({0, 0, roll}) * expected).normalized();
+    Eigen::Matrix2d H;
+    double width = 4; // of the kernel, in sigmas: from wide to narrow
+    for (int iteration = 0; iteration < 15; ++iteration, width = std::max(1.0, 0.8 * width)) {
+      const Matrix32d B = directionBasis(up);
+      H = prior * Eigen::Matrix2d::Identity();
+      Eigen::Vector2d g = -prior * directionMinus(expected, up);
+      for (const Edge &edge : edges) {
+        const double e = edge.normal.dot(up) / (sigma * width);
+        const Eigen::Vector2d J = B.transpose() * edge.normal;
+        const double w = motion::weightOf(e, 1.5) / (sigma * sigma) / options.inflation;
+        H += w * J * J.transpose();
+        g += w * J * edge.normal.dot(up);
+      }
+      up = directionPlus(up, -H.ldlt().solve(g));
+    }
+    double cost = 0.5 * prior * directionMinus(expected, up).squaredNorm();
+    int agreeing = 0;
+    for (const Edge &edge : edges) {
+      const double e = edge.normal.dot(up) / sigma;
+      cost += motion::costOf(e, 1.5) / options.inflation;
+      agreeing += std::abs(e) < 2;
+    }
+    if (cost < best) {
+      best = cost;
+      estimate.up = up;
+      estimate.covariance = H.inverse();
+      estimate.edges = agreeing;
+    }
+  }
+  estimate.status =
+      estimate.edges >= options.min_edges ? VerticalStatus::ok : VerticalStatus::too_few_edges;
+  return estimate;
+}
+
+void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate)
+{
+  if (estimate.status != VerticalStatus::ok) {
+    return;
+  }
+  const Matrix32d B = wRc * directionBasis(estimate.up);
+  const Eigen::Matrix3d information = B * estimate.covariance.inverse() * B.transpose();
+  const Eigen::Vector3d seen = wRc * estimate.up;
+  if (m_n >= 5) { // frames that contradict the others say less
+    const double off = seen.cross(m_up).norm();
+    const double variance = estimate.covariance.trace();
+    const double w = 1 / (1 + off * off / (4 * variance));
+    m_information += w * information;
+    m_weighted += w * seen / variance;
+  }
+  else {
+    m_information += information;
+    m_weighted += seen / estimate.covariance.trace();
+  }
+  ++m_n;
+  m_up = m_weighted.normalized();
+}
+
+Eigen::Matrix2d VerticalFilter::covariance() const
+{
+  const Matrix32d B = directionBasis(m_n > 0 ? m_up : Eigen::Vector3d(0, -1, 0));
+  const Eigen::Matrix2d H = B.transpose() * m_information * B + 1e-6 * Eigen::Matrix2d::Identity();
+  const double lean = 0.7 * kDegree;
+  return std::min(10, std::max(1, m_n)) * H.inverse() + lean * lean * Eigen::Matrix2d::Identity();
+}
+} // namespace bole

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "rendered_walls.h"
+
+#include <bole/geometry/so3.h>
+#include <bole/input/asl_source.h>
+#include <bole/motion/ground_plane.h>
+#include <bole/motion/point_odometry.h>
+#include <bole/motion/vertical.h>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <random>
+
+namespace
+{
+using namespace bole;
+using namespace bole::test;
+
+const PinholeCamera kCamera;
+
+TEST(PointOdometry, KeepsItsUnitOfLengthAlongThePath)
+{
+  PointTracker tracker(kCamera);
+  PointOdometry odometry(kCamera);
+  std::vector<Pose> truth;
+  for (int k = 0; k < 24; ++k) {
+    truth.push_back(
+        {expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0.1 * std::sin(0.3 * k), 0.04 * k}});
+    tracker.track(drawWalls(kCamera, truth.back()));
+    odometry.process(tracker, k * 100000000LL);
+  }
+  const auto path = odometry.trajectory();
+  ASSERT_EQ(path.size(), truth.size());
+  const double unit = truth.back().t.norm() / path.back().wMc.t.norm();
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    EXPECT_LT((unit * path[k].wMc.t - truth[k].t).norm(), 0.05) << k; // 2 % of the path
+    EXPECT_LT(logSo3(path[k].wMc.R.transpose() * truth[k].R).norm(), 0.006) << k;
+  }
+  int near = 0;
+  for (const PointDepth &point : odometry.depths(0.1)) {
+    const double depth = unit / point.inverse_depth;
+    double best = 1e9;
+    for (const double z : {5.0, 8.0, 14.0}) {
+      const Eigen::Vector3d ray = truth.back().R * kCamera.ray(point.pixel);
+      best = std::min(best, std::abs(depth * ray.z() + truth.back().t.z() - z) / z);
+    }
+    near += best < 0.1;
+  }
+  EXPECT_GT(near, 30);
+}
+
+TEST(PointOdometry, ACameraThatOnlyTurnsNeverGetsAUnitOfLength)
+{
+  PointTracker tracker(kCamera);
+  PointOdometry odometry(kCamera);
+  for (int k = 0; k < 15; ++k) {
+    const Pose pose{expSo3({0, 0.01 * k, 0.002 * k}), {0, 0, 0}};
+    tracker.track(drawWalls(kCamera, pose));
+    const auto result = odometry.process(tracker, k * 100000000LL);
+    EXPECT_EQ(result.status, PointOdometryStatus::starting) << k;
+    EXPECT_LT(logSo3(result.wMc.R.transpose() * pose.R).norm(), 2e-3) << k;
+    EXPECT_EQ(result.wMc.t.norm(), 0) << k;
+    if (k > 0) {
+      EXPECT_GE(result.covariance(0, 0), 1);
+    }
+  }
+}
+
+TEST(PointOdometry, LosesItsPointsWithoutMakingAnythingUp)
+{
+  PointTracker tracker(kCamera);
+  PointOdometry odometry(kCamera);
+  PointOdometryResult result;
+  for (int k = 0; k < 10; ++k) {
+    tracker.track(drawWalls(kCamera, {Eigen::Matrix3d::Identity(), {0.1 * k, 0, 0}}));
+    result = odometry.process(tracker, k * 100000000LL);
+  }
+  EXPECT_EQ(result.status, PointOdometryStatus::ok);
+  const vpImage<unsigned char> white(240, 320, 250);
+  for (int k = 10; k < 25; ++k) {
+    tracker.track(white);
+    result = odometry.process(tracker, k * 100000000LL);
+    EXPECT_EQ(result.status, PointOdometryStatus::lost);
+    EXPECT_TRUE(result.wMc.isFinite());
+    EXPECT_GE(result.covariance(0, 0), 1);
+  }
+}
+
+TEST(PointOdometry, PlacesTheRenderedFlightsWithinTwoPercentOfTheirPath)
+{
+  const std::string folder = std::string(BOLE_SHARED_DATA_DIR) + "/rendered/winter-weave";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << folder << " is absent";
+  }
+  AslSource source(folder);
+  PointTracker tracker(source.camera());
+  PointOdometry odometry(source.camera());
+  std::vector<Eigen::Vector3d> truth;
+  Frame frame;
+  double length = 0;
+  while (source.next(frame)) {
+    tracker.track(frame.image);
+    odometry.process(tracker, frame.stamp_ns);
+    truth.push_back((*frame.wMb_truth * source.bMc()).t);
+    length += truth.size() > 1 ? (truth.back() - truth[truth.size() - 2]).norm() : 0;
+  }
+  const auto path = odometry.trajectory();
+  const auto n = static_cast<Eigen::Index>(truth.size());
+  Eigen::Matrix3Xd estimate(3, n), reference(3, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    estimate.col(k) = path[static_cast<std::size_t>(k)].wMc.t;
+    reference.col(k) = truth[static_cast<std::size_t>(k)];
+  }
+  const Eigen::Matrix4d aligned = Eigen::umeyama(estimate, reference, true);
+  const Eigen::Matrix3Xd moved =
+      (aligned.topLeftCorner<3, 3>() * estimate).colwise() + aligned.topRightCorner<3, 1>();
+  EXPECT_LT(std::sqrt((moved - reference).squaredNorm() / double(n)), 0.01 * length);
+}
+
+/// Dark leaning bars on a bright sky, all towards the image of \p up.
+vpImage<unsigned char> drawTrunks(const PinholeCamera &camera, const Eigen::Vector3d &up)
+{
+  vpImage<unsigned char> image(static_cast<unsigned>(camera.height),
+                               static_cast<unsigned>(camera.width), 220);
+  for (const double bearing : {-0.6, -0.35, -0.1, 0.15, 0.4, 0.65}) {
+    const Eigen::Vector3d side = up.cross(Eigen::Vector3d(0, 0, 1)).normalized(),
+                          ahead = side.cross(up);
+    const Eigen::Vector3d foot = std::cos(bearing) * ahead + std::sin(bearing) * side;
+    const Eigen::Vector3d normal = foot.cross(up).normalized();
+    for (unsigned y = 0; y < image.getHeight(); ++y) {
+      for (unsigned x = 0; x < image.getWidth(); ++x) {
+        // Half a pixel of smooth border: stairs would bend the gradients towards the axes.
+        const double off = std::abs(normal.dot(camera.ray({double(x), double(y)}).normalized()));
+        const double dark = std::clamp((0.02 - off) * 0.7 * camera.fx + 0.5, 0.0, 1.0);
+        image[y][x] = std::min(image[y][x], static_cast<unsigned char>(220 - 160 * dark));
+      }
+    }
+  }
+  return image;
+}
+
+TEST(Vertical, TrunksPointToTheZenith)
+{
+  for (const Eigen::Vector3d &tilt :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.1, 0, -0.12), Eigen::Vector3d(-0.15, 0, 0.2)}) {
+    const Eigen::Vector3d up = expSo3(tilt) * Eigen::Vector3d(0, -1, 0);
+    const auto estimate = gravityFromVerticals(drawTrunks(kCamera, up), kCamera);
+    EXPECT_EQ(estimate.status, VerticalStatus::ok);
+    EXPECT_LT(directionMinus(up, estimate.up).norm(), 0.02) << tilt.transpose();
+  }
+}
+
+TEST(Vertical, AnImageWithoutEdgesKeepsWhatWasExpected)
+{
+  const Eigen::Vector3d expected = Eigen::Vector3d(0.1, -1, 0.1).normalized();
+  const auto estimate =
+      gravityFromVerticals(vpImage<unsigned char>(240, 320, 99), kCamera, expected);
+  EXPECT_EQ(estimate.status, VerticalStatus::too_few_edges);
+  EXPECT_LT((estimate.up - expected).norm(), 1e-12);
+  EXPECT_GT(estimate.covariance(0, 0), 0.1);
+}
+
+std::vector<PointDepth> groundPoints(double height, const Eigen::Vector3d &up, double bushes,
+                                     unsigned seed)
+{
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> normal;
+  std::vector<PointDepth> points;
+  while (points.size() < 60) {
+    PointDepth point;
+    point.pixel = {319 * unit(random), 239 * unit(random)};
+    const double below = -up.dot(kCamera.ray(point.pixel));
+    if (below <= 0.02) {
+      point.inverse_depth = 0.1; // a trunk above the horizon
+    }
+    else {
+      const double over = unit(random) < bushes ? 0.6 * unit(random) * height : 0;
+      point.inverse_depth = below / (height - over);
+    }
+    point.sigma = 0.03 * point.inverse_depth;
+    point.inverse_depth += point.sigma * normal(random);
+    points.push_back(point);
+  }
+  return points;
+}
+
+TEST(GroundPlane, FindsTheHeightUnderBushes)
+{
+  const Eigen::Vector3d up = expSo3({0.05, 0, 0.1}) * Eigen::Vector3d(0, -1, 0);
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const auto ground = heightOverGround(groundPoints(1.4, up, 0.33, seed), kCamera, up);
+    ASSERT_TRUE(ground.known);
+    EXPECT_NEAR(ground.height, 1.4, 3 * ground.sigma) << seed;
+    EXPECT_NEAR(ground.height, 1.4, 0.12) << seed;
+  }
+}
+
+TEST(GroundPlane, NothingBelowTheHorizonIsNoGround)
+{
+  std::vector<PointDepth> sky(40);
+  for (auto &point : sky) {
+    point.pixel = {160, 40};
+    point.inverse_depth = 0.1;
+    point.sigma = 0.001;
+  }
+  EXPECT_FALSE(heightOverGround(sky, kCamera, {0, -1, 0}).known);
+}
+
+TEST(GroundPlane, ScaleIsARobustMeanOverFrames)
+{
+  ScaleFromHeight scale;
+  for (int k = 0; k < 30; ++k) {
+    scale.add({true, k % 6 == 0 ? 0.4 : 0.7 + 0.01 * (k % 3 - 1), 0.02, 20}, 1.4, 0.02);
+  }
+  ASSERT_TRUE(scale.known());
+  EXPECT_NEAR(scale.metresPerUnit(), 2.0, 0.06);
+  EXPECT_GT(scale.relativeSigma(), 0.03);
+}
+} // namespace

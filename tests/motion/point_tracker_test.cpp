@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "rendered_walls.h"
+
+#include <bole/geometry/so3.h>
+#include <bole/motion/point_motion.h>
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace
+{
+using namespace bole;
+using namespace bole::test;
+
+const PinholeCamera kCamera;
+
+Pose poseAt(int k) { return {expSo3({0, 0.004 * k, 0}), {0.08 * k, 0.01 * k, 0.05 * k}}; }
+
+TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
+{
+  PointTracker tracker(kCamera);
+  for (int k = 0; k < 4; ++k) {
+    tracker.track(drawWalls(kCamera, poseAt(k)));
+  }
+  const auto matches = tracker.matches(3);
+  ASSERT_GT(matches.size(), 60u);
+  // Every wall is at a known depth: one of them explains the match to a fraction of a pixel.
+  int right = 0;
+  const Pose aMb = poseAt(0).inverse() * poseAt(3);
+  for (const PointMatch &match : matches) {
+    double best = 1e9;
+    for (const double z : {5.0, 8.0, 14.0}) {
+      const Eigen::Vector3d point = poseAt(0).R * kCamera.ray(match.a_px);
+      const Eigen::Vector3d world = poseAt(0).t + point * ((z - poseAt(0).t.z()) / point.z());
+      best = std::min(best, (kCamera.project(poseAt(3).inverse() * world) - match.b_px).norm());
+    }
+    right += best < 0.3;
+  }
+  EXPECT_GT(right, 0.85 * double(matches.size()));
+  EXPECT_GT(aMb.t.norm(), 0.2);
+}
+
+TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
+{
+  PointTracker tracker(kCamera);
+  std::set<std::uint64_t> alive, dead;
+  for (int k = 0; k < 6; ++k) {
+    tracker.track(drawWalls(kCamera, poseAt(3 * k)));
+    std::set<std::uint64_t> now;
+    for (const PointTrack &track : tracker.tracks()) {
+      EXPECT_TRUE(now.insert(track.id).second);
+      EXPECT_EQ(dead.count(track.id), 0u);
+    }
+    for (std::uint64_t id : alive) {
+      if (now.count(id) == 0) {
+        dead.insert(id);
+      }
+    }
+    alive = now;
+  }
+  std::set<int> cells;
+  for (const PointTrack &track : tracker.tracks()) {
+    cells.insert(int(track.current().x() / 80) + 10 * int(track.current().y() / 80));
+  }
+  EXPECT_EQ(cells.size(), 12u); // every cell of 4 x 3
+}
+
+TEST(PointTracker, AWhiteWallHasNoPoints)
+{
+  PointTracker tracker(kCamera);
+  vpImage<unsigned char> white(240, 320, 250);
+  tracker.track(white);
+  tracker.track(white);
+  EXPECT_TRUE(tracker.tracks().empty());
+  EXPECT_TRUE(tracker.matches(1).empty());
+}
+
+TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
+{
+  PointTracker tracker(kCamera);
+  EXPECT_THROW(tracker.track(vpImage<unsigned char>(100, 100, 0)), vpException);
+}
+
+Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
+{
+  Frame frame;
+  frame.index = static_cast<std::size_t>(k);
+  frame.stamp_ns = k * 100000000LL;
+  frame.image = image;
+  frame.wMb_odometry = poseAt(k) * bMc.inverse();
+  for (int i = 1; i <= 20 && k > 0; ++i) {
+    const Eigen::Matrix3d b0Rb1 =
+        bMc.R * poseAt(k - 1).R.transpose() * poseAt(k).R * bMc.R.transpose();
+    frame.gyro.push_back({frame.stamp_ns - 100000000LL + i * 5000000LL, logSo3(b0Rb1) / 0.1});
+  }
+  return frame;
+}
+
+TEST(PointMotion, FindsTheMotionOfEveryFrame)
+{
+  Pose bMc;
+  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  PointMotion motion(kCamera, bMc);
+  for (int k = 0; k < 6; ++k) {
+    const auto steps = motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
+    EXPECT_EQ(steps.size(), k == 0 ? 0u : k < 3 ? 1u : 2u);
+    for (const RelativeMotion &step : steps) {
+      const Pose aMb = poseAt(k - step.frames_back).inverse() * poseAt(k);
+      EXPECT_EQ(step.estimate.status, RelativePoseStatus::ok);
+      EXPECT_LT(logSo3(step.estimate.aRb.transpose() * aMb.R).norm(), 1e-3);
+      EXPECT_LT(directionMinus(aMb.t.normalized(), step.estimate.direction).norm(), 0.06);
+    }
+  }
+}
+
+TEST(PointMotion, FallsBackToTheSensorsWithinAFrameAndRecovers)
+{
+  Pose bMc;
+  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  PointMotion motion(kCamera, bMc);
+  const vpImage<unsigned char> white(240, 320, 250);
+  for (int k = 0; k < 3; ++k) {
+    motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
+  }
+  const auto blind = motion.process(frameAt(3, white, bMc));
+  ASSERT_FALSE(blind.empty());
+  EXPECT_EQ(blind[0].estimate.status, RelativePoseStatus::too_few_points);
+  const Pose aMb = poseAt(2).inverse() * poseAt(3);
+  EXPECT_LT(logSo3(blind[0].estimate.aRb.transpose() * aMb.R).norm(), 1e-3);
+  EXPECT_LT(directionMinus(aMb.t.normalized(), blind[0].estimate.direction).norm(), 1e-6);
+  motion.process(frameAt(4, drawWalls(kCamera, poseAt(4)), bMc));
+  const auto seeing = motion.process(frameAt(5, drawWalls(kCamera, poseAt(5)), bMc));
+  EXPECT_EQ(seeing[0].estimate.status, RelativePoseStatus::ok);
+}
+
+TEST(PointMotion, PassesOverFramesThatAreNotOk)
+{
+  PointMotion motion(kCamera, {});
+  Frame frame = frameAt(0, drawWalls(kCamera, poseAt(0)), {});
+  motion.process(frame);
+  Frame missing;
+  missing.status = FrameStatus::missing;
+  EXPECT_TRUE(motion.process(missing).empty());
+  const auto steps = motion.process(frameAt(2, drawWalls(kCamera, poseAt(2)), {}));
+  ASSERT_EQ(steps.size(), 1u);
+  EXPECT_EQ(steps[0].a_index, 0u);
+  EXPECT_EQ(steps[0].b_index, 2u);
+}
+} // namespace
