@@ -10,6 +10,8 @@ namespace bole
 {
 namespace
 {
+constexpr double kDegree = M_PI / 180;
+
 struct Height
 {
   double value, variance;
@@ -40,6 +42,7 @@ void GroundOptions::validate() const
   require(min_depression_deg >= 1 && min_depression_deg <= 80, "ground.min_depression_deg",
           min_depression_deg, "in 1 .. 80");
   require(max_relative_sigma > 0, "ground.max_relative_sigma", max_relative_sigma, "above 0");
+  require(up_sigma_deg > 0, "ground.up_sigma_deg", up_sigma_deg, "above 0");
   require(roughness > 0, "ground.roughness", roughness, "above 0");
   require(min_points >= 4, "ground.min_points", min_points, "4 or more");
 }
@@ -49,7 +52,7 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
 {
   GroundHeight ground;
   std::vector<Height> heights;
-  const double sine = std::sin(options.min_depression_deg * M_PI / 180);
+  const double sine = std::sin(options.min_depression_deg * kDegree);
   for (const PointDepth &point : points) {
     const Eigen::Vector3d ray = camera.ray(point.pixel);
     const double below = -up.dot(ray);
@@ -59,13 +62,13 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
     }
     const double h = below / point.inverse_depth;
     const double relative = point.sigma / point.inverse_depth;
-    heights.push_back({h, h * h * relative * relative});
+    const double tilt = options.up_sigma_deg * kDegree * ray.norm() / below; // moves the horizon
+    heights.push_back({h, h * h * (relative * relative + tilt * tilt)});
   }
   if (heights.size() < static_cast<std::size_t>(options.min_points)) {
     return ground;
   }
-  // Bushes and trunks stand above the ground: the candidate with the most support wins, and of two
-  // with nearly the same support the lower one.
+  // Bushes and trunks stand above the ground at all heights: the height with the most support wins.
   double best_support = 0, centre = 0;
   for (const Height &candidate : heights) {
     const double roughness = options.roughness * candidate.value;
@@ -75,9 +78,8 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
                         (h.variance + roughness * roughness);
       support += std::exp(-0.5 * u2);
     }
-    if (support > 1.1 * best_support ||
-        (support > 0.9 * best_support && candidate.value > centre)) {
-      best_support = std::max(best_support, support);
+    if (support > best_support) {
+      best_support = support;
       centre = candidate.value;
     }
   }
@@ -137,7 +139,7 @@ double ScaleFromHeight::relativeSigma() const
     return 1;
   }
   const double excess = std::max(1.0, spread / double(m_logs.size()));
-  constexpr double kShared = 0.04;
+  constexpr double kShared = 0.07;
   return std::sqrt(std::min<double>(10, double(m_logs.size())) * excess / weights +
                    kShared * kShared);
 }

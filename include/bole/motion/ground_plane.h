@@ -6,8 +6,7 @@
 ///
 /// Idea: a ground point at inverse depth q along the ray x lies up . x / q below the camera. For
 /// flat ground all have one height; bushes and stumps stand above it, so the estimate is the lower
-/// mode of the heights, robustly refined, with a slope of the ground allowed for if the points span
-/// enough of it.
+/// mode of the heights, robustly refined.
 ///
 /// Laws (each a test): points on a plane give its height exactly; a third of the points on bushes
 /// changes it by less than its standard deviation says; points above the horizon do not count.
@@ -19,6 +18,7 @@ namespace bole
 struct GroundOptions
 {
   double min_depression_deg = 8;    ///< below the horizon, 1 .. 80: nearer to it heights are noise
+  double up_sigma_deg = 1;          ///< of the direction of up, > 0
   double max_relative_sigma = 0.15; ///< of a point's depth, > 0
   double roughness = 0.06;          ///< of the ground, in heights of the camera, > 0: bumps
   int min_points = 8;               ///< >= 4

@@ -32,7 +32,8 @@ struct PointOdometryOptions
   int key_frames = 8;            ///< of the window, 3 .. 30
   int held_key_frames = 3;       ///< oldest of them, not moved any more, 2 .. key_frames - 1
   double key_parallax_deg = 1.2; ///< median flow without rotation that makes a new key frame, > 0
-  double key_shared = 0.5; ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
+  double key_shared =
+      0.5; ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
   double start_parallax_deg = 1; ///< of the first baseline, > 0
   double start_sigma_deg = 3; ///< the first baseline's direction must be known as well as this, > 0
   int min_points = 12;        ///< seen with a known depth, to place a frame; >= 6
