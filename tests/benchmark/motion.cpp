@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/// \file
+/// What the point stage measures on the rendered flights, and what it costs in one thread.
+///
+///     benchmark_motion                 the tables of README, "Point features"
+///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
+
+#include <bole/input/asl_source.h>
+#include <bole/input/open_source.h>
+#include <bole/motion/ground_plane.h>
+#include <bole/motion/point_motion.h>
+#include <bole/motion/point_odometry.h>
+#include <bole/motion/vertical.h>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace bole;
+
+constexpr double kDegrees = 180 / M_PI;
+
+/// Time of this thread alone [ms]: other work of the machine does not count.
+double threadTime()
+{
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
+}
+
+double median(std::vector<double> values)
+{
+  std::sort(values.begin(), values.end());
+  return values.empty() ? NAN : values[values.size() / 2];
+}
+
+double mean(const std::vector<double> &values)
+{
+  double sum = 0;
+  for (double value : values) {
+    sum += value;
+  }
+  return sum / double(values.size());
+}
+
+struct Flight
+{
+  std::string name;
+  PinholeCamera camera;
+  Pose bMc;
+  std::vector<Frame> frames;
+};
+
+Flight readFlight(const std::string &name)
+{
+  AslSource source(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
+  Flight flight{name, source.camera(), source.bMc(), {}};
+  for (Frame frame; source.next(frame);) {
+    flight.frames.push_back(frame);
+  }
+  return flight;
+}
+
+struct Errors
+{
+  std::vector<double> direction, direction_odometry, rotation, rotation_gyro, nees_rotation,
+      nees_direction;
+};
+
+void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
+{
+  PointMotionOptions options;
+  options.use_gyro = gyro;
+  options.use_odometry = odometry;
+  PointMotion motion(flight.camera, flight.bMc, options);
+  std::map<int, Errors> errors;
+  double time = 0;
+  for (const Frame &frame : flight.frames) {
+    const double before = threadTime();
+    const auto steps = motion.process(frame);
+    time += threadTime() - before;
+    for (const RelativeMotion &step : steps) {
+      const auto cameraAt = [&](std::size_t index) {
+        return *flight.frames[index].wMb_truth * flight.bMc;
+      };
+      const Pose aMb = cameraAt(step.a_index).inverse() * cameraAt(step.b_index);
+      Errors &e = errors[step.frames_back];
+      const Eigen::Vector3d phi = logSo3(step.estimate.aRb.transpose() * aMb.R);
+      const Eigen::Vector2d tau = directionMinus(aMb.t.normalized(), step.estimate.direction);
+      if (step.gyro) {
+        const Eigen::Matrix3d cRc = flight.bMc.R.transpose() * step.gyro->R * flight.bMc.R;
+        e.rotation_gyro.push_back(logSo3(cRc.transpose() * aMb.R).norm() * kDegrees);
+      }
+      if (step.odometry) {
+        e.direction_odometry.push_back(
+            directionMinus(aMb.t.normalized(), step.odometry->normalized()).norm() * kDegrees);
+      }
+      if (step.estimate.hasDirection()) {
+        e.rotation.push_back(phi.norm() * kDegrees);
+        e.direction.push_back(tau.norm() * kDegrees);
+        const Matrix5d &S = step.estimate.covariance;
+        e.nees_rotation.push_back(phi.dot(S.topLeftCorner<3, 3>().inverse() * phi) / 3);
+        e.nees_direction.push_back(tau.dot(S.bottomRightCorner<2, 2>().inverse() * tau) / 2);
+      }
+    }
+  }
+  for (const auto &[back, e] : errors) {
+    fmt::print("{:13} {:4} {:4} {:2} | {:6.2f} -> {:5.2f} deg | {:.4f} -> {:.4f} deg | {:5.2f} "
+               "({:4.2f}) {:6.2f} ({:4.2f}) | "
+               "{:3}/{:3} | {:4.2f} ms\n",
+               flight.name, gyro ? "gyro" : "-", odometry ? "odo" : "-", back,
+               median(e.direction_odometry), median(e.direction), median(e.rotation_gyro),
+               median(e.rotation), mean(e.nees_rotation), median(e.nees_rotation),
+               mean(e.nees_direction), median(e.nees_direction), e.direction.size(),
+               flight.frames.size() - static_cast<std::size_t>(back),
+               time / double(flight.frames.size()));
+  }
+}
+
+/// Path aligned to the truth in x, y, yaw and scale, up being known from the first frame's truth.
+struct Aligned
+{
+  double ate = 0, scale = 1;
+};
+Aligned align(const Eigen::Matrix3Xd &path, const Eigen::Matrix3Xd &truth)
+{
+  const Eigen::Vector3d path_mean = path.rowwise().mean(), truth_mean = truth.rowwise().mean();
+  Eigen::Matrix3Xd p = path.colwise() - path_mean, q = truth.colwise() - truth_mean;
+  const double c = (p.topRows<2>().cwiseProduct(q.topRows<2>())).sum();
+  const double s = p.row(0).dot(q.row(1)) - p.row(1).dot(q.row(0));
+  p = expSo3({0, 0, std::atan2(s, c)}) * p;
+  const double scale = p.cwiseProduct(q).sum() / p.squaredNorm();
+  return {std::sqrt((scale * p - q).squaredNorm() / double(path.cols())), scale};
+}
+
+void comparePaths(const Flight &flight)
+{
+  PointTracker tracker(flight.camera);
+  PointOdometry odometry(flight.camera);
+  VerticalFilter vertical;
+  ScaleFromHeight scale;
+  double track_ms = 0, place_ms = 0, vertical_ms = 0, length = 0;
+  for (const Frame &frame : flight.frames) {
+    const double t0 = threadTime();
+    tracker.track(frame.image);
+    const double t1 = threadTime();
+    const auto placed = odometry.process(tracker, frame.stamp_ns);
+    const double t2 = threadTime();
+    vertical.add(placed.wMc.R, gravityFromVerticals(frame.image, flight.camera));
+    const double t3 = threadTime();
+    track_ms += t1 - t0;
+    place_ms += t2 - t1;
+    vertical_ms += t3 - t2;
+    if (placed.status == PointOdometryStatus::ok && vertical.known()) {
+      const Eigen::Vector3d up = placed.wMc.R.transpose() * vertical.up();
+      scale.add(heightOverGround(odometry.depths(), flight.camera, up), frame.wMb_truth->t.z(),
+                0.02);
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(flight.frames.size());
+  const auto path = odometry.trajectory();
+  const Eigen::Matrix3d first = flight.frames[0].wMb_truth->R * flight.bMc.R;
+  Eigen::Matrix3Xd points(3, n), filter(3, n), truth(3, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Frame &frame = flight.frames[static_cast<std::size_t>(k)];
+    points.col(k) = first * path[static_cast<std::size_t>(k)].wMc.t;
+    filter.col(k) = frame.wMb_odometry->t;
+    truth.col(k) = frame.wMb_truth->t;
+    length += k > 0 ? (truth.col(k) - truth.col(k - 1)).norm() : 0;
+  }
+  const Aligned by_points = align(points, truth), by_filter = align(filter, truth);
+  const double tilt = std::acos(std::min(1.0, (first * vertical.up()).z())) * kDegrees;
+  fmt::print("{:13} | {:.3f} m, {:.2f} % | {:.3f} m | {:.2f} deg | {:+.1f} % (sigma {:.1f} %) | "
+             "{:.2f} + {:.2f} + {:.2f} ms\n",
+             flight.name, by_points.ate, 100 * by_points.ate / length, by_filter.ate, tilt,
+             100 * (scale.metresPerUnit() / by_points.scale - 1), 100 * scale.relativeSigma(),
+             track_ms / double(n), place_ms / double(n), vertical_ms / double(n));
+}
+
+void plainVideo(const std::string &path)
+{
+  const auto source = openSource(path);
+  PointTracker tracker(source->camera());
+  PointOdometry odometry(source->camera());
+  VerticalFilter vertical;
+  std::map<std::string, int> statuses;
+  for (Frame frame; source->next(frame);) {
+    if (frame.status != FrameStatus::ok) {
+      continue;
+    }
+    tracker.track(frame.image);
+    const auto placed = odometry.process(tracker, frame.stamp_ns);
+    vertical.add(placed.wMc.R, gravityFromVerticals(frame.image, source->camera()));
+    ++statuses[toString(placed.status)];
+    fmt::print("{:6.2f} s {:13} {:3} points, sigma {:.2f} px, at {:7.3f} {:7.3f} {:7.3f}, turned "
+               "{:6.2f} deg\n",
+               1e-9 * double(frame.stamp_ns), toString(placed.status), placed.points,
+               placed.sigma_px, placed.wMc.t.x(), placed.wMc.t.y(), placed.wMc.t.z(),
+               logSo3(placed.wMc.R).norm() * kDegrees);
+  }
+  for (const auto &[status, count] : statuses) {
+    fmt::print("{} {}\n", status, count);
+  }
+  if (vertical.known()) {
+    fmt::print("up in the first camera: {:.3f} {:.3f} {:.3f}\n", vertical.up().x(),
+               vertical.up().y(), vertical.up().z());
+  }
+}
+} // namespace
+
+int main(int argc, char **argv)
+{
+  cv::setNumThreads(1);
+  if (argc > 1) {
+    plainVideo(argv[1]);
+    return 0;
+  }
+  if (!std::filesystem::exists(std::string(BOLE_SHARED_DATA_DIR) + "/rendered")) {
+    fmt::print("skipped: {}/rendered is absent\n", BOLE_SHARED_DATA_DIR);
+    return 0;
+  }
+  std::vector<Flight> flights;
+  for (const char *name : {"park-forward", "winter-weave", "pine-arc"}) {
+    flights.push_back(readFlight(name));
+  }
+  fmt::print("flight, priors, frames apart | direction, pose filter -> points (median) | rotation, "
+             "gyro -> points | "
+             "NEES a degree of freedom, rotation and direction: mean (median) | with direction | "
+             "cost of both distances\n");
+  for (const bool gyro : {true, false}) {
+    for (const bool filter : {true, false}) {
+      for (const Flight &flight : flights) {
+        compareRelativePoses(flight, gyro, filter);
+      }
+    }
+  }
+  fmt::print("\nwithout odometry and gyro: flight | ATE by points after x, y, yaw, scale | of the "
+             "pose filter | tilt of up | "
+             "scale by the ground | tracker + placing + vertical\n");
+  for (const Flight &flight : flights) {
+    comparePaths(flight);
+  }
+  return 0;
+}
