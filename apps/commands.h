@@ -13,4 +13,6 @@ void addSimulate(CLI::App &app);
 void addRecord(CLI::App &app);  ///< a live flight to disk
 void addReplay(CLI::App &app);  ///< a recorded flight, served again
 void addEmulate(CLI::App &app); ///< a sequence, served as an AR.Drone would
+void addGraph(CLI::App &app);    ///< the graph of a run
+void addSolve(CLI::App &app);    ///< the optimum of a saved graph
 } // namespace bole::apps

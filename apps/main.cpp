@@ -15,6 +15,8 @@ int main(int argc, char **argv)
   bole::apps::addRecord(app);
   bole::apps::addReplay(app);
   bole::apps::addEmulate(app);
+  bole::apps::addGraph(app);
+  bole::apps::addSolve(app);
   try {
     app.parse(argc, argv);
   }

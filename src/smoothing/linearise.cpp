@@ -260,10 +260,12 @@ bool Smoother::State::movedTooFar(const Variable &variable) const
 /// Has the estimate changed since those eliminated before last saw it?
 bool Smoother::State::worthPassing(const Variable &variable) const
 {
-  const Vector6d change = (variable.delta - variable.passed).cwiseAbs();
   const int metres = variable.is_pose ? 3 : 2;
-  return change.head(metres).maxCoeff() > options.propagation_threshold ||
-         change.tail(6 - metres).maxCoeff() > 0.2 * options.propagation_threshold;
+  for (int i = 0; i < variable.dim; ++i)
+    if (std::abs(variable.delta(i) - variable.passed(i)) >
+        (i < metres ? 1 : 0.2) * options.propagation_threshold)
+      return true;
+  return false;
 }
 
 void Smoother::State::relinearise(int v)

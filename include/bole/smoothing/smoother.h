@@ -59,15 +59,16 @@ struct SmootherOptions
   double relinearise_lean = 0.005;      ///< tan
   /// One that moved farther is linearised again when some factor's true residual is off its linear
   /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
-  /// stretch of the flight, and changes no view in it, costs nothing. Default: errors of a view
-  /// stay far below its noise.
-  double linearisation_tolerance = 0.05;
+  /// stretch of the flight, and changes no view in it, costs nothing. Default: trunks stay
+  /// within a tenth of their standard deviation of the batch optimum.
+  double linearisation_tolerance = 0.2;
   /// Changes of a variable below this are not passed on to the variables eliminated before it: [m]
   /// for positions, a fifth of it [rad, relative] for rotations, log radius and lean. >= 0; 0
-  /// passes all. Default: no user of a map notices a millimetre.
-  double propagation_threshold = 1e-3;
-  /// Gauss-Newton iterations in one update(), >= 1. Default: new trunks settle in 2 or 3.
-  int max_iterations = 5;
+  /// passes all. Default: well below the error of a well-seen trunk.
+  double propagation_threshold = 5e-3;
+  /// Gauss-Newton iterations in one update(), >= 1. Default: the next frame goes on with
+  /// what has not settled.
+  int max_iterations = 2;
 
   /// Robust loss on summary factors. Default: a wrongly associated view is off by tens of sigmas,
   /// and must not bend the map; at 3 sigma of 4 numbers a good view keeps most of its weight.

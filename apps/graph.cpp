@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// `bole graph`: what the smoother of a run was given and what it made of it.
+#include "commands.h"
+
+#include <bole/smoothing/g2o.h>
+
+#include <algorithm>
+#include <fmt/core.h>
+
+namespace bole::apps
+{
+namespace
+{
+void printStatistics(const Graph &graph)
+{
+  std::vector<std::size_t> views(graph.trunks.size(), 0);
+  for (const Graph::ObservationEdge &edge : graph.observations)
+    ++views[edge.trunk];
+  std::sort(views.begin(), views.end());
+  double length = 0;
+  for (std::size_t i = 1; i < graph.poses.size(); ++i)
+    length += (graph.poses[i].wMb.t - graph.poses[i - 1].wMb.t).norm();
+  fmt::print("poses      {} over {:.2f} m\n", graph.poses.size(), length);
+  fmt::print("trunks     {}\n", graph.trunks.size());
+  fmt::print("summaries  {}", graph.observations.size());
+  if (!views.empty())
+    fmt::print(", {} to {} a trunk, median {}", views.front(), views.back(),
+               views[views.size() / 2]);
+  fmt::print("\nodometry   {}\ndirections {}\nheights    {}\npriors     {}\n",
+             graph.odometry.size(), graph.relative_poses.size(), graph.heights.size(),
+             graph.pose_priors.size());
+  fmt::print("cost       {:.9g}\n", cost(graph));
+}
+} // namespace
+
+void addGraph(CLI::App &app)
+{
+  struct Arguments
+  {
+    std::string run, output;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App *command = app.add_subcommand("graph", "Statistics and export of the graph of a run");
+  command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")
+      ->required();
+  command->add_option("--export", arguments->output, "write the graph here, in g2o text");
+  command->footer("Example:\n  bole graph run --export forest.g2o");
+  command->callback([arguments] {
+    const Graph graph = readG2o(arguments->run + "/graph.g2o");
+    printStatistics(graph);
+    if (!arguments->output.empty())
+      writeG2o(arguments->output, graph);
+  });
+}
+} // namespace bole::apps

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/smoothing/g2o.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <fmt/core.h>
+#include <fstream>
+#include <functional>
+#include <istream>
+#include <sstream>
+#include <unordered_map>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+class Reader
+{
+public:
+  Reader(std::istream &in, const std::string &name) : m_in(in), m_name(name) {}
+
+  Graph read()
+  {
+    std::string line;
+    while (std::getline(m_in, line)) {
+      ++m_line;
+      m_fields.clear();
+      m_next = 0;
+      std::istringstream words(line.substr(0, line.find('#')));
+      for (std::string word; words >> word;)
+        m_fields.push_back(word);
+      if (!m_fields.empty())
+        readLine();
+    }
+    resolveEdges();
+    try {
+      validate(m_graph);
+    }
+    catch (const vpException &error) {
+      throw vpException(vpException::badValue, "%s: %s", m_name.c_str(), error.what());
+    }
+    return std::move(m_graph);
+  }
+
+private:
+  [[noreturn]] void fail(const std::string &why) const
+  {
+    throw vpException(vpException::badValue, "%s:%zu: %s", m_name.c_str(), m_line, why.c_str());
+  }
+
+  std::string word()
+  {
+    if (m_next >= m_fields.size())
+      fail(m_fields[0] + ": the line ends too early");
+    return m_fields[m_next++];
+  }
+  double number()
+  {
+    const std::string text = word();
+    char *end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (end != text.c_str() + text.size() || !std::isfinite(value))
+      fail(fmt::format("{}: {} = {}, must be a finite number", m_fields[0], m_next - 1, text));
+    return value;
+  }
+  std::int64_t id()
+  {
+    const std::string text = word();
+    char *end = nullptr;
+    const long long value = std::strtoll(text.c_str(), &end, 10);
+    if (end != text.c_str() + text.size() || value < 0)
+      fail(fmt::format("{}: id = {}, must be a whole number of at least 0", m_fields[0], text));
+    return value;
+  }
+  template <int N> Eigen::Matrix<double, N, 1> vector()
+  {
+    Eigen::Matrix<double, N, 1> v;
+    for (int i = 0; i < N; ++i)
+      v(i) = number();
+    return v;
+  }
+  Eigen::Matrix3d rotation()
+  {
+    const Eigen::Vector4d q = vector<4>();
+    if (!(std::abs(q.norm() - 1) < 1e-3))
+      fail(fmt::format("{}: quaternion of length {:.6g}, must have length 1", m_fields[0],
+                       q.norm()));
+    return Eigen::Quaterniond(q(3), q(0), q(1), q(2)).normalized().toRotationMatrix();
+  }
+  Pose pose()
+  {
+    const Eigen::Vector3d t = vector<3>();
+    return {rotation(), t};
+  }
+  template <int N> Eigen::Matrix<double, N, N> upper()
+  {
+    Eigen::Matrix<double, N, N> m;
+    for (int r = 0; r < N; ++r)
+      for (int c = r; c < N; ++c)
+        m(r, c) = m(c, r) = number();
+    return m;
+  }
+  template <int N>
+  Eigen::Matrix<double, N, N> positiveDefinite(const Eigen::Matrix<double, N, N> &m)
+  {
+    if (Eigen::LLT<Eigen::Matrix<double, N, N>>(m).info() != Eigen::Success)
+      fail(m_fields[0] + ": matrix, must be positive definite");
+    return m;
+  }
+  Matrix6d covariance()
+  {
+    Vector6d scale;
+    scale << 1, 1, 1, 0.5, 0.5, 0.5;
+    const Matrix6d information =
+        scale.asDiagonal() * positiveDefinite<6>(upper<6>()) * scale.asDiagonal();
+    const Matrix6d inverse = information.inverse();
+    return positiveDefinite<6>(0.5 * (inverse + inverse.transpose()));
+  }
+  Trunk trunk()
+  {
+    const Vector5d v = vector<5>();
+    return {v.head<2>(), v(2), v.tail<2>()};
+  }
+
+  void readLine()
+  {
+    const std::string tag = word();
+    if (tag == "VERTEX_SE3:QUAT")
+      readPose();
+    else if (tag == "VERTEX_TRUNK")
+      readTrunk();
+    else if (tag == "EDGE_SE3:QUAT")
+      readOdometry();
+    else if (tag == "EDGE_SE3_PRIOR:QUAT")
+      readPosePrior();
+    else if (tag == "EDGE_TRUNK_SUMMARY")
+      readSummary();
+    else if (tag == "EDGE_DIRECTION")
+      readDirection();
+    else if (tag == "EDGE_HEIGHT")
+      readHeight();
+    else if (tag == "PARAMS_SE3OFFSET")
+      id(), m_graph.bMc = pose();
+    else if (tag == "LOSS")
+      readLoss();
+    else
+      fail("tag = " + tag + ", must be one of those of <bole/smoothing/g2o.h>");
+    if (m_next != m_fields.size())
+      fail(fmt::format("{}: {} fields, must be {}", tag, m_fields.size(), m_next));
+  }
+
+  std::int64_t newId()
+  {
+    const std::int64_t name = id();
+    const auto [at, fresh] = m_line_of.emplace(name, m_line);
+    if (!fresh)
+      fail(fmt::format("id = {}, must not be that of line {}", name, at->second));
+    return name;
+  }
+  void readPose()
+  {
+    const std::int64_t name = newId();
+    m_pose_of[name] = m_graph.poses.size();
+    m_graph.poses.push_back({name, pose()});
+  }
+  void readTrunk()
+  {
+    const std::int64_t name = newId();
+    Graph::TrunkVertex vertex;
+    vertex.id = name;
+    vertex.trunk = trunk();
+    vertex.prior.mean = trunk();
+    vertex.prior.sigma = vector<5>();
+    if (!(vertex.prior.sigma.array() > 0).all())
+      fail("VERTEX_TRUNK: sigma, must be above 0");
+    m_trunk_of[name] = m_graph.trunks.size();
+    m_graph.trunks.push_back(vertex);
+  }
+  void readOdometry()
+  {
+    Graph::OdometryEdge edge;
+    const std::int64_t a = id(), b = id();
+    if (a == b)
+      fail("EDGE_SE3:QUAT: must be between two poses");
+    edge.odometry.aMb = pose();
+    edge.odometry.covariance = covariance();
+    m_graph.odometry.push_back(edge);
+    later([this, a, b, i = m_graph.odometry.size() - 1] {
+      m_graph.odometry[i].a = find(m_pose_of, a, "pose");
+      m_graph.odometry[i].b = find(m_pose_of, b, "pose");
+    });
+  }
+  void readPosePrior()
+  {
+    Graph::PosePriorEdge edge;
+    const std::int64_t a = id();
+    edge.prior.mean = pose();
+    edge.prior.covariance = covariance();
+    m_graph.pose_priors.push_back(edge);
+    later([this, a, i = m_graph.pose_priors.size() - 1] {
+      m_graph.pose_priors[i].pose = find(m_pose_of, a, "pose");
+    });
+  }
+  void readSummary()
+  {
+    Graph::ObservationEdge edge;
+    const std::int64_t a = id(), b = id();
+    edge.summary.optimum.cRt = rotation();
+    edge.summary.optimum.log_ratio = number();
+    edge.summary.energy = number();
+    edge.summary.f = vector<4>();
+    edge.summary.F = upper<4>();
+    SquareRootSummary root;
+    const SummaryStatus status = squareRoot(edge.summary, root);
+    if (status == SummaryStatus::indefinite)
+      fail("EDGE_TRUNK_SUMMARY: F, must be positive semi-definite");
+    if (status == SummaryStatus::not_finite)
+      fail("EDGE_TRUNK_SUMMARY: log(r/d), must be below 0");
+    m_graph.observations.push_back(edge);
+    later([this, a, b, i = m_graph.observations.size() - 1] {
+      m_graph.observations[i].pose = find(m_pose_of, a, "pose");
+      m_graph.observations[i].trunk = find(m_trunk_of, b, "trunk");
+    });
+  }
+  void readDirection()
+  {
+    Graph::RelativePoseEdge edge;
+    const std::int64_t a = id(), b = id();
+    if (a == b)
+      fail("EDGE_DIRECTION: must be between two poses");
+    edge.measurement.caRcb = rotation();
+    edge.measurement.direction = vector<3>();
+    if (!(std::abs(edge.measurement.direction.norm() - 1) < 1e-3))
+      fail("EDGE_DIRECTION: direction, must have length 1");
+    edge.measurement.direction.normalize();
+    edge.measurement.covariance = positiveDefinite<5>(upper<5>());
+    m_graph.relative_poses.push_back(edge);
+    later([this, a, b, i = m_graph.relative_poses.size() - 1] {
+      m_graph.relative_poses[i].a = find(m_pose_of, a, "pose");
+      m_graph.relative_poses[i].b = find(m_pose_of, b, "pose");
+    });
+  }
+  void readHeight()
+  {
+    Graph::HeightEdge edge;
+    const std::int64_t a = id();
+    edge.height.z = number();
+    edge.height.sigma = number();
+    if (!(edge.height.sigma > 0))
+      fail("EDGE_HEIGHT: sigma, must be above 0");
+    m_graph.heights.push_back(edge);
+    later([this, a, i = m_graph.heights.size() - 1] {
+      m_graph.heights[i].pose = find(m_pose_of, a, "pose");
+    });
+  }
+  void readLoss()
+  {
+    const std::string which = word(), kind = word();
+    if (which != "summary" && which != "direction")
+      fail("LOSS: " + which + ", must be summary or direction");
+    Loss loss;
+    try {
+      loss.kind = lossKindFromString(kind);
+    }
+    catch (const vpException &error) {
+      fail(error.what());
+    }
+    loss.width = number();
+    if (!(loss.width > 0))
+      fail("LOSS: width, must be above 0");
+    (which == "summary" ? m_graph.summary_loss : m_graph.direction_loss) = loss;
+  }
+
+  /// Edges may stand before their vertices: names are looked up at the end, errors keep their line.
+  void later(std::function<void()> resolve) { m_later.emplace_back(m_line, std::move(resolve)); }
+  void resolveEdges()
+  {
+    for (const auto &[line, resolve] : m_later) {
+      m_line = line;
+      resolve();
+    }
+  }
+  std::size_t find(const std::unordered_map<std::int64_t, std::size_t> &names, std::int64_t name,
+                   const char *kind) const
+  {
+    const auto at = names.find(name);
+    if (at == names.end())
+      fail(fmt::format("id = {}, must be that of a {}", name, kind));
+    return at->second;
+  }
+
+  std::istream &m_in;
+  std::string m_name;
+  std::size_t m_line = 0, m_next = 0;
+  std::vector<std::string> m_fields;
+  Graph m_graph;
+  std::unordered_map<std::int64_t, std::size_t> m_line_of, m_pose_of, m_trunk_of;
+  std::vector<std::pair<std::size_t, std::function<void()>>> m_later;
+};
+} // namespace
+
+Graph readG2o(std::istream &in, const std::string &name) { return Reader(in, name).read(); }
+
+Graph readG2o(const std::string &path)
+{
+  std::ifstream in(path);
+  if (!in)
+    throw vpException(vpException::ioError, "%s, must be a readable file", path.c_str());
+  return readG2o(in, path);
+}
+} // namespace bole
