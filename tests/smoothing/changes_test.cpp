@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Removing, merging, outliers and the lag.
+#include "support/dense_reference.h"
+#include "support/flight.h"
+
+#include <gmock/gmock.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+using test::DenseReference;
+using test::Flight;
+using test::FlightOptions;
+using test::Replay;
+using test::simulateFlight;
+using test::smootherFor;
+
+FlightOptions shortFlight()
+{
+  FlightOptions o;
+  o.poses = 60;
+  return o;
+}
+
+TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
+{
+  const Flight flight = simulateFlight(shortFlight());
+  Replay replay(flight, smootherFor(shortFlight()));
+  replay.run();
+  const std::size_t trunks = replay.smoother.graph().trunks.size();
+
+  replay.smoother.removeTrunk(1);
+  replay.smoother.update();
+  replay.smoother.optimize();
+
+  DenseReference dense(replay.smoother.graph());
+  EXPECT_EQ(dense.graph().trunks.size(), trunks - 1);
+  EXPECT_NEAR(replay.smoother.cost(), dense.solve(), 1e-6 * dense.solve());
+  EXPECT_FALSE(replay.smoother.hasTrunk(1));
+  EXPECT_THROW(replay.smoother.trunk(1), vpException);
+}
+
+TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
+{
+  const Flight flight = simulateFlight(shortFlight());
+  Replay whole(flight, smootherFor(shortFlight())), halves(flight, smootherFor(shortFlight()));
+  whole.run();
+  std::vector<int> first;
+  for (int i = 0; i < 60; ++i) {
+    if (i == 20) { // from here on every trunk counts as new
+      first = halves.trunk_id;
+      halves.trunk_id.assign(flight.trunks.size(), -1);
+    }
+    halves.step();
+  }
+
+  for (std::size_t j = 0; j < first.size(); ++j)
+    if (first[j] >= 0 && halves.trunk_id[j] >= 0)
+      halves.smoother.mergeTrunks(first[j], halves.trunk_id[j]);
+  halves.smoother.update();
+  halves.smoother.optimize();
+  whole.smoother.optimize();
+
+  EXPECT_EQ(halves.smoother.observationCount(), whole.smoother.observationCount());
+  for (std::size_t j = 0; j < first.size(); ++j)
+    if (first[j] >= 0) {
+      EXPECT_LT(
+          halves.smoother.trunk(first[j]).minus(whole.smoother.trunk(whole.trunk_id[j])).norm(),
+          2e-3);
+    }
+}
+
+TEST(Changes, WronglyAssociatedViewsDoNotBendTheMap)
+{
+  FlightOptions clean = shortFlight(), dirty = shortFlight();
+  dirty.outliers = 0.03;
+  const Flight flight = simulateFlight(dirty);
+  Replay robust(flight, smootherFor(clean));
+  SmootherOptions quadratic = smootherFor(clean);
+  quadratic.summary_loss.kind = LossKind::quadratic;
+  Replay plain(flight, quadratic);
+  robust.run();
+  plain.run();
+
+  const auto error = [&](Replay &replay) {
+    replay.smoother.optimize();
+    double sum = 0;
+    for (int i = 0; i < 60; ++i)
+      sum += replay.smoother.pose(i).minus(flight.truth[i]).head<3>().squaredNorm();
+    return std::sqrt(sum / 60);
+  };
+  EXPECT_LT(error(robust), 0.5 * error(plain));
+}
+
+TEST(Changes, TheLagClosesOldPosesAndStaysNearTheFullSmoother)
+{
+  FlightOptions o;
+  o.poses = 200;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions lagged = smootherFor(o);
+  lagged.fixed_lag = 60;
+  Replay full(flight, smootherFor(o)), window(flight, lagged);
+  full.run();
+  window.run();
+
+  const Graph open = window.smoother.graph();
+  EXPECT_LE(open.poses.size(), 62u);
+  const Vector6d apart = window.smoother.pose(199).minus(full.smoother.pose(199));
+  const Matrix6d C = full.smoother.currentPoseCovariance();
+  for (int i = 0; i < 6; ++i)
+    EXPECT_LT(std::abs(apart(i)), std::sqrt(C(i, i))) << i;
+  EXPECT_TRUE(window.smoother.poseCovariance(3).allFinite());
+  EXPECT_NEAR(std::sqrt(window.smoother.currentPoseCovariance()(0, 0) / C(0, 0)), 1, 0.1);
+}
+
+TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
+{
+  FlightOptions o;
+  o.poses = 260;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions lagged = smootherFor(o);
+  lagged.fixed_lag = 20;
+  Replay window(flight, lagged);
+  window.run();
+  const Trunk before = window.smoother.trunk(0);
+  SummaryFactor view;
+  view.optimum = window.smoother.predictedRelative(0);
+  view.F *= 1e4;
+
+  EXPECT_EQ(window.smoother.addObservation(259, 0, view), SummaryStatus::ok);
+  window.smoother.update();
+
+  EXPECT_LT(window.smoother.trunk(0).minus(before).norm(), 0.05);
+}
+} // namespace
+} // namespace bole

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/so3.h>
+#include <bole/smoothing/smoother.h>
+
+#include <functional>
+#include <gmock/gmock.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Largest difference of \p J to central differences, at two steps: falls with the square of the
+/// step.
+void expectDerivative(const std::function<VectorXd(const VectorXd &)> &f, const MatrixXd &J,
+                      double coarse = 1e-2)
+{
+  double error[2];
+  for (int k = 0; k < 2; ++k) {
+    const double h = k == 0 ? coarse : coarse / 2;
+    error[k] = 0;
+    for (int c = 0; c < J.cols(); ++c) {
+      const VectorXd up = f(h * VectorXd::Unit(J.cols(), c)),
+                     down = f(-h * VectorXd::Unit(J.cols(), c));
+      error[k] = std::max(error[k], ((up - down) / (2 * h) - J.col(c)).cwiseAbs().maxCoeff());
+    }
+  }
+  EXPECT_LT(error[0], 2e-3 * (1 + J.cwiseAbs().maxCoeff()));
+  if (error[0] > 1e-8) {
+    EXPECT_NEAR(error[0] / error[1], 4, 0.5);
+  }
+}
+
+const Pose kA(expSo3({0.1, -0.2, 0.5}), {1, 2, 3});
+const Pose kB(expSo3({0.3, 0.1, 0.7}), {2, 2.5, 3.2});
+const Pose kMc(SmootherOptions::forwardCamera().R *expSo3({0.05, 0.02, 0.01}), {0.1, 0.02, -0.03});
+
+TEST(Factors, OdometryJacobiansAgreeWithDifferences)
+{
+  Odometry o;
+  o.aMb = (kA.inverse() * kB).plus(0.1 * Vector6d::Ones());
+  const Matrix6d S = Vector6d(1, 2, 3, 4, 5, 6).asDiagonal();
+  Matrix6d J_a, J_b;
+  residual(o, S, kA, kB, &J_a, &J_b);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(o, S, kA.plus(d), kB, nullptr, nullptr); }, J_a);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(o, S, kA, kB.plus(d), nullptr, nullptr); }, J_b);
+}
+
+TEST(Factors, RelativePoseJacobiansAgreeWithDifferences)
+{
+  RelativePoseMeasurement m;
+  m.caRcb = (kMc.inverse() * kA.inverse() * kB * kMc).R * expSo3({0.1, 0.05, -0.1});
+  m.direction = Eigen::Vector3d(0.5, 0.2, 0.8).normalized();
+  const Matrix5d S = Matrix5d::Identity();
+  Matrix56d J_a, J_b;
+  residual(m, S, kMc, kA, kB, &J_a, &J_b);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(m, S, kMc, kA.plus(d), kB, nullptr, nullptr); },
+      J_a);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(m, S, kMc, kA, kB.plus(d), nullptr, nullptr); },
+      J_b);
+}
+
+TEST(Factors, ARelativePoseEqualToThePredictionHasNoResidual)
+{
+  const Pose caMcb = kMc.inverse() * kA.inverse() * kB * kMc;
+  RelativePoseMeasurement m;
+  m.caRcb = caMcb.R;
+  m.direction = caMcb.t.normalized();
+  EXPECT_LT(residual(m, Matrix5d::Identity(), kMc, kA, kB, nullptr, nullptr).norm(), 1e-9);
+}
+
+TEST(Factors, PosePriorAndHeightJacobiansAgreeWithDifferences)
+{
+  const PosePrior prior = {kA, Matrix6d::Identity()};
+  const Matrix6d S = Matrix6d::Identity();
+  Matrix6d J;
+  residual(prior, S, kB, &J);
+  expectDerivative([&](const VectorXd &d) { return residual(prior, S, kB.plus(d), nullptr); }, J);
+  Matrix16d J_height;
+  residual(Height{1, 0.1}, kB, &J_height);
+  expectDerivative(
+      [&](const VectorXd &d) {
+        return VectorXd::Constant(1, residual(Height{1, 0.1}, kB.plus(d), nullptr));
+      },
+      J_height);
+}
+
+TEST(Factors, SummaryJacobiansAgreeWithDifferences)
+{
+  Trunk trunk;
+  trunk.xy << 6, 4;
+  trunk.lean << 0.05, -0.03;
+  SummaryFactor summary;
+  summary.optimum = relativeTrunk(kA, kMc, trunk).plus(Vector4d(0.1, -0.1, 0.2, 0.3));
+  summary.F << 5, 1, 0, 0, 1, 4, 0, 0, 0, 0, 3, 1, 0, 0, 1, 2;
+  summary.f << 0.1, 0.2, -0.1, 0.3;
+  SquareRootSummary root;
+  ASSERT_EQ(squareRoot(summary, root), SummaryStatus::ok);
+  Matrix46d J_pose;
+  Matrix45d J_trunk;
+  residual(root, kMc, kA, trunk, &J_pose, &J_trunk);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(root, kMc, kA.plus(d), trunk, nullptr, nullptr); },
+      J_pose);
+  expectDerivative(
+      [&](const VectorXd &d) { return residual(root, kMc, kA, trunk.plus(d), nullptr, nullptr); },
+      J_trunk);
+  const RelativeTrunk relative = relativeTrunk(kA, kMc, trunk);
+  EXPECT_NEAR(0.5 * root.residual(relative).squaredNorm() + root.constant,
+              summary.energyAt(relative), 1e-12);
+  EXPECT_TRUE((root.S.transpose() * root.S).isApprox(summary.F, 1e-12));
+}
+
+TEST(Losses, WeightIsTheDerivativeOfRhoAndNeverRises)
+{
+  for (const LossKind kind : {LossKind::quadratic, LossKind::huber, LossKind::cauchy}) {
+    const Loss loss = {kind, 2};
+    EXPECT_EQ(loss.rho(0), 0);
+    EXPECT_EQ(loss.weight(0), 1);
+    EXPECT_EQ(lossKindFromString(toString(kind)), kind);
+    double last = 1;
+    for (double s = 0.5; s < 50; s *= 1.7) {
+      EXPECT_NEAR((loss.rho(s + 1e-5) - loss.rho(s - 1e-5)) / 2e-5, loss.weight(s), 1e-6);
+      EXPECT_LE(loss.weight(s), last);
+      last = loss.weight(s);
+    }
+  }
+  EXPECT_THROW(lossKindFromString("tukey"), vpException);
+}
+} // namespace
+} // namespace bole
