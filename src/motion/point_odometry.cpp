@@ -84,6 +84,7 @@ struct PointOdometry::State
 
   double focal() const { return std::sqrt(camera.fx * camera.fy); }
   PointOdometryResult begin(const PointTracker &tracker);
+  double unexplainedByTurning(const std::vector<PointMatch> &matches) const;
   bool start(const PointTracker &tracker, const RelativePoseEstimate &first, int back);
   PointOdometryResult place(bool turned_known);
   void assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
@@ -208,7 +209,18 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     prior.rotation_covariance = turned->covariance();
   }
   const auto estimate = estimateRelativePose(matches, camera, prior, options.relative_pose);
-  if (estimate.hasRotation()) {
+  const double wanted_px = options.start_parallax_deg * kDegree * focal();
+  const bool translates =
+      options.focal_known ||
+      unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
+  if (!translates && matches.size() >= 6) {
+    // What looks like a flight past a wall is taken for a pan.
+    wMc.R = window.front().wMc.R *
+            motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
+                                options.min_sigma_px / focal(), options.relative_pose)
+                .aRb;
+  }
+  else if (estimate.hasRotation()) {
     wMc.R = window.front().wMc.R * estimate.aRb;
   }
   records[now].key = window.front().frame;
@@ -218,8 +230,8 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   result.sigma_px = estimate.sigma_px;
   const double direction_sigma =
       std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
-  if (estimate.hasDirection() && direction_sigma < options.start_sigma_deg * kDegree &&
-      estimate.parallax_px > options.start_parallax_deg * kDegree * focal() &&
+  if (translates && estimate.hasDirection() &&
+      direction_sigma < options.start_sigma_deg * kDegree && estimate.parallax_px > wanted_px &&
       start(tracker, estimate, back)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
@@ -232,6 +244,23 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     restart();
   }
   return result;
+}
+
+/// Flow [px] of the bulk of the matches that a rotation leaves, at the focal length that leaves
+/// least.
+double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> &matches) const
+{
+  double least = 1e9;
+  for (const double factor : {0.7, 0.85, 1.0, 1.3, 1.7, 2.2, 3.0}) {
+    PinholeCamera other = camera;
+    other.fx *= factor;
+    other.fy *= factor;
+    const double pixel = 1 / (factor * focal());
+    const auto fit = motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}),
+                                         0.05 * pixel, options.relative_pose);
+    least = std::min(least, fit.sigma / pixel);
+  }
+  return least;
 }
 
 bool PointOdometry::State::start(const PointTracker &tracker, const RelativePoseEstimate &first,

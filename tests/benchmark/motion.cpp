@@ -190,7 +190,9 @@ void plainVideo(const std::string &path)
 {
   const auto source = openSource(path);
   PointTracker tracker(source->camera());
-  PointOdometry odometry(source->camera());
+  PointOdometryOptions options;
+  options.focal_known = false; // openSource() guesses it
+  PointOdometry odometry(source->camera(), options);
   VerticalFilter vertical;
   std::map<std::string, int> statuses;
   for (Frame frame; source->next(frame);) {

@@ -36,10 +36,14 @@ struct PointOdometryOptions
       0.5; ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
   double start_parallax_deg = 1; ///< of the first baseline, > 0
   double start_sigma_deg = 3; ///< the first baseline's direction must be known as well as this, > 0
-  int min_points = 12;        ///< seen with a known depth, to place a frame; >= 6
-  int iterations = 6;         ///< of the bundle adjustment a frame, 1 .. 100
-  double min_sigma_px = 0.1;  ///< floor of the observation noise, > 0
-  double inflation = 3;       ///< as RelativePoseOptions::inflation, >= 1
+  /// False where the focal length is a guess: a pan past a wall then looks like a sideways flight,
+  /// so a start also needs flow that no rotation explains under any focal length from 0.7 to 3
+  /// times the guess.
+  bool focal_known = true;
+  int min_points = 12;               ///< seen with a known depth, to place a frame; >= 6
+  int iterations = 6;                ///< of the bundle adjustment a frame, 1 .. 100
+  double min_sigma_px = 0.1;         ///< floor of the observation noise, > 0
+  double inflation = 3;              ///< as RelativePoseOptions::inflation, >= 1
   RelativePoseOptions relative_pose; ///< of the start
 
   /// Throws vpException: "point_odometry.name = value, must be ...".

@@ -31,9 +31,9 @@ struct PointOptions
   double quality = 0.01;      ///< of a corner against the strongest of the image, 0 .. 1
   double min_response =
       1e-5; ///< smallest eigenvalue of the gradient moments of a corner, grey 0 .. 1, >= 0
-  int window_px = 13;  ///< side of the Lucas-Kanade window, odd, 5 .. 51
+  int window_px = 11;  ///< side of the Lucas-Kanade window, odd, 5 .. 51
   int levels = 3;      ///< pyramid levels above the image, 0 .. 6: 3 follow 20 px a frame and more
-  int iterations = 15; ///< of Lucas-Kanade a level, 1 .. 100
+  int iterations = 10; ///< of Lucas-Kanade a level, 1 .. 100
   double max_backward_px = 0.3; ///< forward-backward error above which a track ends, > 0
   double margin_px = 4;         ///< from the border of the image, >= 0
   int history = 32;             ///< frames a track remembers, 2 .. 1000
