@@ -92,7 +92,8 @@ struct ArDroneEmulator::State
   {
     video_socket = generation == 2 ? Socket::listenTcp(options.host, options.video_port)
                                    : Socket::bindUdp(options.host, options.video_port);
-    options.video_port = video_socket.localPort(); // the same again after a reboot
+    if (options.video_port == 0) // once: the same again after a reboot
+      options.video_port = video_socket.localPort();
   }
 
   double chance() { return std::uniform_real_distribution<double>(0, 1)(random); }

@@ -85,12 +85,18 @@ struct Decoder
   /// Moves to the next start code on a byte; its number, or nothing at the end.
   std::optional<std::uint32_t> findStartCode()
   {
+    const bool padded = bits.peek(static_cast<int>((8 - bits.position() % 8) % 8)) == 0;
+    if (!padded)
+      complain("bits behind a group");
     bits.alignToByte();
-    for (; bits.position() + 22 <= bits.size(); bits.skip(8))
+    for (; bits.position() + 22 <= bits.size(); bits.skip(8)) {
       if (const std::uint32_t code = bits.peek(22); (code >> 5) == 1) {
         bits.skip(22);
         return code & 0x1f;
       }
+      if (bits.peek(8) != 0)
+        complain("bytes behind a group"); // only zeros fill its last word
+    }
     return std::nullopt;
   }
 

@@ -4,8 +4,10 @@
 #include <bole/ardrone/uvlc.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -17,8 +19,11 @@ class BitSink
 public:
   void put(std::uint32_t value, int count)
   {
-    for (int i = count - 1; i >= 0; --i)
-      m_bits.push_back(((value >> i) & 1u) != 0);
+    for (int i = count - 1; i >= 0; --i) {
+      m_word = 2 * m_word + ((value >> i) & 1u);
+      if (++m_used == 32)
+        flush();
+    }
   }
   /// A magnitude of at least 1 as the guide's tables print it: as many zeros as it has binary
   /// digits, then its binary digits (the first of which is the one).
@@ -33,25 +38,27 @@ public:
   }
   void padToWord()
   {
-    while (m_bits.size() % 32 != 0)
-      m_bits.push_back(false);
+    if (m_used > 0)
+      put(0, 32 - m_used);
   }
   std::vector<std::uint8_t> bytes()
   {
     padToWord();
-    std::vector<std::uint8_t> out;
-    for (std::size_t word = 0; word < m_bits.size(); word += 32) {
-      std::uint32_t value = 0;
-      for (std::size_t i = 0; i < 32; ++i)
-        value = 2 * value + (m_bits[word + i] ? 1 : 0);
-      for (int shift = 0; shift < 32; shift += 8)
-        out.push_back(static_cast<std::uint8_t>(value >> shift));
-    }
-    return out;
+    return std::move(m_bytes);
   }
 
 private:
-  std::vector<bool> m_bits;
+  void flush()
+  {
+    for (int shift = 0; shift < 32; shift += 8)
+      m_bytes.push_back(static_cast<std::uint8_t>(m_word >> shift));
+    m_word = 0;
+    m_used = 0;
+  }
+
+  std::vector<std::uint8_t> m_bytes;
+  std::uint32_t m_word = 0;
+  int m_used = 0;
 };
 
 /// (row, column) along the anti-diagonals, turning at the edges.
@@ -67,45 +74,45 @@ std::vector<std::pair<int, int>> diagonalWalk()
   return walk;
 }
 
-double cosine(int x, int u)
-{
-  static const std::vector<double> table = [] {
-    std::vector<double> t(64);
-    for (int i = 0; i < 64; ++i)
-      t[static_cast<std::size_t>(i)] = std::cos((2 * (i / 8) + 1) * (i % 8) * std::acos(-1.0) / 16);
-    return t;
-  }();
-  return table[static_cast<std::size_t>(x * 8 + u)];
-}
-
-/// Quantised coefficients of the 8x8 block whose pixel (x, y) is pixel(x, y), in the order of the
-/// stream.
-template <typename Pixel> std::vector<int> transform(const Pixel &pixel)
-{
-  static const auto walk = diagonalWalk();
-  double columns[8][8] = {}; // over y, for each x
+/// cosine[x][u] = cos((2x + 1) u pi / 16), for a block a product a coefficient and pixel.
+using Cosines = std::array<std::array<double, 8>, 8>;
+const Cosines kCosine = [] {
+  Cosines table{};
   for (int x = 0; x < 8; ++x)
-    for (int v = 0; v < 8; ++v)
-      for (int y = 0; y < 8; ++y)
-        columns[x][v] += pixel(x, y) * cosine(y, v);
-  std::vector<int> levels;
-  for (const auto &[v, u] : walk) {
+    for (int u = 0; u < 8; ++u)
+      table[x][u] = std::cos((2 * x + 1) * u * std::acos(-1.0) / 16);
+  return table;
+}();
+const std::vector<std::pair<int, int>> kWalk = diagonalWalk();
+
+using Block = std::array<double, 64>; // pixels, row by row
+using Levels = std::array<int, 64>;   // quantised, in the order of the stream
+
+Levels transform(const Block &pixels)
+{
+  std::array<double, 64> columns{}; // [v][x]: the sum over y
+  for (int v = 0; v < 8; ++v)
+    for (int y = 0; y < 8; ++y)
+      for (int x = 0; x < 8; ++x)
+        columns[v * 8 + x] += pixels[y * 8 + x] * kCosine[y][v];
+  Levels levels{};
+  std::size_t position = 0;
+  for (const auto &[v, u] : kWalk) {
     double sum = 0;
     for (int x = 0; x < 8; ++x)
-      sum += columns[x][v] * cosine(x, u);
+      sum += columns[v * 8 + x] * kCosine[x][u];
     const double scale = 0.25 * (u == 0 ? std::sqrt(0.5) : 1) * (v == 0 ? std::sqrt(0.5) : 1);
-    const int step = 3 + 2 * (u + v);
-    levels.push_back(static_cast<int>(std::lround(sum * scale / step)));
+    levels[position++] = static_cast<int>(std::lround(sum * scale / (3 + 2 * (u + v))));
   }
   return levels;
 }
 
-bool hasDetail(const std::vector<int> &levels)
+bool hasDetail(const Levels &levels)
 {
   return std::any_of(levels.begin() + 1, levels.end(), [](int level) { return level != 0; });
 }
 
-void putBlock(BitSink &sink, const std::vector<int> &levels)
+void putBlock(BitSink &sink, const Levels &levels)
 {
   sink.put(static_cast<std::uint32_t>(levels[0]), 10);
   if (!hasDetail(levels))
@@ -151,25 +158,36 @@ Size sizeCode(unsigned width, unsigned height)
       height);
 }
 
+Block pixelsAt(const vpImage<unsigned char> &image, int left, int top)
+{
+  Block pixels{};
+  for (int y = 0; y < 8; ++y) {
+    const unsigned char *row = image[std::min(top + y, static_cast<int>(image.getHeight()) - 1)];
+    for (int x = 0; x < 8; ++x)
+      pixels[y * 8 + x] = row[std::min(left + x, static_cast<int>(image.getWidth()) - 1)];
+  }
+  return pixels;
+}
+
 void putMacroblock(BitSink &sink, const vpImage<unsigned char> &image, int left, int top)
 {
-  const auto at = [&image](int x, int y) {
-    const int row = std::min(y, static_cast<int>(image.getHeight()) - 1);
-    const int column = std::min(x, static_cast<int>(image.getWidth()) - 1);
-    return static_cast<double>(image[row][column]);
-  };
-  std::vector<std::vector<int>> blocks;
-  for (const auto &[dx, dy] : {std::pair{0, 0}, std::pair{8, 0}, std::pair{0, 8}, std::pair{8, 8}})
-    blocks.push_back(
-        transform([&, dx = dx, dy = dy](int x, int y) { return at(left + dx + x, top + dy + y); }));
-  for (int colour = 0; colour < 2; ++colour)
-    blocks.push_back(transform([](int, int) { return 128.0; }));
+  static const Levels neutral = [] {
+    Block grey;
+    grey.fill(128);
+    return transform(grey);
+  }();
+  const std::array<Levels, 6> blocks = {transform(pixelsAt(image, left, top)),
+                                        transform(pixelsAt(image, left + 8, top)),
+                                        transform(pixelsAt(image, left, top + 8)),
+                                        transform(pixelsAt(image, left + 8, top + 8)),
+                                        neutral,
+                                        neutral};
   std::uint32_t description = 1u << 7;
   for (std::size_t block = 0; block < blocks.size(); ++block)
     description |= (hasDetail(blocks[block]) ? 1u : 0u) << block;
   sink.put(0, 1);
   sink.put(description, 8);
-  for (const auto &levels : blocks)
+  for (const Levels &levels : blocks)
     putBlock(sink, levels);
 }
 } // namespace
