@@ -15,4 +15,6 @@ void addReplay(CLI::App &app);  ///< a recorded flight, served again
 void addEmulate(CLI::App &app); ///< a sequence, served as an AR.Drone would
 void addGraph(CLI::App &app);    ///< the graph of a run
 void addSolve(CLI::App &app);    ///< the optimum of a saved graph
+void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
+void addShowSaliency(CLI::App &app);      ///< basis flows, saliency beside images
 } // namespace bole::apps

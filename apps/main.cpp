@@ -11,6 +11,8 @@ int main(int argc, char **argv)
   app.set_version_flag("--version", "bole " BOLE_VERSION);
   app.require_subcommand(1);
   bole::apps::addEvaluate(app);
+  bole::apps::addCalibrateSaliency(app);
+  bole::apps::addShowSaliency(app);
   bole::apps::addSimulate(app);
   bole::apps::addRecord(app);
   bole::apps::addReplay(app);
