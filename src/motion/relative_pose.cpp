@@ -20,6 +20,7 @@ using motion::Parallax;
 using motion::Rays;
 using motion::RotationFit;
 
+constexpr double kSharedError = 0.1;
 constexpr double kUnknownDirection = 1e2; // variance of a direction that nobody has seen [rad^2]
 
 void takePrior(RelativePoseEstimate &estimate, const RelativePosePrior &given,
@@ -168,6 +169,10 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.aRb = fit.motion.aRb;
   estimate.direction = fit.motion.direction;
   estimate.covariance = covarianceOf(fit, prior, parallax.ratio, options.inflation);
+  // However many the points: errors that they share do not average below a tenth of noise over
+  // parallax.
+  const double shared = kSharedError * fit.sigma / std::max(parallax.median, fit.sigma);
+  estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
   const motion::Epipolar epipolar(fit.motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     estimate.weights[i] =
