@@ -333,7 +333,9 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
-  for (int hypothesis = 0; hypothesis < options.hypotheses; ++hypothesis) {
+  for (int hypothesis = 0;
+       hypothesis < (rotation_known ? (options.hypotheses + 1) / 2 : options.hypotheses);
+       ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
       motion.direction = *d;

@@ -169,7 +169,7 @@ void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::
 void PointTracker::State::replenish(const cv::Mat &image)
 {
   int missing = options.max_points - static_cast<int>(tracks.size());
-  if (missing <= options.max_points / 20) {
+  if (missing <= options.max_points / 6) {
     return;
   }
   cv::cornerMinEigenVal(image, response, 5, 3);

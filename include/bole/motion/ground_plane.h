@@ -48,7 +48,7 @@ public:
   bool known() const { return m_logs.size() >= 3; }
   double metresPerUnit() const;
   /// Relative standard deviation; frames share their ground, so ten of them count as one, and 4 %
-  /// stay (slope, tilt of up; measured on the rendered flights: errors of 0.3 to 9 %).
+  /// stay (slope, tilt of up; measured on the rendered flights: errors of 2 to 8 %).
   double relativeSigma() const;
 
 private:

@@ -15,7 +15,7 @@
 /// A camera that only turns gets its rotation and the status rotation_only: the translation is then
 /// held at its place, with a covariance that says so, not guessed.
 ///
-/// Cost: about 2 ms a frame with 150 points (benchmark_motion). Not thread-safe.
+/// Cost: about 1.3 ms a frame with 150 points (benchmark_motion). Not thread-safe.
 
 #include <bole/geometry/pose.h>
 #include <bole/motion/gyro.h>

@@ -11,7 +11,7 @@
 /// costs tracks there and nowhere else.
 ///
 /// Positions are pixels of the rectified image, pixel centres whole. One instance a video; not
-/// thread-safe. Cost: about 1.5 ms a frame at 320x240 with 150 points in one thread
+/// thread-safe. Cost: about 2 ms a frame at 320x240 with 150 points in one thread
 /// (benchmark_motion).
 
 #include <bole/geometry/camera.h>

@@ -22,7 +22,7 @@
 /// matches give the exact motion; swapping a and b inverts it; a camera that only turns gets the
 /// rotation and the status no_parallax.
 ///
-/// Cost: about 0.2 ms for 150 matches with a prior, 1 ms without.
+/// Cost: about 0.3 ms for 150 matches with a gyro, 1 ms without.
 
 #include <bole/geometry/camera.h>
 #include <bole/geometry/direction.h>

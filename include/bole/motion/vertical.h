@@ -14,7 +14,7 @@
 /// Laws (each a test): edges that run through the image of the zenith give the zenith; an image
 /// without edges gives the expected direction and the status too_few_edges.
 ///
-/// Cost: about 1 ms at 320x240.
+/// Cost: about 0.4 ms at 320x240.
 
 #include <bole/geometry/camera.h>
 #include <bole/geometry/direction.h>
