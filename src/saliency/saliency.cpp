@@ -70,6 +70,29 @@ vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCam
   return result;
 }
 
+/// Mean over a square window, clipped at the border of the image.
+vpImage<float> windowMean(const vpImage<float> &image, int window)
+{
+  if (window == 1)
+    return image;
+  const int half = window / 2, height = static_cast<int>(image.getHeight()), width = static_cast<int>(image.getWidth());
+  vpImage<float> across(image.getHeight(), image.getWidth()), result(image.getHeight(), image.getWidth());
+  const float scale = 1.f / window;
+  for (int i = 0; i < height; ++i)
+    for (int j = 0; j < width; ++j) {
+      float sum = 0;
+      for (int k = std::max(0, j - half); k <= std::min(width - 1, j + half); ++k)
+        sum += image[i][k];
+      across[i][j] = scale * sum;
+    }
+  result = 0.f;
+  for (int i = 0; i < height; ++i)
+    for (int k = std::max(0, i - half); k <= std::min(height - 1, i + half); ++k)
+      for (int j = 0; j < width; ++j)
+        result[i][j] += scale * across[k][j];
+  return result;
+}
+
 double meanDeviation(const Eigen::Matrix3d &covariance)
 {
   return std::sqrt(std::max(covariance.trace(), 0.0) / 3);
@@ -241,7 +264,8 @@ void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &resu
 {
   const double prior = m_options.background_prior;
   const float prior_log_odds = static_cast<float>(std::log((1 - prior) / prior));
-  vpImage<float> log_odds = enlarged(rotation.log_ratio, workingLevel(m_camera, m_options), m_camera);
+  const vpImage<float> ratio = windowMean(rotation.log_ratio, m_options.label_window_px);
+  vpImage<float> log_odds = enlarged(ratio, workingLevel(m_camera, m_options), m_camera);
   for (unsigned p = 0; p < log_odds.getSize(); ++p)
     log_odds.bitmap[p] = prior_log_odds - log_odds.bitmap[p];
   fill(log_odds, prior_log_odds, result);

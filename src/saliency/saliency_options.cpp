@@ -32,6 +32,7 @@ SaliencyOptions SaliencyOptions::paper()
 {
   SaliencyOptions options;
   options.sigma_intensity = 0.02;
+  options.label_window_px = 1;
   options.sigma_background_px = 0.15;
   options.sigma_foreground_px = 3;
   options.background_prior = 0.5;
@@ -65,7 +66,7 @@ void SaliencyOptions::validate() const
   requireInside("min_range", min_range, 0.05, near_range);
   requireWithin("inverse_depths", inverse_depths, 4, 64);
   for (const auto &[name, value] :
-       {std::pair("window_width_px", window_width_px), std::pair("window_height_px", window_height_px)})
+       {std::pair("label_window_px", label_window_px), std::pair("window_width_px", window_width_px), std::pair("window_height_px", window_height_px)})
     require(value >= 1 && value <= 31 && value % 2 == 1, name, value, "odd and within [1, 31]");
   requireWithin("min_parallax_px", min_parallax_px, 0.1, 50);
   requireWithin("max_frames_apart", max_frames_apart, 1, 20);

@@ -63,7 +63,10 @@ TEST(Saliency, LabelsAPatchThatMovesOtherwiseThanTheBackground)
   WallAndPost scene;
   scene.post_width = 0.6;
   const Eigen::Matrix3d turn = expSo3({0, 0.01, 0});
-  SaliencyEstimator estimator(kCamera);
+  SaliencyOptions options;
+  options.sigma_background_px = 1; // the post's 4 px shall count as parallax
+  options.sigma_foreground_px = 6;
+  SaliencyEstimator estimator(kCamera, options);
   estimator.update(scene.view(kStill), turned(Eigen::Matrix3d::Identity()));
   const Pose now(turn, {0.06, 0, 0}); // the post moves by 4 px, the wall by 0.3
 

@@ -9,8 +9,9 @@ struct SaliencyOptions
 {
   // --- the model of Eq. 12 and 13
   double sigma_intensity = 0.02;   ///< noise of a pixel, 1 = full scale; (0, 1]. Rendered and real video: 1-3 %
-  double sigma_background_px = 1;  ///< flow of the background about V w [px, full resolution]; (0, 20]. What counts as parallax
-  double sigma_foreground_px = 6;  ///< the same for the foreground [px]; (sigma_background_px, 200]
+  double sigma_background_px = 2;  ///< flow of the background about V w [px, full resolution]; (0, 20]. What counts as parallax
+  double sigma_foreground_px = 10; ///< the same for the foreground [px]; (sigma_background_px, 200]
+  int label_window_px = 7;         ///< log ratios are averaged over this square [px at the working level]; odd, [1, 31]
   double background_prior = 0.7;   ///< p(lambda = 1) before looking; (0, 1). Most of a forest is far
   bool foreground_mean_zero = false; ///< Eq. 13 as printed: the flow of the foreground has mean 0 instead of V w
   bool linear_flow = false;        ///< Eq. 13 as printed: flow V w; otherwise the exact warp of the rotation
