@@ -206,7 +206,6 @@ public:
 
   // ordering.cpp
   void orderAffected();
-  void orderByMinimumDegree();
 
   // covariance.cpp
   /// y = L^-1 X with X zero but for the rows of the variables given; returns y^T y.

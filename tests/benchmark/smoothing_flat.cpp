@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Time a frame over a long flight: must not grow with its length. Writes <poses> <ms of update>
+// Time a frame over a long flight: must not grow with its length.
+// benchmark_smoothing_flat [poses] [figure.svg]
 // <bytes> lines for the figure.
 #include "support/flight.h"
+#include "support/line_chart.h"
 
 #include <cstdio>
 #include <ctime>
@@ -31,6 +33,7 @@ int main(int argc, char **argv)
   const bole::test::Flight flight = bole::test::simulateFlight(o);
   bole::test::Replay replay(flight, bole::test::smootherFor(o));
   std::vector<double> ms;
+  std::vector<std::pair<double, double>> naive, flat, tail;
   std::size_t relinearised = 0, eliminated = 0, resolved = 0, limit = 0, views = 0;
   for (int i = 0; i < o.poses; ++i) {
     const double start = threadMs();
@@ -41,9 +44,19 @@ int main(int argc, char **argv)
     resolved += result.resolved;
     limit += result.status != bole::UpdateStatus::ok;
     views += flight.views[i].size();
+    const int n = i + 1;
+    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000) {
+      bole::Smoother again(replay.smoother.graph(), replay.smoother.options());
+      const double from = threadMs();
+      again.optimize(1e-6);
+      naive.emplace_back(n, threadMs() - from);
+      fmt::print("{:6d} poses: full re-solve {:.1f} ms\n", n, naive.back().second);
+    }
     if ((i + 1) % std::max(1, o.poses / 20) == 0) {
       const std::size_t window = std::min<std::size_t>(500, ms.size());
       const std::vector<double> last(ms.end() - static_cast<long>(window), ms.end());
+      flat.emplace_back(i + 1, quantile(last, 0.5));
+      tail.emplace_back(i + 1, quantile(last, 0.99));
       fmt::print("{:6d} poses: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms, {:.1f} MB\n", i + 1,
                  quantile(last, 0.5), quantile(last, 0.99), quantile(last, 1),
                  static_cast<double>(replay.smoother.memoryBytes()) / 1e6);
@@ -59,4 +72,30 @@ int main(int argc, char **argv)
              static_cast<double>(resolved) / n, limit);
   fmt::print("all frames: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n", quantile(ms, 0.5),
              quantile(ms, 0.99), quantile(ms, 1));
+  const auto windowMedian = [&](int from, int to) {
+    return quantile({ms.begin() + from, ms.begin() + to}, 0.5);
+  };
+  if (o.poses >= 2000)
+    fmt::print("median about pose 500: {:.3f} ms; of the last 500: {:.3f} ms, ratio {:.2f}; p99 / "
+               "median {:.1f}\n",
+               windowMedian(400, 600), windowMedian(o.poses - 500, o.poses),
+               windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600),
+               quantile(ms, 0.99) / quantile(ms, 0.5));
+  if (argc > 2) {
+    bole::test::LineChart chart;
+    chart.title = "Adding one frame: incremental update and full re-solve";
+    chart.x_name = "poses in the graph";
+    chart.y_name = "ms of one thread";
+    chart.log_x = chart.log_y = true;
+    chart.x_min = 100;
+    chart.x_max = o.poses;
+    chart.y_min = 0.1;
+    chart.y_max = 10000;
+    chart.x_ticks = {100, 300, 1000, 3000, 10000, 20000};
+    chart.y_ticks = {0.1, 1, 10, 100, 1000, 10000};
+    chart.lines = {{"full re-solve", "#c33", naive},
+                   {"update, p99 of 500", "#69c", tail},
+                   {"update, median", "#036", flat}};
+    chart.write(argv[2]);
+  }
 }
