@@ -24,7 +24,11 @@ std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t>
   options.grabber.open_timeout_s = test::kPatience_s;
   ArDroneSource source(address, options);
   std::vector<Frame> frames;
-  for (Frame frame; source.next(frame);) {
+  frames.reserve(1000); // ViSP copies empty images by memcpy from null
+  for (;;) {
+    Frame frame; // a new one each time: ViSP 3.5 leaks what is assigned to an image moved from
+    if (!source.next(frame))
+      break;
     frames.push_back(std::move(frame));
     if (numbers != nullptr)
       numbers->push_back(source.liveFrame().number);
