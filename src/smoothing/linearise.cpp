@@ -8,6 +8,7 @@ namespace bole
 {
 namespace
 {
+constexpr double kLargestShift = 8; ///< times the relinearisation thresholds
 constexpr std::size_t kFactorsProbed =
     6; ///< of a trunk, newest to oldest, for their linearisation error
 
@@ -248,6 +249,14 @@ bool Smoother::State::movedTooFar(const Variable &variable) const
                              d.segment<2>(3).cwiseAbs().maxCoeff() <= options.relinearise_lean;
   if (moved_little)
     return false;
+  // Neighbours must be linearised at points that fit together: a common shift may not grow without
+  // bound.
+  const double farthest =
+      variable.is_pose ? d.head<3>().cwiseAbs().maxCoeff() : d.head<2>().cwiseAbs().maxCoeff();
+  if (farthest > kLargestShift * options.relinearise_position ||
+      (variable.is_pose &&
+       d.tail<3>().cwiseAbs().maxCoeff() > kLargestShift * options.relinearise_rotation))
+    return true;
   const std::size_t count = variable.factors.size();
   const std::size_t every = variable.is_pose ? 1 : std::max<std::size_t>(1, count / kFactorsProbed);
   for (std::size_t i = 0; i < count; i += every)
