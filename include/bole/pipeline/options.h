@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// All options of the pipeline: one aggregate a stage.
+
+#include <bole/detection/detector.h>
+#include <bole/gradient/gradient.h>
+#include <bole/map/trunk_map.h>
+#include <bole/motion/point_motion.h>
+#include <bole/pipeline/motion_model.h>
+#include <bole/saliency/saliency_options.h>
+#include <bole/smoothing/smoother.h>
+#include <bole/tracking/trunk_tracker.h>
+
+namespace bole
+{
+/// What belongs to no single stage.
+struct FlowOptions
+{
+  bool use_points = true;        ///< relative poses from point features
+  bool use_saliency = true;      ///< motion saliency: off leaves detection ungated
+  int detect_every = 2;          ///< frames between two runs of the detector, 1 to 100
+  double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
+  double trunk_low = 0.25;       ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
+  double trunk_high = 2.6;       ///< ... to [m]; its middle is near breast height, where radii are told
+  double track_range = 12;       ///< known trunks farther than this are not tracked [m], 1 to 100
+  double gate = 9.2;             ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
+  double gate_sigma_px = 1.0;    ///< of a border beside the prediction [px], 0.1 to 10
+
+  void validate() const; ///< \throw vpException naming the option, its value and the range
+};
+
+struct PipelineOptions
+{
+  FlowOptions flow;
+  MotionModelOptions motion;
+  PointMotionOptions points;
+  GradientOptions gradient;
+  SaliencyOptions saliency;
+  DetectorOptions detection;
+  TrackingOptions tracking;
+  SmootherOptions smoothing;
+  MapOptions map;
+
+  void validate() const;
+};
+} // namespace bole

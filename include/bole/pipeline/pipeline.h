@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// From frames to a map of trunks and a trajectory: the stages in flow order.
+///
+/// Idea: predict the pose; reduce the image to its gradient; ask for saliency and relative poses; track the known
+/// trunks relative to the camera and replace the image by a summary factor each; smooth; look for new trunks where
+/// none is known; review the map (paper, Sections 3 to 7).
+///
+/// \code
+/// bole::AslSource source("data/park-forward");
+/// bole::Pipeline pipeline(source.camera(), source.bMc(), bole::PipelineOptions());
+/// bole::Frame frame;
+/// while (source.next(frame)) {
+///   const bole::FrameResult result = pipeline.process(frame);
+///   std::cout << frame.index << ": " << result.trunks.size() << " trunks in view\n";
+/// }
+/// for (const bole::TrunkRecord &trunk : pipeline.map()) ...
+/// \endcode
+///
+/// Memory: the window of the detector and the graph of the smoother; no image is kept beyond the window.
+/// Not thread-safe; no globals.
+
+#include <bole/pipeline/options.h>
+#include <bole/saliency/saliency.h>
+
+#include <deque>
+#include <utility>
+
+namespace bole
+{
+/// A known trunk in one frame.
+struct TrackedTrunk
+{
+  int id = 0;
+  TrunkStatus map_status = TrunkStatus::candidate;
+  TrackingStatus status = TrackingStatus::not_visible;
+  RelativeTrunk relative; ///< the optimum where tracked, else the prediction
+  ElevationRange range;   ///< the part looked at
+};
+
+struct FrameResult
+{
+  std::size_t index = 0;
+  std::int64_t stamp_ns = 0;
+  FrameStatus frame_status = FrameStatus::ok;
+  Pose wMb;                         ///< as known right after this frame
+  std::vector<TrackedTrunk> trunks; ///< known trunks that might be in view
+  std::vector<Detection> detections; ///< new ones
+  std::optional<Saliency> saliency;
+  std::vector<std::pair<const char *, double>> timing_ms; ///< a stage each, in flow order
+  UpdateStatus smoother_status = UpdateStatus::ok;
+  bool step_from_odometry = false;
+};
+
+class Pipeline
+{
+public:
+  Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineOptions &options = {});
+
+  /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted.
+  FrameResult process(const Frame &frame);
+
+  /// Smooths the whole flight once more, everything linearised anew.
+  void finish();
+
+  std::vector<TrunkRecord> map() const { return m_map.records(); }
+  struct StampedPose
+  {
+    std::int64_t stamp_ns = 0;
+    Pose wMb;
+  };
+  std::vector<StampedPose> smoothedTrajectory() const;
+  const std::vector<StampedPose> &onlineTrajectory() const { return m_online; }
+  Graph graph() const { return m_smoother.graph(); }
+  const Smoother &smoother() const { return m_smoother; }
+  /// Trunk record fields that need the smoother are refreshed from it; called by process() and finish().
+  void refreshMap();
+
+private:
+  struct View ///< a frame of the detector's window
+  {
+    Gradient gradient;
+    LevelProfile profile;
+    std::size_t pose = 0;
+    double time_s = 0;
+  };
+  struct Lap;
+
+  void addPose(const Frame &frame, FrameResult &result);
+  void addRelativePoses(const std::vector<RelativeMotion> &motions);
+  void estimateSaliency(const Frame &frame, FrameResult &result);
+  void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
+  bool observe(MapTrunk &trunk, std::size_t pose, const TrackingResult &tracked, double time_s);
+  TrackingPrediction predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
+                             const Pose &wMc) const;
+  bool insideGate(const TrackingPrediction &prediction, const TrackingResult &tracked) const;
+  void hide(TrackingPrediction &prediction, const MapTrunk &trunk, const Pose &wMc) const;
+  ElevationRange elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const;
+  void keepView(const Frame &frame, Gradient gradient);
+  void detectNew(FrameResult &result);
+  void adopt(const Detection &detection);
+  std::vector<InhibitedRange> inhibited() const;
+  void reviewMap();
+  Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }
+
+  PinholeCamera m_camera;
+  Pose m_bMc;
+  PipelineOptions m_options;
+  MotionModel m_motion;
+  PointMotion m_points;
+  SaliencyEstimator m_saliency;
+  Smoother m_smoother;
+  TrunkMap m_map;
+  std::deque<View> m_views; ///< oldest first
+  std::vector<StampedPose> m_online;
+  std::vector<std::size_t> m_pose_of_frame; ///< pose of each processed frame, by its place in m_indices
+  std::vector<std::size_t> m_indices;       ///< Frame::index of each processed frame
+  Vector6d m_velocity = Vector6d::Zero();   ///< of the body, in its frame
+  bool m_ground_known = false;              ///< the world's z = 0 is the ground
+};
+} // namespace bole

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/pipeline/options.h>
+
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+void FlowOptions::validate() const
+{
+  const auto require = [](const char *name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+  };
+  require("flow.detect_every", detect_every, 1, 100);
+  require("flow.view_spacing", view_spacing, 0, 1);
+  require("flow.trunk_low", trunk_low, 0, 5);
+  require("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
+  require("flow.track_range", track_range, 1, 100);
+  require("flow.gate", gate, 1, 100);
+  require("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
+}
+
+void PipelineOptions::validate() const
+{
+  flow.validate();
+  motion.validate();
+  points.validate();
+  gradient.validate();
+  saliency.validate();
+  detection.validate();
+  tracking.validate();
+  smoothing.validate();
+  map.validate();
+}
+} // namespace bole

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/pipeline/pipeline.h>
+
+#include <bole/geometry/so3.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+/// Times the stages of a frame one after the other.
+struct Pipeline::Lap
+{
+  FrameResult &result;
+  std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
+
+  void operator()(const char *stage)
+  {
+    const auto now = std::chrono::steady_clock::now();
+    result.timing_ms.emplace_back(stage, std::chrono::duration<double, std::milli>(now - last).count());
+    last = now;
+  }
+};
+
+namespace
+{
+SmootherOptions withCamera(SmootherOptions options, const Pose &bMc)
+{
+  options.bMc = bMc;
+  return options;
+}
+
+double bearingOf(const Pose &wMc, const Trunk &trunk)
+{
+  const Eigen::Vector2d w = trunk.xy - wMc.t.head<2>();
+  return std::atan2(w.y(), w.x());
+}
+} // namespace
+
+Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineOptions &options)
+  : m_camera(camera), m_bMc(bMc), m_options(options), m_motion(options.motion, options.points.gyro),
+    m_points(camera, bMc, options.points), m_saliency(camera, options.saliency),
+    m_smoother(withCamera(options.smoothing, bMc)), m_map(options.map)
+{
+  m_options.validate();
+}
+
+FrameResult Pipeline::process(const Frame &frame)
+{
+  FrameResult result;
+  result.index = frame.index;
+  result.stamp_ns = frame.stamp_ns;
+  result.frame_status = frame.status;
+  const double time_s = 1e-9 * static_cast<double>(frame.stamp_ns);
+  Lap lap{result};
+
+  addPose(frame, result);
+  lap("predict");
+  if (frame.status == FrameStatus::ok) {
+    if (m_options.flow.use_points)
+      addRelativePoses(m_points.process(frame));
+    lap("points");
+    Gradient gradient = computeGradient(frame.image, m_options.gradient);
+    lap("gradient");
+    if (m_options.flow.use_saliency)
+      estimateSaliency(frame, result);
+    lap("saliency");
+    trackKnown(gradient, time_s, result);
+    lap("tracking");
+    result.smoother_status = m_smoother.update().status;
+    lap("smoothing");
+    keepView(frame, std::move(gradient));
+    detectNew(result);
+    lap("detection");
+    reviewMap();
+    lap("map");
+  }
+  else
+    m_smoother.update();
+
+  const std::size_t pose = m_smoother.poseCount() - 1;
+  result.wMb = m_smoother.pose(pose);
+  if (pose > 0) {
+    const double dt = 1e-9 * static_cast<double>(frame.stamp_ns - m_online.back().stamp_ns);
+    m_velocity = result.wMb.minus(m_smoother.pose(pose - 1)) / std::max(dt, 1e-3);
+  }
+  m_online.push_back({frame.stamp_ns, result.wMb});
+  m_motion.advance(frame);
+  return result;
+}
+
+void Pipeline::addPose(const Frame &frame, FrameResult &result)
+{
+  m_indices.push_back(frame.index);
+  if (m_smoother.poseCount() == 0) {
+    const PosePrior first = m_motion.first(frame);
+    m_ground_known = frame.wMb_odometry.has_value();
+    m_smoother.addFirstPose(first.mean, first.covariance);
+    m_smoother.update();
+    return;
+  }
+  const Pose wMa = m_smoother.pose(m_smoother.poseCount() - 1);
+  const MotionStep step = m_motion.step(frame, wMa, m_points.gyroBias(), m_velocity);
+  const std::size_t pose = m_smoother.addPose(step.aMb, step.covariance);
+  if (step.absolute)
+    m_smoother.addPosePrior(pose, *step.absolute);
+  result.step_from_odometry = step.step_from_odometry;
+  m_smoother.update();
+}
+
+void Pipeline::addRelativePoses(const std::vector<RelativeMotion> &motions)
+{
+  const auto poseOf = [this](std::size_t index) {
+    return static_cast<std::size_t>(std::lower_bound(m_indices.begin(), m_indices.end(), index) - m_indices.begin());
+  };
+  bool added = false;
+  for (const RelativeMotion &motion : motions) {
+    if (!motion.estimate.hasDirection())
+      continue;
+    m_smoother.addRelativePose(poseOf(motion.a_index), poseOf(motion.b_index),
+                               {motion.estimate.aRb, motion.estimate.direction, motion.estimate.covariance});
+    added = true;
+  }
+  if (added)
+    m_smoother.update();
+}
+
+void Pipeline::estimateSaliency(const Frame &frame, FrameResult &result)
+{
+  std::optional<RotationPrior> turn;
+  std::optional<TranslationPrior> step;
+  const std::size_t pose = m_smoother.poseCount() - 1;
+  if (pose > 0) {
+    const Pose pMc = cameraAt(pose - 1).inverse() * cameraAt(pose);
+    if (result.step_from_odometry || !frame.gyro.empty())
+      turn = RotationPrior{pMc.R, 1e-6 * Eigen::Matrix3d::Identity()};
+    if (result.step_from_odometry)
+      step = TranslationPrior{pMc.t, 1e-4 * Eigen::Matrix3d::Identity()};
+  }
+  result.saliency = m_saliency.update(frame.image, turn, step);
+}
+
+ElevationRange Pipeline::elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const
+{
+  if (!m_ground_known)
+    return m_options.detection.profile.range;
+  const double d = trunk.radius() / relative.ratio();
+  const double tangent = std::sqrt(std::max(d * d - trunk.radius() * trunk.radius(), 0.01));
+  return {(m_options.flow.trunk_low - wMc.t.z()) / tangent, (m_options.flow.trunk_high - wMc.t.z()) / tangent};
+}
+
+/// Borders behind nearer trunks of the map are hidden.
+void Pipeline::hide(TrackingPrediction &prediction, const MapTrunk &trunk, const Pose &wMc) const
+{
+  const double range = (trunk.trunk.xy - wMc.t.head<2>()).norm();
+  const double bearing = bearingOf(wMc, trunk.trunk), half = std::asin(std::min(0.99, trunk.trunk.radius() / range));
+  for (const MapTrunk &other : m_map.trunks()) {
+    if (other.id == trunk.id || other.removed || other.status == TrunkStatus::lost || other.observations < 5)
+      continue;
+    const double other_range = (other.trunk.xy - wMc.t.head<2>()).norm();
+    if (other_range > range - 0.2)
+      continue;
+    const double other_half = std::asin(std::min(0.99, other.trunk.radius() / other_range)) + 2 / m_camera.fx;
+    const double apart = std::remainder(bearing - bearingOf(wMc, other.trunk), 2 * M_PI);
+    prediction.left_hidden |= std::abs(apart + half) < other_half;
+    prediction.right_hidden |= std::abs(apart - half) < other_half;
+  }
+}
+
+TrackingPrediction Pipeline::predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
+                                     const Pose &wMc) const
+{
+  TrackingPrediction prediction;
+  prediction.relative = relative;
+  prediction.covariance = covariance;
+  prediction.range = elevation(relative, trunk.trunk, wMc);
+  prediction.left_contrast = trunk.left_contrast;
+  prediction.right_contrast = trunk.right_contrast;
+  hide(prediction, trunk, wMc);
+  return prediction;
+}
+
+bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingResult &tracked, double time_s)
+{
+  const SummaryFactor summary{tracked.optimum, tracked.energy, tracked.f, tracked.F};
+  if (m_smoother.addObservation(pose, trunk.smoother_id, summary) != SummaryStatus::ok)
+    return false;
+  const Pose wMc = cameraAt(pose);
+  m_map.recordView(trunk, {time_s, bearingOf(wMc, trunk.trunk), (trunk.trunk.xy - wMc.t.head<2>()).norm(),
+                           tracked.left_contrast, tracked.right_contrast});
+  return true;
+}
+
+void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &result)
+{
+  const std::size_t pose = m_smoother.poseCount() - 1;
+  const Pose wMc = cameraAt(pose);
+  for (MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.removed || (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
+      continue;
+    const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
+    if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
+      continue;
+    const TrackingPrediction prediction =
+        predict(trunk, relative, m_smoother.relativeCovariance(trunk.smoother_id), wMc);
+    TrackingResult tracked = trackTrunk(gradient, m_camera, prediction, m_options.tracking);
+    if (tracked.status == TrackingStatus::tracked && !insideGate(prediction, tracked))
+      tracked.status = TrackingStatus::diverged;
+    if (tracked.status == TrackingStatus::not_visible)
+      continue;
+    if (tracked.status == TrackingStatus::tracked)
+      observe(trunk, pose, tracked, time_s);
+    else if (tracked.status != TrackingStatus::occluded)
+      m_map.recordMiss(trunk);
+    if (result.saliency && tracked.status == TrackingStatus::tracked) {
+      const double foreground =
+          foregroundBetween(result.saliency->p_background, m_camera, tracked.optimum, prediction.range);
+      if (foreground >= 0)
+        m_map.recordForeground(trunk, foreground);
+    }
+    result.trunks.push_back({trunk.id, trunk.status, tracked.status,
+                             tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range});
+  }
+}
+
+/// Bearing and log r/d against the prediction.
+bool Pipeline::insideGate(const TrackingPrediction &prediction, const TrackingResult &tracked) const
+{
+  const Eigen::Vector2d innovation = tracked.optimum.minus(prediction.relative).tail<2>();
+  const double s_px = m_options.flow.gate_sigma_px / m_camera.fx;
+  Eigen::Matrix2d S = prediction.covariance.bottomRightCorner<2, 2>();
+  S(0, 0) += s_px * s_px;
+  S(1, 1) += std::pow(s_px / prediction.relative.ratio(), 2) + 0.0025; // taper
+  if (!tracked.left_used || !tracked.right_used)
+    return innovation(0) * innovation(0) <= m_options.flow.gate * S(0, 0);
+  return innovation.dot(S.inverse() * innovation) <= m_options.flow.gate;
+}
+
+void Pipeline::keepView(const Frame &frame, Gradient gradient)
+{
+  const std::size_t pose = m_smoother.poseCount() - 1;
+  const Pose wMc = cameraAt(pose);
+  View view;
+  view.profile = computeLevelProfile(gradient.signed_x, m_camera, wMc.R, m_options.detection.profile);
+  view.gradient = std::move(gradient);
+  view.pose = pose;
+  view.time_s = 1e-9 * static_cast<double>(frame.stamp_ns);
+  // the newest view always stands last; it stays when the camera has moved on from the one before it
+  if (m_views.size() >= 2) {
+    const double moved = (cameraAt(m_views.back().pose).t - cameraAt(m_views[m_views.size() - 2].pose).t).norm();
+    if (moved < m_options.flow.view_spacing)
+      m_views.pop_back();
+  }
+  m_views.push_back(std::move(view));
+  if (static_cast<int>(m_views.size()) > m_options.detection.window)
+    m_views.pop_front();
+}
+
+std::vector<InhibitedRange> Pipeline::inhibited() const
+{
+  std::vector<InhibitedRange> ranges;
+  const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
+  const Eigen::Vector2d forward = wMc.R.col(2).head<2>().normalized(), left(-forward.y(), forward.x());
+  for (const MapTrunk &trunk : m_map.trunks()) {
+    const Eigen::Vector2d w = trunk.trunk.xy - wMc.t.head<2>();
+    const double r = trunk.trunk.radius(), d2 = w.squaredNorm();
+    if (trunk.removed || trunk.status == TrunkStatus::lost || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
+      continue;
+    const double q = w.dot(left) / w.dot(forward), half = r / std::sqrt(d2 - r * r);
+    ranges.push_back({q - half - 1 / m_camera.fx, q + half + 1 / m_camera.fx});
+  }
+  return ranges;
+}
+
+void Pipeline::detectNew(FrameResult &result)
+{
+  if (m_online.size() % static_cast<std::size_t>(m_options.flow.detect_every) != 0)
+    return;
+  std::vector<DetectorView> views;
+  for (const View &view : m_views)
+    views.push_back({&view.profile, cameraAt(view.pose)});
+  result.detections = detectTrunks(views, m_camera, inhibited(), m_options.detection);
+  for (const Detection &detection : result.detections)
+    adopt(detection);
+  if (!result.detections.empty())
+    m_smoother.update();
+}
+
+/// A detection becomes a candidate, with what the views of the window saw of it.
+void Pipeline::adopt(const Detection &detection)
+{
+  const std::size_t smoother_id = m_smoother.addTrunk(detection.trunk);
+  MapTrunk &trunk = m_map.add(smoother_id, detection.trunk);
+  trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
+  for (const View &view : m_views) {
+    const Pose wMc = cameraAt(view.pose);
+    const RelativeTrunk relative = relativeTrunk(wMc, Pose(), detection.trunk);
+    if (!relative.isFinite() || relative.cRt(2, 0) <= 0)
+      continue;
+    Matrix4d covariance = Matrix4d::Zero();
+    covariance.diagonal() << 1e-4, 1e-4, std::pow(1.0 / m_camera.fx, 2), std::pow(1.0 / m_camera.fx / relative.ratio(), 2);
+    TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
+    const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
+    if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked))
+      observe(trunk, view.pose, tracked, view.time_s);
+  }
+}
+
+void Pipeline::reviewMap()
+{
+  refreshMap();
+  for (const MapChange &change : m_map.review())
+    if (change.to == TrunkStatus::merged)
+      m_smoother.removeTrunk(m_map.trunks()[static_cast<std::size_t>(change.id)].smoother_id);
+}
+
+void Pipeline::refreshMap()
+{
+  for (MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.removed)
+      continue;
+    trunk.trunk = m_smoother.trunk(trunk.smoother_id);
+    trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+  }
+}
+
+void Pipeline::finish()
+{
+  if (m_smoother.poseCount() == 0)
+    return;
+  m_smoother.optimize();
+  refreshMap();
+}
+
+std::vector<Pipeline::StampedPose> Pipeline::smoothedTrajectory() const
+{
+  std::vector<StampedPose> trajectory;
+  for (std::size_t i = 0; i < m_online.size(); ++i)
+    trajectory.push_back({m_online[i].stamp_ns, m_smoother.pose(i)});
+  return trajectory;
+}
+} // namespace bole
