@@ -107,8 +107,10 @@ std::vector<MapChange> TrunkMap::review()
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0 && mayBeConfirmed(trunk))
       change(trunk, TrunkStatus::confirmed);
-    else if (trunk.status != TrunkStatus::lost && trunk.misses_in_a_row >= m_options.lost_misses)
+    else if (trunk.status != TrunkStatus::lost && trunk.misses_in_a_row >= m_options.lost_misses) {
+      trunk.removed = trunk.status == TrunkStatus::candidate;
       change(trunk, TrunkStatus::lost);
+    }
   }
   for (MapTrunk &a : m_trunks)
     for (MapTrunk &b : m_trunks) {

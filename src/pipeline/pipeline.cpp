@@ -3,6 +3,7 @@
 
 #include <bole/geometry/so3.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -312,7 +313,7 @@ void Pipeline::reviewMap()
 {
   refreshMap();
   for (const MapChange &change : m_map.review())
-    if (change.to == TrunkStatus::merged)
+    if (m_map.trunks()[static_cast<std::size_t>(change.id)].removed)
       m_smoother.removeTrunk(m_map.trunks()[static_cast<std::size_t>(change.id)].smoother_id);
 }
 
