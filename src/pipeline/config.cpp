@@ -26,7 +26,6 @@ struct Kind
   std::string operator()(std::vector<int> *) const { return "a list of whole numbers"; }
   std::string operator()(EnergyForm *) const { return "absolute_mean or paper"; }
   std::string operator()(LossKind *) const { return "quadratic, huber or cauchy"; }
-  std::string operator()(Eigen::Vector3d *) const { return "a list of three numbers"; }
 };
 
 /// Assigns a YAML node to an entry; false when it is not of the entry's kind.
@@ -59,14 +58,6 @@ struct Assign
       }
     return false;
   }
-  bool operator()(Eigen::Vector3d *to) const
-  {
-    std::vector<double> values;
-    if (!node.IsSequence() || node.size() != 3 || !YAML::convert<std::vector<double>>::decode(node, values))
-      return false;
-    *to = Eigen::Vector3d(values.data());
-    return to->allFinite();
-  }
 };
 
 struct Print
@@ -83,10 +74,6 @@ struct Print
     return *value == EnergyForm::paper ? "paper" : "absolute_mean";
   }
   std::string operator()(const LossKind *value) const { return toString(*value); }
-  std::string operator()(const Eigen::Vector3d *value) const
-  {
-    return fmt::format("[{}, {}, {}]", value->x(), value->y(), value->z());
-  }
 };
 
 std::string where(const std::string &path, const YAML::Mark &mark)
@@ -137,7 +124,8 @@ void addPoints(std::vector<OptionEntry> &entries, PointMotionOptions &o)
                                  {"points.use_gyro", &o.use_gyro},
                                  {"points.use_odometry", &o.use_odometry},
                                  {"points.frames_back", &o.frames_back},
-                                 {"points.odometry_sigma", &o.odometry_sigma},
+                                 {"points.odometry_walk", &o.odometry_walk},
+                                 {"points.odometry_height_sigma", &o.odometry_height_sigma},
                                  {"points.odometry_relative_sigma", &o.odometry_relative_sigma},
                                  {"gyro.noise_density", &o.gyro.noise_density},
                                  {"gyro.bias_sigma", &o.gyro.bias_sigma},

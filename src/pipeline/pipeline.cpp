@@ -312,9 +312,11 @@ void Pipeline::adopt(const Detection &detection)
 void Pipeline::reviewMap()
 {
   refreshMap();
-  for (const MapChange &change : m_map.review())
-    if (m_map.trunks()[static_cast<std::size_t>(change.id)].removed)
-      m_smoother.removeTrunk(m_map.trunks()[static_cast<std::size_t>(change.id)].smoother_id);
+  for (const MapChange &change : m_map.review()) {
+    const MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(change.id)];
+    if (trunk.removed && m_smoother.hasTrunk(trunk.smoother_id))
+      m_smoother.removeTrunk(trunk.smoother_id);
+  }
 }
 
 void Pipeline::refreshMap()

@@ -21,7 +21,7 @@ namespace bole
 struct OptionEntry
 {
   std::string name;
-  std::variant<double *, int *, bool *, std::vector<int> *, EnergyForm *, LossKind *, Eigen::Vector3d *> value;
+  std::variant<double *, int *, bool *, std::vector<int> *, EnergyForm *, LossKind *> value;
 };
 
 /// Every option of \p options, in the order of the stages. Points into \p options.

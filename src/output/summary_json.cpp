@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/output/atomic_file.h>
+#include <bole/output/summary_json.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/version.hpp>
+#include <visp3/core/vpConfig.h>
+
+extern "C" {
+#include <libavutil/avutil.h>
+}
+
+namespace bole
+{
+namespace
+{
+using Json = nlohmann::ordered_json;
+
+Json median(std::vector<double> values)
+{
+  if (values.empty())
+    return nullptr;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Json trunksJson(const std::vector<TrunkRecord> &trunks)
+{
+  Json json;
+  for (const auto status : {TrunkStatus::confirmed, TrunkStatus::candidate, TrunkStatus::lost, TrunkStatus::merged})
+    json[toString(status)] = std::count_if(trunks.begin(), trunks.end(),
+                                           [&](const TrunkRecord &trunk) { return trunk.status == status; });
+  std::vector<double> radius, sigma, sigma_radius, observations;
+  for (const TrunkRecord &trunk : trunks) {
+    if (trunk.status != TrunkStatus::confirmed)
+      continue;
+    radius.push_back(trunk.radius);
+    sigma.push_back(std::sqrt(std::max(0.0, trunk.covariance_xy.trace())));
+    sigma_radius.push_back(std::sqrt(std::max(0.0, trunk.variance_radius)));
+    observations.push_back(trunk.observations);
+  }
+  json["median_of_confirmed"] = {{"radius_m", median(radius)},
+                                 {"position_sigma_m", median(sigma)},
+                                 {"radius_sigma_m", median(sigma_radius)},
+                                 {"observations", median(observations)}};
+  return json;
+}
+
+Json timingJson(const TimingTable &timing)
+{
+  Json json = {{"median_frame_ms", timing.medianTotal_ms()}, {"percentile95_frame_ms", timing.percentile95_ms()}};
+  for (std::size_t i = 0; i < timing.stages.size(); ++i)
+    json["median_stage_ms"][timing.stages[i]] = timing.medianStage_ms(i);
+  return json;
+}
+
+Json framesJson(const std::map<FrameStatus, std::size_t> &frames)
+{
+  Json json;
+  std::size_t all = 0;
+  for (const auto status :
+       {FrameStatus::ok, FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized}) {
+    const auto entry = frames.find(status);
+    json[toString(status)] = entry == frames.end() ? 0 : entry->second;
+    all += entry == frames.end() ? 0 : entry->second;
+  }
+  json["all"] = all;
+  return json;
+}
+
+Json textOrNull(const std::string &text) { return text.empty() ? Json() : Json(text); }
+} // namespace
+
+const char *toString(ScaleSource source)
+{
+  switch (source) {
+  case ScaleSource::odometry:
+    return "odometry";
+  case ScaleSource::height:
+    return "height";
+  case ScaleSource::prior:
+    return "prior";
+  }
+  return "unknown";
+}
+
+std::string toJson(const RunSummary &summary)
+{
+  const PinholeCamera &camera = summary.camera;
+  Json json;
+  json["complete"] = summary.is_complete;
+  json["input"] = {{"source", summary.input},
+                   {"camera_file", textOrNull(summary.camera_file)},
+                   {"odometry_file", textOrNull(summary.odometry_file)},
+                   {"odometry", summary.has_odometry},
+                   {"gyro", summary.has_gyro},
+                   {"note", textOrNull(summary.note)}};
+  json["camera"] = {{"width_px", camera.width}, {"height_px", camera.height}, {"fx_px", camera.fx},
+                    {"fy_px", camera.fy},       {"cx_px", camera.cx},         {"cy_px", camera.cy}};
+  json["preset"] = textOrNull(summary.preset);
+  json["scale"] = toString(summary.scale);
+  json["frames"] = framesJson(summary.frames);
+  json["trunks"] = trunksJson(summary.trunks);
+  json["timing"] = timingJson(summary.timing);
+  for (const auto &[name, value] : summary.figures)
+    json["figures"][name] = value;
+  json["versions"] = {{"bole", summary.version},
+                      {"visp", fmt::format("{}.{}.{}", VISP_VERSION_MAJOR, VISP_VERSION_MINOR, VISP_VERSION_PATCH)},
+                      {"opencv", CV_VERSION},
+                      {"libav", av_version_info()}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void writeSummary(const std::string &path, const RunSummary &summary) { writeAtomically(path, toJson(summary)); }
+} // namespace bole

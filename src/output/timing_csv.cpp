@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/output/atomic_file.h>
+#include <bole/output/timing_csv.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <iterator>
+
+namespace bole
+{
+namespace
+{
+double quantile(std::vector<double> values, double part)
+{
+  if (values.empty())
+    return 0;
+  const auto at = static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
+  return values[at];
+}
+
+std::vector<double> totals(const std::vector<FrameTiming> &frames)
+{
+  std::vector<double> values;
+  for (const FrameTiming &frame : frames)
+    values.push_back(frame.total_ms);
+  return values;
+}
+} // namespace
+
+double TimingTable::medianTotal_ms() const { return quantile(totals(frames), 0.5); }
+
+double TimingTable::percentile95_ms() const { return quantile(totals(frames), 0.95); }
+
+double TimingTable::medianStage_ms(std::size_t stage) const
+{
+  std::vector<double> values;
+  for (const FrameTiming &frame : frames)
+    if (stage < frame.stages_ms.size())
+      values.push_back(frame.stages_ms[stage]);
+  return quantile(std::move(values), 0.5);
+}
+
+void writeTiming(const std::string &path, const TimingTable &timing)
+{
+  std::string text = "frame,timestamp [s]";
+  for (const std::string &stage : timing.stages)
+    text += "," + stage + " [ms]";
+  text += ",total [ms]\n";
+  for (const FrameTiming &frame : timing.frames) {
+    fmt::format_to(std::back_inserter(text), "{},{:.9f}", frame.index, static_cast<double>(frame.stamp_ns) * 1e-9);
+    for (std::size_t i = 0; i < timing.stages.size(); ++i)
+      fmt::format_to(std::back_inserter(text), ",{:.4f}", i < frame.stages_ms.size() ? frame.stages_ms[i] : 0.0);
+    fmt::format_to(std::back_inserter(text), ",{:.4f}\n", frame.total_ms);
+  }
+  writeAtomically(path, text);
+}
+} // namespace bole
