@@ -233,11 +233,18 @@ bool overlaps(const Detection &a, const Detection &b)
   return a.q_left > b.q_right && b.q_left > a.q_right;
 }
 
+/// Small residuals tell a trunk from chance; of two readings of the same place the wider is the silhouette, the
+/// narrower a shadow's edge on the bark.
+double quality(const Detection &detection)
+{
+  return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) / (detection.rms_px + 0.2);
+}
+
 /// Best first; a trunk that overlaps a better one in the image is another reading of the same lines.
 std::vector<Detection> suppress(std::vector<Detection> found)
 {
   std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) {
-    return a.agreement * a.inliers > b.agreement * b.inliers;
+    return quality(a) > quality(b);
   });
   std::vector<Detection> kept;
   for (const Detection &detection : found)

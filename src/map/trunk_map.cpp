@@ -17,6 +17,9 @@ void MapOptions::validate() const
   require("map.confirm_parallax", confirm_parallax, 0, 1);
   require("map.confirm_range_sigma", confirm_range_sigma, 0.01, 1);
   require("map.confirm_hit_ratio", confirm_hit_ratio, 0, 1);
+  require("map.confirm_innovation_px", confirm_innovation_px, 0.1, 20);
+  require("map.near_range", near_range, 0, 100);
+  require("map.doubt_observations", doubt_observations, 3, 1000);
   require("map.confirm_foreground", confirm_foreground, 0, 1);
   require("map.lost_misses", lost_misses, 1, 1000);
   require("map.radius_min", radius_min, 0.001, 10);
@@ -55,6 +58,7 @@ void TrunkMap::recordView(MapTrunk &trunk, const TrunkView &view) const
   trunk.first_seen_s = std::min(trunk.first_seen_s, view.time_s);
   trunk.last_seen_s = std::max(trunk.last_seen_s, view.time_s);
   ++trunk.observations;
+  trunk.innovation2 += (view.innovation2 - trunk.innovation2) / std::min(trunk.observations, 30);
   ++trunk.hits;
   trunk.misses_in_a_row = 0;
   const auto blend = [](std::optional<double> &mean, double now) {
@@ -76,6 +80,12 @@ void TrunkMap::recordForeground(MapTrunk &trunk, double foreground) const
   trunk.foreground += (foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
+/// Predictions of a trunk come true; those of a chance pair of lines miss by what the scan allows.
+bool TrunkMap::fits(const MapTrunk &trunk) const
+{
+  return trunk.innovation2 <= m_options.confirm_innovation_px * m_options.confirm_innovation_px;
+}
+
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
 {
   const double r = trunk.trunk.radius();
@@ -83,8 +93,10 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
   return trunk.observations >= m_options.confirm_observations && trunk.parallax() >= m_options.confirm_parallax &&
          trunk.hits >= m_options.confirm_hit_ratio * (trunk.hits + trunk.misses) && r >= m_options.radius_min &&
          r <= m_options.radius_max && position_sigma < 10 &&
+         fits(trunk) &&
          std::sqrt(trunk.covariance(2, 2)) <= 2 * m_options.confirm_range_sigma &&
-         (trunk.foreground_count == 0 || trunk.foreground >= m_options.confirm_foreground);
+         (trunk.foreground_count == 0 || trunk.range_min_seen > m_options.near_range ||
+          trunk.foreground >= m_options.confirm_foreground);
 }
 
 bool TrunkMap::isDuplicate(const MapTrunk &a, const MapTrunk &b) const
@@ -105,6 +117,11 @@ std::vector<MapChange> TrunkMap::review()
       continue;
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk))
       change(trunk, TrunkStatus::confirmed);
+    else if (trunk.status == TrunkStatus::candidate && trunk.observations >= m_options.doubt_observations &&
+             !fits(trunk)) {
+      trunk.removed = true;
+      change(trunk, TrunkStatus::lost);
+    }
     else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0 && mayBeConfirmed(trunk))
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status != TrunkStatus::lost && trunk.misses_in_a_row >= m_options.lost_misses) {

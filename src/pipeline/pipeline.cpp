@@ -183,14 +183,18 @@ TrackingPrediction Pipeline::predict(const MapTrunk &trunk, const RelativeTrunk 
   return prediction;
 }
 
-bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingResult &tracked, double time_s)
+bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction,
+                       const TrackingResult &tracked, double time_s)
 {
   const SummaryFactor summary{tracked.optimum, tracked.energy, tracked.f, tracked.F};
   if (m_smoother.addObservation(pose, trunk.smoother_id, summary) != SummaryStatus::ok)
     return false;
   const Pose wMc = cameraAt(pose);
+  const Eigen::Vector2d moved = m_camera.fx * tracked.optimum.minus(prediction.relative).tail<2>();
+  const double widened = tracked.left_used && tracked.right_used ? moved(1) * tracked.optimum.ratio() : 0;
+  const double innovation2 = moved(0) * moved(0) + widened * widened; // mean over (bearing +- width)
   m_map.recordView(trunk, {time_s, bearingOf(wMc, trunk.trunk), (trunk.trunk.xy - wMc.t.head<2>()).norm(),
-                           tracked.left_contrast, tracked.right_contrast});
+                           tracked.left_contrast, tracked.right_contrast, innovation2});
   return true;
 }
 
@@ -212,7 +216,7 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
     if (tracked.status == TrackingStatus::not_visible)
       continue;
     if (tracked.status == TrackingStatus::tracked)
-      observe(trunk, pose, tracked, time_s);
+      observe(trunk, pose, prediction, tracked, time_s);
     else if (tracked.status != TrackingStatus::occluded)
       m_map.recordMiss(trunk);
     if (result.saliency && tracked.status == TrackingStatus::tracked) {
@@ -305,7 +309,7 @@ void Pipeline::adopt(const Detection &detection)
     TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
     const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
     if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked))
-      observe(trunk, view.pose, tracked, view.time_s);
+      observe(trunk, view.pose, prediction, tracked, view.time_s);
   }
 }
 

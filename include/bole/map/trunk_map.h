@@ -22,7 +22,10 @@ struct MapOptions
   double confirm_parallax = 0.05;     ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
   double confirm_range_sigma = 0.10;  ///< relative standard deviation of the range at which it may be, 0.01 to 1
   double confirm_hit_ratio = 0.65;    ///< found / should have been found, 0 to 1
-  double confirm_foreground = 0.0;    ///< mean of 1 - p(background) inside it, where known, 0 to 1
+  double confirm_innovation_px = 0.9; ///< rms of prediction against what was found [px], 0.1 to 20; chance gives 1.4
+  double near_range = 5.5;            ///< a trunk that came nearer must have been foreground [m], 0 to 100
+  double confirm_foreground = 0.3;    ///< mean of 1 - p(background) inside it, where known, 0 to 1
+  int doubt_observations = 8;         ///< views after which a candidate that does not fit is given up, 3 to 1000
   int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
   double radius_min = 0.04;           ///< thinner is no trunk [m]
   double radius_max = 0.60;           ///< thicker is no trunk [m]
@@ -44,6 +47,7 @@ struct MapTrunk
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   double bearing_first = 0;                  ///< world bearing of the first view [rad]
   double bearing_low = 0, bearing_high = 0;  ///< extremes of the bearing from the first one [rad]
+  double innovation2 = 0;                    ///< mean square of prediction against what was found [px^2]
   double foreground = 0;                     ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   double range_min_seen = 1e9;               ///< nearest it was [m]
@@ -59,6 +63,7 @@ struct TrunkView
   double bearing = 0; ///< of the trunk from the camera, world [rad]
   double range = 0;   ///< [m]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
+  double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2]
 };
 
 /// What review() decided.
@@ -89,6 +94,7 @@ public:
   std::vector<TrunkRecord> records() const;
 
 private:
+  bool fits(const MapTrunk &trunk) const;
   bool mayBeConfirmed(const MapTrunk &trunk) const;
   bool isDuplicate(const MapTrunk &a, const MapTrunk &b) const;
 

@@ -64,6 +64,7 @@ public:
   /// Smooths the whole flight once more, everything linearised anew.
   void finish();
 
+  const std::vector<MapTrunk> &mapTrunks() const { return m_map.trunks(); }
   std::vector<TrunkRecord> map() const { return m_map.records(); }
   struct StampedPose
   {
@@ -91,7 +92,8 @@ private:
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
   void estimateSaliency(const Frame &frame, FrameResult &result);
   void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
-  bool observe(MapTrunk &trunk, std::size_t pose, const TrackingResult &tracked, double time_s);
+  bool observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction, const TrackingResult &tracked,
+               double time_s);
   TrackingPrediction predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
                              const Pose &wMc) const;
   bool insideGate(const TrackingPrediction &prediction, const TrackingResult &tracked) const;
