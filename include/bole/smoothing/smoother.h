@@ -63,7 +63,7 @@ struct SmootherOptions
   /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
   /// stretch of the flight, and changes no view in it, costs nothing. Default: trunks stay
   /// within a tenth of their standard deviation of the batch optimum.
-  double linearisation_tolerance = 0.2;
+  double linearisation_tolerance = 0.05;
   /// Changes of a variable below this are not passed on to the variables eliminated before it: [m]
   /// for positions, a fifth of it [rad, relative] for rotations, log radius and lean. >= 0; 0
   /// passes all. Default: well below the error of a well-seen trunk.
@@ -72,9 +72,9 @@ struct SmootherOptions
   /// what has not settled.
   int max_iterations = 2;
 
-  /// Robust loss on summary factors. Default: a wrongly associated view is off by tens of sigmas,
-  /// and must not bend the map; at 3 sigma of 4 numbers a good view keeps most of its weight.
-  Loss summary_loss = {LossKind::cauchy, 5.0};
+  /// Robust loss on summary factors. Default: a wrongly associated view pulls with a bounded force;
+  /// Cauchy forgets it altogether, but has local optima in which long flights were caught.
+  Loss summary_loss = {LossKind::huber, 3.0};
   /// Robust loss on relative poses from points: their covariance does not know of moving branches.
   Loss direction_loss = {LossKind::huber, 4.0};
 
