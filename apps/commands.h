@@ -8,6 +8,7 @@
 
 namespace bole::apps
 {
+void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addSimulate(CLI::App &app);
 void addRecord(CLI::App &app);  ///< a live flight to disk

@@ -10,6 +10,7 @@ int main(int argc, char **argv)
   CLI::App app("bole: tree trunks as vertical cylinders, tracked and mapped from a small drone's video", "bole");
   app.set_version_flag("--version", "bole " BOLE_VERSION);
   app.require_subcommand(1);
+  bole::apps::addTrack(app);
   bole::apps::addEvaluate(app);
   bole::apps::addCalibrateSaliency(app);
   bole::apps::addShowSaliency(app);

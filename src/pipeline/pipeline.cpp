@@ -226,7 +226,8 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
         m_map.recordForeground(trunk, foreground);
     }
     result.trunks.push_back({trunk.id, trunk.status, tracked.status,
-                             tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range});
+                             tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
+                             (trunk.trunk.xy - wMc.t.head<2>()).norm()});
   }
 }
 

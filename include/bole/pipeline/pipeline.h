@@ -37,6 +37,7 @@ struct TrackedTrunk
   TrackingStatus status = TrackingStatus::not_visible;
   RelativeTrunk relative; ///< the optimum where tracked, else the prediction
   ElevationRange range;   ///< the part looked at
+  double distance = 0;    ///< from the camera to the axis by the map [m]
 };
 
 struct FrameResult

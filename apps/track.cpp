@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole track: from a flight through trees to a map of trunks and a trajectory.
+#include "commands.h"
+#include "interrupt.h"
+#include "track_output.h"
+
+#include <bole/ardrone/ardrone_source.h>
+#include <bole/input/open_source.h>
+#include <bole/output/progress.h>
+#include <bole/pipeline/config.h>
+
+#include <cstdio>
+#include <fmt/format.h>
+#include <memory>
+
+#include <visp3/core/vpDisplay.h>
+#include <visp3/gui/vpDisplayX.h>
+
+namespace bole::apps
+{
+namespace
+{
+struct Arguments
+{
+  std::string input, run, config;
+  std::vector<std::string> settings;
+  SourceOptions source;
+  bool is_shown = false, has_video = true, is_without_odometry = false;
+  std::size_t frames_most = 0;
+};
+
+std::unique_ptr<FrameSource> openInput(const Arguments &arguments)
+{
+  if (!ArDroneSource::accepts(arguments.input))
+    return openSource(arguments.input, arguments.source);
+  ArDroneSource::Options options;
+  options.give_up_s = 10;
+  return std::make_unique<ArDroneSource>(ArDroneAddress::parse(arguments.input), options);
+}
+
+PipelineOptions readOptions(const Arguments &arguments)
+{
+  PipelineOptions options;
+  if (!arguments.config.empty())
+    readConfig(arguments.config, options);
+  for (const std::string &setting : arguments.settings)
+    setOption(setting, options);
+  return options;
+}
+
+/// The overlay in a ViSP window, where one was asked for.
+class Window
+{
+public:
+  explicit Window(bool is_shown) : m_is_shown(is_shown) {}
+  ~Window()
+  {
+    if (m_display)
+      vpDisplay::close(m_picture);
+  }
+  void show(const vpImage<vpRGBa> &picture)
+  {
+    if (!m_is_shown)
+      return;
+    m_picture = picture;
+    if (!m_display)
+      m_display = std::make_unique<vpDisplayX>(m_picture, 100, 100, "bole track");
+    vpDisplay::display(m_picture);
+    vpDisplay::flush(m_picture);
+  }
+
+private:
+  bool m_is_shown;
+  vpImage<vpRGBa> m_picture;
+  std::unique_ptr<vpDisplayX> m_display;
+};
+
+void track(const Arguments &arguments)
+{
+  const PipelineOptions options = readOptions(arguments);
+  const auto source = openInput(arguments);
+  if (!source->note().empty())
+    std::fprintf(stderr, "bole: %s\n", source->note().c_str());
+
+  Pipeline pipeline(source->camera(), source->bMc(), options);
+  TrackOutput output(arguments.run, arguments.input, arguments.config, *source, arguments.has_video);
+  Window window(arguments.is_shown);
+  Progress progress(source->size(), stderr);
+  endAtInterrupt();
+  std::size_t count = 0;
+  while (!interrupted() && (arguments.frames_most == 0 || count < arguments.frames_most)) {
+    Frame frame;
+    if (!source->next(frame))
+      break;
+    if (arguments.is_without_odometry) {
+      frame.wMb_odometry.reset();
+      frame.gyro.clear();
+    }
+    const FrameResult result = pipeline.process(frame);
+    window.show(output.add(frame, result));
+    progress.update(++count, output.trunksInView(), toString(frame.status));
+    if (count % 50 == 0)
+      output.write(pipeline, false);
+  }
+  progress.finish();
+  if (count == 0)
+    throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
+  pipeline.finish();
+  output.write(pipeline, !interrupted());
+  output.finish();
+  fmt::print("{} frames, {} trunks confirmed, median {:.1f} ms a frame. Look at {}/overlay.mp4 and {}/map.svg\n", count,
+             output.confirmed(), output.medianTotal_ms(), arguments.run, arguments.run);
+}
+} // namespace
+
+void addTrack(CLI::App &app)
+{
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App *command = app.add_subcommand("track", "Map the trunks of a flight and smooth its trajectory");
+  command->add_option("INPUT", arguments->input,
+                      "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
+      ->required();
+  command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
+  command->add_option("--config", arguments->config, "YAML file of options (config/paper.yaml: the paper's method)");
+  command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
+  command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
+  command->add_option("--odometry", arguments->source.odometry_path,
+                      "Poses for a video: TUM or ASL csv; `none` withholds odometry and gyro");
+  command->add_option("--rate", arguments->source.frame_rate_hz, "Frames a second of numbered images")
+      ->capture_default_str();
+  command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
+      ->capture_default_str();
+  command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)");
+  command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
+  command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
+  command->footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, graph.g2o, overlay.mp4, saliency.mp4, map.svg,\n"
+                  "timing.csv and summary.json to the folder; Ctrl-C ends the flight and keeps what is known.\n"
+                  "Examples:\n"
+                  "  bole track data/park-forward -o run\n"
+                  "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
+                  "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
+                  "  bole track ardrone://192.168.1.1 -o run --show");
+  command->callback([arguments] {
+    if (arguments->source.odometry_path == "none") {
+      arguments->is_without_odometry = true;
+      arguments->source.odometry_path.clear();
+    }
+    track(*arguments);
+  });
+}
+} // namespace bole::apps

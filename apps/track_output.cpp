@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "track_output.h"
+
+#include <bole/input/asl_source.h>
+#include <bole/input/truth.h>
+#include <bole/output/overlay.h>
+#include <bole/output/timing_csv.h>
+#include <bole/output/trajectory_writer.h>
+#include <bole/output/trunks_csv.h>
+#include <bole/smoothing/g2o.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole::apps
+{
+namespace
+{
+Trajectory toTrajectory(const std::vector<Pipeline::StampedPose> &poses)
+{
+  Trajectory trajectory;
+  for (const auto &pose : poses)
+    trajectory.push_back({pose.stamp_ns, pose.wMb});
+  return trajectory;
+}
+
+vpImage<float> foregroundOf(const Saliency &saliency)
+{
+  vpImage<float> foreground(saliency.p_background.getHeight(), saliency.p_background.getWidth());
+  for (unsigned int i = 0; i < foreground.getSize(); ++i)
+    foreground.bitmap[i] = 1 - saliency.p_background.bitmap[i];
+  return foreground;
+}
+} // namespace
+
+TrackOutput::TrackOutput(const std::string &run, const std::string &input, const std::string &preset,
+                         const FrameSource &source, bool has_video)
+  : m_run(run), m_camera(source.camera())
+{
+  std::error_code error;
+  std::filesystem::create_directories(run, error);
+  if (error)
+    throw vpException(vpException::ioError, "%s: cannot be made: %s", run.c_str(), error.message().c_str());
+  m_summary.version = BOLE_VERSION;
+  m_summary.input = input;
+  m_summary.preset = preset.empty() ? "default" : preset;
+  m_summary.note = source.note();
+  m_summary.camera = m_camera;
+  m_summary.has_odometry = source.hasOdometry();
+  m_summary.has_gyro = source.hasGyro();
+  m_picture.title = source.name();
+  if (AslSource::accepts(input) && std::filesystem::exists(input + "/trees.csv"))
+    m_picture.truth_trunks = readTruthTrunks(input);
+  if (has_video) {
+    m_overlay = std::make_unique<VideoWriter>(run + "/overlay.mp4");
+    m_saliency = std::make_unique<VideoWriter>(run + "/saliency.mp4");
+  }
+}
+
+vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result)
+{
+  ++m_summary.frames[frame.status];
+  if (!result.step_from_odometry && m_summary.timing.frames.size() == 1)
+    m_summary.scale = ScaleSource::prior;
+  FrameTiming timing;
+  timing.index = frame.index;
+  timing.stamp_ns = frame.stamp_ns;
+  for (const auto &[stage, ms] : result.timing_ms) {
+    if (timing.stages_ms.size() >= m_summary.timing.stages.size())
+      m_summary.timing.stages.emplace_back(stage);
+    timing.stages_ms.push_back(ms);
+    timing.total_ms += ms;
+  }
+  m_summary.timing.frames.push_back(timing);
+  if (frame.wMb_odometry)
+    m_picture.odometry.push_back({frame.stamp_ns, *frame.wMb_odometry});
+  if (frame.wMb_truth)
+    m_picture.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
+
+  Overlay overlay;
+  for (const TrackedTrunk &trunk : result.trunks) {
+    if (trunk.map_status == TrunkStatus::merged || trunk.status == TrackingStatus::not_visible)
+      continue;
+    overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high,
+                              trunk.map_status, trunk.status == TrackingStatus::tracked});
+  }
+  m_in_view = static_cast<std::size_t>(std::count_if(
+      result.trunks.begin(), result.trunks.end(),
+      [](const TrackedTrunk &trunk) { return trunk.status == TrackingStatus::tracked; }));
+  if (result.saliency)
+    overlay.foreground = foregroundOf(*result.saliency);
+  overlay.is_warning = frame.status != FrameStatus::ok;
+  overlay.text = fmt::format("{:.1f} s  {} trunks  {}", 1e-9 * static_cast<double>(frame.stamp_ns), m_in_view,
+                             overlay.is_warning ? toString(frame.status) : "");
+  if (frame.image.getSize() == 0 || static_cast<int>(frame.image.getWidth()) != m_camera.width)
+    return {};
+  const vpImage<vpRGBa> picture = drawOverlay(frame.image, m_camera, overlay);
+  if (m_overlay)
+    m_overlay->write(picture, frame.stamp_ns);
+  if (m_saliency && result.saliency)
+    m_saliency->write(drawSaliency(frame.image, m_camera, overlay.foreground, overlay.text), frame.stamp_ns);
+  return picture;
+}
+
+void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
+{
+  m_picture.smoothed = toTrajectory(pipeline.smoothedTrajectory());
+  m_picture.online = toTrajectory(pipeline.onlineTrajectory());
+  m_picture.trunks = pipeline.map();
+  m_summary.trunks = m_picture.trunks;
+  m_summary.is_complete = is_complete;
+  m_confirmed = static_cast<int>(
+      std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),
+                    [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
+  writeTrajectory(m_run + "/trajectory.tum", m_picture.smoothed);
+  writeTrajectory(m_run + "/trajectory_online.tum", m_picture.online);
+  writeTrunks(m_run + "/trunks.csv", m_picture.trunks);
+  writeG2o(m_run + "/graph.g2o", pipeline.graph());
+  writeMap(m_run + "/map.svg", m_picture);
+  writeTiming(m_run + "/timing.csv", m_summary.timing);
+  writeSummary(m_run + "/summary.json", m_summary);
+}
+
+void TrackOutput::finish()
+{
+  if (m_overlay)
+    m_overlay->finish();
+  if (m_saliency)
+    m_saliency->finish();
+}
+} // namespace bole::apps
