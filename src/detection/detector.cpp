@@ -32,6 +32,7 @@ void DetectorOptions::validate() const
   require("detection.parallax_min", parallax_min, 0, 1);
   require("detection.range_sigma_max", range_sigma_max, 0.01, 1);
   require("detection.views_min", views_min, 2, 100);
+  require("detection.near_range", near_range, 0, 100);
   require("detection.foreground_min", foreground_min, 0, 1);
 }
 
@@ -237,7 +238,8 @@ bool overlaps(const Detection &a, const Detection &b)
 /// narrower a shadow's edge on the bark.
 double quality(const Detection &detection)
 {
-  return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) / (detection.rms_px + 0.2);
+  return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) *
+         (0.5 + std::max(detection.foreground, 0.0)) / (detection.rms_px + 0.2);
 }
 
 /// Best first; a trunk that overlaps a better one in the image is another reading of the same lines.
@@ -312,7 +314,8 @@ double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera
 }
 
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
-                                    const std::vector<InhibitedRange> &known, const DetectorOptions &options)
+                                    const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
+                                    const DetectorOptions &options)
 {
   std::vector<Detection> found;
   if (static_cast<int>(views.size()) < options.views_min)
@@ -332,8 +335,17 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         break;
       if (pair.s * options.range_max < options.radius_min || inhibited(known, peaks[i].q, peaks[j].q))
         continue;
-      if (const auto detection = verify(plane, pair, camera.fx, options))
-        found.push_back(*detection);
+      auto detection = verify(plane, pair, camera.fx, options);
+      if (!detection)
+        continue;
+      if (p_background)
+        detection->foreground =
+            foregroundBetween(*p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk),
+                              options.profile.range);
+      if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
+          detection->foreground < options.foreground_min)
+        continue;
+      found.push_back(*detection);
     }
   return suppress(std::move(found));
 }

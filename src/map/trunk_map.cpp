@@ -16,6 +16,7 @@ void MapOptions::validate() const
   require("map.confirm_observations", confirm_observations, 2, 1000);
   require("map.confirm_parallax", confirm_parallax, 0, 1);
   require("map.confirm_range_sigma", confirm_range_sigma, 0.01, 1);
+  require("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
   require("map.confirm_hit_ratio", confirm_hit_ratio, 0, 1);
   require("map.confirm_innovation_px", confirm_innovation_px, 0.1, 20);
   require("map.near_range", near_range, 0, 100);
@@ -75,15 +76,38 @@ void TrunkMap::recordMiss(MapTrunk &trunk) const
   ++trunk.misses_in_a_row;
 }
 
-void TrunkMap::recordForeground(MapTrunk &trunk, double foreground) const
+void TrunkMap::recordForeground(MapTrunk &trunk, double range, double foreground) const
 {
+  if (range > m_options.near_range)
+    return;
   trunk.foreground += (foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
 /// Predictions of a trunk come true; those of a chance pair of lines miss by what the scan allows.
-bool TrunkMap::fits(const MapTrunk &trunk) const
+bool TrunkMap::fits(const MapTrunk &trunk, double slack) const
 {
-  return trunk.innovation2 <= m_options.confirm_innovation_px * m_options.confirm_innovation_px;
+  return std::sqrt(trunk.innovation2) <= slack * m_options.confirm_innovation_px;
+}
+
+/// A trunk that came near must have moved like something near.
+bool TrunkMap::isForeground(const MapTrunk &trunk) const
+{
+  return trunk.foreground_count < 3 || trunk.foreground >= m_options.confirm_foreground;
+}
+
+bool TrunkMap::isHit(const MapTrunk &trunk, double ratio) const
+{
+  return trunk.hits >= ratio * (trunk.hits + trunk.misses);
+}
+
+/// Of a candidate, what keeps it from ever being confirmed; of a confirmed trunk, clear signs that it is none.
+bool TrunkMap::isDisproved(const MapTrunk &trunk) const
+{
+  if (trunk.observations < m_options.doubt_observations)
+    return false;
+  if (trunk.status == TrunkStatus::candidate)
+    return !fits(trunk) || !isForeground(trunk);
+  return !fits(trunk, 1.5) || !isForeground(trunk) || !isHit(trunk, 0.8 * m_options.confirm_hit_ratio);
 }
 
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
@@ -91,12 +115,9 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
   const double r = trunk.trunk.radius();
   const double position_sigma = std::sqrt(trunk.covariance.topLeftCorner<2, 2>().trace());
   return trunk.observations >= m_options.confirm_observations && trunk.parallax() >= m_options.confirm_parallax &&
-         trunk.hits >= m_options.confirm_hit_ratio * (trunk.hits + trunk.misses) && r >= m_options.radius_min &&
-         r <= m_options.radius_max && position_sigma < 10 &&
-         fits(trunk) &&
-         std::sqrt(trunk.covariance(2, 2)) <= 2 * m_options.confirm_range_sigma &&
-         (trunk.foreground_count == 0 || trunk.range_min_seen > m_options.near_range ||
-          trunk.foreground >= m_options.confirm_foreground);
+         isHit(trunk, m_options.confirm_hit_ratio) && r >= m_options.radius_min && r <= m_options.radius_max &&
+         position_sigma <= m_options.confirm_position_sigma && fits(trunk) && isForeground(trunk) &&
+         std::sqrt(trunk.covariance(2, 2)) <= 2 * m_options.confirm_range_sigma;
 }
 
 bool TrunkMap::isDuplicate(const MapTrunk &a, const MapTrunk &b) const
@@ -117,8 +138,7 @@ std::vector<MapChange> TrunkMap::review()
       continue;
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk))
       change(trunk, TrunkStatus::confirmed);
-    else if (trunk.status == TrunkStatus::candidate && trunk.observations >= m_options.doubt_observations &&
-             !fits(trunk)) {
+    else if (trunk.status != TrunkStatus::lost && isDisproved(trunk)) {
       trunk.removed = true;
       change(trunk, TrunkStatus::lost);
     }

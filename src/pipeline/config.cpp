@@ -188,6 +188,7 @@ void addDetection(std::vector<OptionEntry> &entries, DetectorOptions &o)
                                  {"detection.parallax_min", &o.parallax_min},
                                  {"detection.range_sigma_max", &o.range_sigma_max},
                                  {"detection.views_min", &o.views_min},
+                                 {"detection.near_range", &o.near_range},
                                  {"detection.foreground_min", &o.foreground_min}});
 }
 
@@ -232,6 +233,7 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
   entries.insert(entries.end(), {{"map.confirm_observations", &o.confirm_observations},
                                  {"map.confirm_parallax", &o.confirm_parallax},
                                  {"map.confirm_range_sigma", &o.confirm_range_sigma},
+                                 {"map.confirm_position_sigma", &o.confirm_position_sigma},
                                  {"map.confirm_hit_ratio", &o.confirm_hit_ratio},
                                  {"map.confirm_innovation_px", &o.confirm_innovation_px},
                                  {"map.near_range", &o.near_range},

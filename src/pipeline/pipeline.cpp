@@ -192,7 +192,9 @@ bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPredicti
   const Pose wMc = cameraAt(pose);
   const Eigen::Vector2d moved = m_camera.fx * tracked.optimum.minus(prediction.relative).tail<2>();
   const double widened = tracked.left_used && tracked.right_used ? moved(1) * tracked.optimum.ratio() : 0;
-  const double innovation2 = moved(0) * moved(0) + widened * widened; // mean over (bearing +- width)
+  const double width_px = 2 * m_camera.fx * tracked.optimum.ratio();
+  const double innovation2 = std::min(moved(0) * moved(0) + widened * widened, 9.0) / // mean over (bearing +- width)
+                             (1 + std::pow(width_px / 20, 2));
   m_map.recordView(trunk, {time_s, bearingOf(wMc, trunk.trunk), (trunk.trunk.xy - wMc.t.head<2>()).norm(),
                            tracked.left_contrast, tracked.right_contrast, innovation2});
   return true;
@@ -223,7 +225,7 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
       const double foreground =
           foregroundBetween(result.saliency->p_background, m_camera, tracked.optimum, prediction.range);
       if (foreground >= 0)
-        m_map.recordForeground(trunk, foreground);
+        m_map.recordForeground(trunk, (trunk.trunk.xy - wMc.t.head<2>()).norm(), foreground);
     }
     result.trunks.push_back({trunk.id, trunk.status, tracked.status,
                              tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
@@ -287,7 +289,8 @@ void Pipeline::detectNew(FrameResult &result)
   std::vector<DetectorView> views;
   for (const View &view : m_views)
     views.push_back({&view.profile, cameraAt(view.pose)});
-  result.detections = detectTrunks(views, m_camera, inhibited(), m_options.detection);
+  result.detections = detectTrunks(views, m_camera, inhibited(),
+                                   result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
   for (const Detection &detection : result.detections)
     adopt(detection);
   if (!result.detections.empty())

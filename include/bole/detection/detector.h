@@ -26,14 +26,15 @@ struct DetectorOptions
   double range_max = 9.0;      ///< farthest trunk that matters for planning [m], 2 to 50
   double radius_min = 0.05;    ///< [m]
   double radius_max = 0.38;    ///< [m]
-  double agreement_min = 0.55; ///< mean agreement of the borders with the window, 0 to 1
+  double agreement_min = 0.6;  ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;    ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;      ///< [px]
-  double rms_max_px = 1.3;     ///< of the inliers, [px]
+  double rms_max_px = 0.9;     ///< of the inliers, [px]
   double parallax_min = 0.04;  ///< angle between the first and the last line of sight, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   int views_min = 5;           ///< views within the window that see both borders
-  double foreground_min = 0.0; ///< mean of 1 - p(background) between the borders, 0 (off) to 1
+  double near_range = 5.5;     ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
+  double foreground_min = 0.3; ///< mean of 1 - p(background) between its borders then, 0 to 1
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -71,7 +72,9 @@ struct InhibitedRange
 double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
                          const ElevationRange &range);
 
-/// Trunks seen in views.back() (the current frame) and agreed on by the others. Cost: 2 to 4 ms. Thread-safe.
+/// Trunks seen in views.back() (the current frame) and agreed on by the others. \p p_background: of the current frame,
+/// or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 24. Thread-safe.
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
-                                    const std::vector<InhibitedRange> &known, const DetectorOptions &options);
+                                    const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
+                                    const DetectorOptions &options);
 } // namespace bole

@@ -21,8 +21,10 @@ struct MapOptions
   int confirm_observations = 10;      ///< views before a candidate may be confirmed, 2 to 1000
   double confirm_parallax = 0.05;     ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
   double confirm_range_sigma = 0.10;  ///< relative standard deviation of the range at which it may be, 0.01 to 1
-  double confirm_hit_ratio = 0.65;    ///< found / should have been found, 0 to 1
-  double confirm_innovation_px = 0.9; ///< rms of prediction against what was found [px], 0.1 to 20; chance gives 1.4
+  double confirm_position_sigma = 0.30; ///< standard deviation of the place at which it may be [m], 0.01 to 10
+  double confirm_hit_ratio = 0.75;    ///< found / should have been found, 0 to 1
+  double confirm_innovation_px = 1.0; ///< rms of prediction against what was found, for a trunk that is narrow in the
+                                      ///< image [px], 0.1 to 20; chance gives 1.4
   double near_range = 5.5;            ///< a trunk that came nearer must have been foreground [m], 0 to 100
   double confirm_foreground = 0.3;    ///< mean of 1 - p(background) inside it, where known, 0 to 1
   int doubt_observations = 8;         ///< views after which a candidate that does not fit is given up, 3 to 1000
@@ -47,7 +49,7 @@ struct MapTrunk
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   double bearing_first = 0;                  ///< world bearing of the first view [rad]
   double bearing_low = 0, bearing_high = 0;  ///< extremes of the bearing from the first one [rad]
-  double innovation2 = 0;                    ///< mean square of prediction against what was found [px^2]
+  double innovation2 = 0;                    ///< running mean of TrunkView::innovation2
   double foreground = 0;                     ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   double range_min_seen = 1e9;               ///< nearest it was [m]
@@ -63,7 +65,8 @@ struct TrunkView
   double bearing = 0; ///< of the trunk from the camera, world [rad]
   double range = 0;   ///< [m]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
-  double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2]
+  double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], less the
+                          ///< wider the trunk stands in the image (its borders are rougher)
 };
 
 /// What review() decided.
@@ -86,7 +89,8 @@ public:
 
   void recordView(MapTrunk &trunk, const TrunkView &view) const;
   void recordMiss(MapTrunk &trunk) const;
-  void recordForeground(MapTrunk &trunk, double foreground) const;
+  /// Saliency inside a trunk \p range away; said nothing of it beyond near_range.
+  void recordForeground(MapTrunk &trunk, double range, double foreground) const;
 
   /// Promotes, loses and merges by what is known now. The caller carries the changes to the smoother.
   std::vector<MapChange> review();
@@ -94,7 +98,10 @@ public:
   std::vector<TrunkRecord> records() const;
 
 private:
-  bool fits(const MapTrunk &trunk) const;
+  bool fits(const MapTrunk &trunk, double slack = 1) const;
+  bool isForeground(const MapTrunk &trunk) const;
+  bool isHit(const MapTrunk &trunk, double ratio) const;
+  bool isDisproved(const MapTrunk &trunk) const;
   bool mayBeConfirmed(const MapTrunk &trunk) const;
   bool isDuplicate(const MapTrunk &a, const MapTrunk &b) const;
 

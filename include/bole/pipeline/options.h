@@ -14,6 +14,14 @@
 
 namespace bole
 {
+/// Points for the smoother, which has the pose filter already: it must not count twice.
+inline PointMotionOptions withoutOdometry()
+{
+  PointMotionOptions options;
+  options.use_odometry = false;
+  return options;
+}
+
 /// What belongs to no single stage.
 struct FlowOptions
 {
@@ -34,7 +42,7 @@ struct PipelineOptions
 {
   FlowOptions flow;
   MotionModelOptions motion;
-  PointMotionOptions points;
+  PointMotionOptions points = withoutOdometry();
   GradientOptions gradient;
   SaliencyOptions saliency;
   DetectorOptions detection;
