@@ -22,6 +22,8 @@ void MapOptions::validate() const
   require("map.near_range", near_range, 0, 100);
   require("map.doubt_observations", doubt_observations, 3, 1000);
   require("map.confirm_foreground", confirm_foreground, 0, 1);
+  require("map.doubt_slack", doubt_slack, 1, 10);
+  require("map.merge_distance", merge_distance, 0, 5);
   require("map.lost_misses", lost_misses, 1, 1000);
   require("map.radius_min", radius_min, 0.001, 10);
   require("map.radius_max", radius_max, radius_min, 10);
@@ -106,8 +108,8 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk) const
   if (trunk.observations < m_options.doubt_observations)
     return false;
   if (trunk.status == TrunkStatus::candidate)
-    return !fits(trunk) || !isForeground(trunk);
-  return !fits(trunk, 1.5) || !isForeground(trunk) || !isHit(trunk, 0.8 * m_options.confirm_hit_ratio);
+    return !fits(trunk, m_options.doubt_slack) || !isForeground(trunk);
+  return !fits(trunk, 2 * m_options.doubt_slack) || !isForeground(trunk) || !isHit(trunk, 0.8 * m_options.confirm_hit_ratio);
 }
 
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
@@ -123,7 +125,7 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
 bool TrunkMap::isDuplicate(const MapTrunk &a, const MapTrunk &b) const
 {
   const double distance = (a.trunk.axisAt(1.3) - b.trunk.axisAt(1.3)).head<2>().norm();
-  return distance < a.trunk.radius() + b.trunk.radius();
+  return distance < a.trunk.radius() + b.trunk.radius() + m_options.merge_distance;
 }
 
 std::vector<MapChange> TrunkMap::review()
@@ -153,8 +155,11 @@ std::vector<MapChange> TrunkMap::review()
     for (MapTrunk &b : m_trunks) {
       if (a.id >= b.id || a.removed || b.removed || !isDuplicate(a, b))
         continue;
-      MapTrunk &keep = a.observations >= b.observations ? a : b;
-      MapTrunk &gone = a.observations >= b.observations ? b : a;
+      MapTrunk &wide = a.trunk.log_radius >= b.trunk.log_radius ? a : b;
+      MapTrunk &narrow = &wide == &a ? b : a;
+      // the narrower of two is an edge on the bark, unless the wider has little behind it
+      const bool is_wide_kept = wide.observations >= 0.6 * narrow.observations && wide.innovation2 <= 2 * narrow.innovation2;
+      MapTrunk &keep = is_wide_kept ? wide : narrow, &gone = is_wide_kept ? narrow : wide;
       gone.removed = true;
       change(gone, TrunkStatus::merged, keep.id);
     }

@@ -240,6 +240,8 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
                                  {"map.doubt_observations", &o.doubt_observations},
                                  {"map.confirm_foreground", &o.confirm_foreground},
                                  {"map.lost_misses", &o.lost_misses},
+                                 {"map.merge_distance", &o.merge_distance},
+                                 {"map.doubt_slack", &o.doubt_slack},
                                  {"map.radius_min", &o.radius_min},
                                  {"map.radius_max", &o.radius_max}});
 }

@@ -183,6 +183,15 @@ TrackingPrediction Pipeline::predict(const MapTrunk &trunk, const RelativeTrunk 
   return prediction;
 }
 
+/// Mean square of the borders found against those expected [px^2], less the wider the trunk stands in the image.
+double Pipeline::misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const
+{
+  const Eigen::Vector2d moved = m_camera.fx * tracked.optimum.minus(expected).tail<2>();
+  const double widened = tracked.left_used && tracked.right_used ? moved(1) * tracked.optimum.ratio() : 0;
+  const double width_px = 2 * m_camera.fx * tracked.optimum.ratio();
+  return std::min(moved(0) * moved(0) + widened * widened, 9.0) / (1 + std::pow(width_px / 20, 2));
+}
+
 bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction,
                        const TrackingResult &tracked, double time_s)
 {
@@ -190,11 +199,7 @@ bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPredicti
   if (m_smoother.addObservation(pose, trunk.smoother_id, summary) != SummaryStatus::ok)
     return false;
   const Pose wMc = cameraAt(pose);
-  const Eigen::Vector2d moved = m_camera.fx * tracked.optimum.minus(prediction.relative).tail<2>();
-  const double widened = tracked.left_used && tracked.right_used ? moved(1) * tracked.optimum.ratio() : 0;
-  const double width_px = 2 * m_camera.fx * tracked.optimum.ratio();
-  const double innovation2 = std::min(moved(0) * moved(0) + widened * widened, 9.0) / // mean over (bearing +- width)
-                             (1 + std::pow(width_px / 20, 2));
+  const double innovation2 = misfit(tracked, prediction.relative);
   m_map.recordView(trunk, {time_s, bearingOf(wMc, trunk.trunk), (trunk.trunk.xy - wMc.t.head<2>()).norm(),
                            tracked.left_contrast, tracked.right_contrast, innovation2});
   return true;
@@ -274,7 +279,10 @@ std::vector<InhibitedRange> Pipeline::inhibited() const
   for (const MapTrunk &trunk : m_map.trunks()) {
     const Eigen::Vector2d w = trunk.trunk.xy - wMc.t.head<2>();
     const double r = trunk.trunk.radius(), d2 = w.squaredNorm();
-    if (trunk.removed || trunk.status == TrunkStatus::lost || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
+    // a candidate in doubt must not keep a better reading of the same lines away
+    const bool is_doubtful = trunk.status == TrunkStatus::candidate &&
+                             std::sqrt(trunk.innovation2) > m_options.map.confirm_innovation_px;
+    if (trunk.removed || is_doubtful || trunk.status == TrunkStatus::lost || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
       continue;
     const double q = w.dot(left) / w.dot(forward), half = r / std::sqrt(d2 - r * r);
     ranges.push_back({q - half - 1 / m_camera.fx, q + half + 1 / m_camera.fx});
@@ -293,8 +301,6 @@ void Pipeline::detectNew(FrameResult &result)
                                    result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
   for (const Detection &detection : result.detections)
     adopt(detection);
-  if (!result.detections.empty())
-    m_smoother.update();
 }
 
 /// A detection becomes a candidate, with what the views of the window saw of it.
@@ -303,6 +309,7 @@ void Pipeline::adopt(const Detection &detection)
   const std::size_t smoother_id = m_smoother.addTrunk(detection.trunk);
   MapTrunk &trunk = m_map.add(smoother_id, detection.trunk);
   trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
+  std::vector<std::pair<std::size_t, TrackingResult>> seen;
   for (const View &view : m_views) {
     const Pose wMc = cameraAt(view.pose);
     const RelativeTrunk relative = relativeTrunk(wMc, Pose(), detection.trunk);
@@ -312,9 +319,16 @@ void Pipeline::adopt(const Detection &detection)
     covariance.diagonal() << 1e-4, 1e-4, std::pow(1.0 / m_camera.fx, 2), std::pow(1.0 / m_camera.fx / relative.ratio(), 2);
     TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
     const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
-    if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked))
-      observe(trunk, view.pose, prediction, tracked, view.time_s);
+    if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) &&
+        observe(trunk, view.pose, prediction, tracked, view.time_s))
+      seen.emplace_back(view.pose, tracked);
   }
+  m_smoother.update();
+  const Trunk fitted = m_smoother.trunk(smoother_id);
+  double sum = 0;
+  for (const auto &[pose, tracked] : seen)
+    sum += misfit(tracked, relativeTrunk(m_smoother.pose(pose), m_bMc, fitted));
+  trunk.innovation2 = seen.empty() ? 9 : sum / static_cast<double>(seen.size());
 }
 
 void Pipeline::reviewMap()

@@ -23,13 +23,15 @@ struct MapOptions
   double confirm_range_sigma = 0.10;  ///< relative standard deviation of the range at which it may be, 0.01 to 1
   double confirm_position_sigma = 0.30; ///< standard deviation of the place at which it may be [m], 0.01 to 10
   double confirm_hit_ratio = 0.75;    ///< found / should have been found, 0 to 1
-  double confirm_innovation_px = 1.0; ///< rms of prediction against what was found, for a trunk that is narrow in the
+  double confirm_innovation_px = 0.7; ///< rms of prediction against what was found, for a trunk that is narrow in the
                                       ///< image [px], 0.1 to 20; chance gives 1.4
   double near_range = 5.5;            ///< a trunk that came nearer must have been foreground [m], 0 to 100
   double confirm_foreground = 0.3;    ///< mean of 1 - p(background) inside it, where known, 0 to 1
   int doubt_observations = 8;         ///< views after which a candidate that does not fit is given up, 3 to 1000
+  double doubt_slack = 1.3;           ///< a candidate stays while it is within this times confirm_innovation_px, 1 to 10
   int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
-  double radius_min = 0.04;           ///< thinner is no trunk [m]
+  double merge_distance = 0.30;       ///< two trunks with less than this between their bark are one [m], 0 to 5
+  double radius_min = 0.05;           ///< thinner is no trunk [m]
   double radius_max = 0.60;           ///< thicker is no trunk [m]
 
   void validate() const; ///< \throw vpException naming the option, its value and the range

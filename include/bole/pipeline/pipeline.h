@@ -93,6 +93,7 @@ private:
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
   void estimateSaliency(const Frame &frame, FrameResult &result);
   void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
+  double misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const;
   bool observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction, const TrackingResult &tracked,
                double time_s);
   TrackingPrediction predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
