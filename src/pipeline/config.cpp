@@ -91,6 +91,7 @@ void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
                                  {"flow.trunk_high", &o.trunk_high},
                                  {"flow.track_range", &o.track_range},
                                  {"flow.gate", &o.gate},
+                                 {"flow.contrast_noise", &o.contrast_noise},
                                  {"flow.gate_sigma_px", &o.gate_sigma_px}});
 }
 

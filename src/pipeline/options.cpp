@@ -17,6 +17,7 @@ void FlowOptions::validate() const
   require("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
   require("flow.track_range", track_range, 1, 100);
   require("flow.gate", gate, 1, 100);
+  require("flow.contrast_noise", contrast_noise, 0, 0.5);
   require("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
 }
 

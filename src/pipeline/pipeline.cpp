@@ -158,7 +158,7 @@ void Pipeline::hide(TrackingPrediction &prediction, const MapTrunk &trunk, const
   const double range = (trunk.trunk.xy - wMc.t.head<2>()).norm();
   const double bearing = bearingOf(wMc, trunk.trunk), half = std::asin(std::min(0.99, trunk.trunk.radius() / range));
   for (const MapTrunk &other : m_map.trunks()) {
-    if (other.id == trunk.id || other.removed || other.status == TrunkStatus::lost || other.observations < 5)
+    if (other.id == trunk.id || other.removed || other.status != TrunkStatus::confirmed)
       continue;
     const double other_range = (other.trunk.xy - wMc.t.head<2>()).norm();
     if (other_range > range - 0.2)
@@ -183,13 +183,19 @@ TrackingPrediction Pipeline::predict(const MapTrunk &trunk, const RelativeTrunk 
   return prediction;
 }
 
-/// Mean square of the borders found against those expected [px^2], less the wider the trunk stands in the image.
+/// Mean square of the borders found against those expected [px^2], less the wider the trunk stands in the image
+/// (its borders are rougher) and the weaker they are (noise moves them).
 double Pipeline::misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const
 {
   const Eigen::Vector2d moved = m_camera.fx * tracked.optimum.minus(expected).tail<2>();
   const double widened = tracked.left_used && tracked.right_used ? moved(1) * tracked.optimum.ratio() : 0;
   const double width_px = 2 * m_camera.fx * tracked.optimum.ratio();
-  return std::min(moved(0) * moved(0) + widened * widened, 9.0) / (1 + std::pow(width_px / 20, 2));
+  const double weakest = std::max(tracked.left_used && tracked.right_used
+                                      ? std::min(std::abs(tracked.left_contrast), std::abs(tracked.right_contrast))
+                                      : std::abs(tracked.left_contrast + tracked.right_contrast),
+                                  1e-3);
+  return std::min(moved(0) * moved(0) + widened * widened, 9.0) /
+         (1 + std::pow(width_px / 20, 2) + std::pow(m_options.flow.contrast_noise / weakest, 2));
 }
 
 bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction,
@@ -320,7 +326,7 @@ void Pipeline::adopt(const Detection &detection)
     TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
     const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
     if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) &&
-        observe(trunk, view.pose, prediction, tracked, view.time_s))
+        tracked.left_used && tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
       seen.emplace_back(view.pose, tracked);
   }
   m_smoother.update();

@@ -21,15 +21,15 @@ namespace bole
 struct DetectorOptions
 {
   ProfileOptions profile;
-  int window = 24;             ///< frames looked at together, 4 to 100
+  int window = 18;             ///< frames looked at together, 4 to 100
   double range_min = 1.5;      ///< nearest trunk [m], 0.3 to 5
   double range_max = 9.0;      ///< farthest trunk that matters for planning [m], 2 to 50
   double radius_min = 0.06;    ///< [m]
   double radius_max = 0.38;    ///< [m]
-  double agreement_min = 0.6;  ///< mean agreement of the borders with the window, 0 to 1
+  double agreement_min = 0.5;  ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;    ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;      ///< [px]
-  double rms_max_px = 0.9;     ///< of the inliers, [px]
+  double rms_max_px = 0.7;     ///< of the inliers, [px]
   double parallax_min = 0.04;  ///< angle between the first and the last line of sight, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   int views_min = 5;           ///< views within the window that see both borders
@@ -73,7 +73,7 @@ double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera
                          const ElevationRange &range);
 
 /// Trunks seen in views.back() (the current frame) and agreed on by the others. \p p_background: of the current frame,
-/// or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 24. Thread-safe.
+/// or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 18. Thread-safe.
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
                                     const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
                                     const DetectorOptions &options);

@@ -23,7 +23,7 @@ struct MapOptions
   double confirm_range_sigma = 0.10;  ///< relative standard deviation of the range at which it may be, 0.01 to 1
   double confirm_position_sigma = 0.30; ///< standard deviation of the place at which it may be [m], 0.01 to 10
   double confirm_hit_ratio = 0.75;    ///< found / should have been found, 0 to 1
-  double confirm_innovation_px = 0.7; ///< rms of prediction against what was found, for a trunk that is narrow in the
+  double confirm_innovation_px = 0.9; ///< rms of prediction against what was found, for a trunk that is narrow in the
                                       ///< image [px], 0.1 to 20; chance gives 1.4
   double near_range = 5.5;            ///< a trunk that came nearer must have been foreground [m], 0 to 100
   double confirm_foreground = 0.3;    ///< mean of 1 - p(background) inside it, where known, 0 to 1

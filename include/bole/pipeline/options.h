@@ -27,12 +27,13 @@ struct FlowOptions
 {
   bool use_points = true;        ///< relative poses from point features
   bool use_saliency = true;      ///< motion saliency: off leaves detection ungated
-  int detect_every = 2;          ///< frames between two runs of the detector, 1 to 100
+  int detect_every = 1;          ///< frames between two runs of the detector, 1 to 100
   double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
   double trunk_low = 0.25;       ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
   double trunk_high = 2.6;       ///< ... to [m]; its middle is near breast height, where radii are told
   double track_range = 12;       ///< known trunks farther than this are not tracked [m], 1 to 100
   double gate = 9.2;             ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
+  double contrast_noise = 0.02;  ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
   double gate_sigma_px = 1.0;    ///< of a border beside the prediction [px], 0.1 to 10
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
