@@ -29,6 +29,8 @@ void renderFrame(benchmark::State &state)
 }
 BENCHMARK(renderFrame)
     ->ArgNames({"samples", "trunks_per_1000m2"})
+    ->Args({2, 50})
+    ->Args({3, 50})
     ->Args({4, 50})
     ->Args({4, 120})
     ->Args({8, 50})
