@@ -85,6 +85,8 @@ void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
 {
   entries.insert(entries.end(), {{"flow.use_points", &o.use_points},
                                  {"flow.use_saliency", &o.use_saliency},
+                                 {"flow.detect_lines", &o.detect_lines},
+                                 {"flow.detect_window", &o.detect_window},
                                  {"flow.detect_every", &o.detect_every},
                                  {"flow.view_spacing", &o.view_spacing},
                                  {"flow.trunk_low", &o.trunk_low},
@@ -193,6 +195,19 @@ void addDetection(std::vector<OptionEntry> &entries, DetectorOptions &o)
                                  {"detection.foreground_min", &o.foreground_min}});
 }
 
+void addLines(std::vector<OptionEntry> &entries, LineDetectorOptions &o)
+{
+  entries.insert(entries.end(), {{"lines.either_polarity", &o.either_polarity},
+                                 {"lines.border_a", &o.border_a},
+                                 {"lines.border_b", &o.border_b},
+                                 {"lines.foreground_a", &o.foreground_a},
+                                 {"lines.foreground_b", &o.foreground_b},
+                                 {"lines.inhibition_px", &o.inhibition_px},
+                                 {"lines.threshold", &o.threshold},
+                                 {"lines.width_min_px", &o.width_min_px},
+                                 {"lines.width_max_px", &o.width_max_px}});
+}
+
 void addTracking(std::vector<OptionEntry> &entries, TrackingOptions &o)
 {
   entries.insert(entries.end(), {{"energy.form", &o.energy.form},
@@ -292,6 +307,7 @@ std::vector<OptionEntry> optionEntries(PipelineOptions &options)
                                  {"gradient.split_sigma_px", &options.gradient.split_sigma_px}});
   addSaliency(entries, options.saliency);
   addDetection(entries, options.detection);
+  addLines(entries, options.lines);
   addTracking(entries, options.tracking);
   addSmoothing(entries, options.smoothing);
   addMap(entries, options.map);

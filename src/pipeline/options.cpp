@@ -29,6 +29,7 @@ void PipelineOptions::validate() const
   gradient.validate();
   saliency.validate();
   detection.validate();
+  lines.validate();
   tracking.validate();
   smoothing.validate();
   map.validate();

@@ -118,14 +118,31 @@ void Pipeline::addRelativePoses(const std::vector<RelativeMotion> &motions)
   };
   bool added = false;
   for (const RelativeMotion &motion : motions) {
-    if (!motion.estimate.hasDirection())
+    if (!motion.estimate.hasDirection()) {
+      if (motion.estimate.hasRotation() && !motion.gyro) {
+        addTurn(poseOf(motion.a_index), poseOf(motion.b_index), motion.estimate);
+        added = true;
+      }
       continue;
+    }
     m_smoother.addRelativePose(poseOf(motion.a_index), poseOf(motion.b_index),
                                {motion.estimate.aRb, motion.estimate.direction, motion.estimate.covariance});
     added = true;
   }
   if (added)
     m_smoother.update();
+}
+
+/// A camera that only turns, without a gyro: its rotation, and nothing of its translation.
+void Pipeline::addTurn(std::size_t a, std::size_t b, const RelativePoseEstimate &estimate)
+{
+  Odometry odometry;
+  odometry.aMb.R = m_bMc.R * estimate.aRb * m_bMc.R.transpose();
+  odometry.covariance.setZero();
+  odometry.covariance.topLeftCorner<3, 3>() = 1e4 * Eigen::Matrix3d::Identity();
+  odometry.covariance.bottomRightCorner<3, 3>() =
+      m_bMc.R * estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose() + 1e-8 * Eigen::Matrix3d::Identity();
+  m_smoother.addOdometry(a, b, odometry);
 }
 
 void Pipeline::estimateSaliency(const Frame &frame, FrameResult &result)
@@ -300,6 +317,10 @@ void Pipeline::detectNew(FrameResult &result)
 {
   if (m_online.size() % static_cast<std::size_t>(m_options.flow.detect_every) != 0)
     return;
+  if ((m_options.flow.detect_lines || !m_ground_known) && result.saliency)
+    detectSingle(result);
+  if (!m_options.flow.detect_window || !m_ground_known)
+    return;
   std::vector<DetectorView> views;
   for (const View &view : m_views)
     views.push_back({&view.profile, cameraAt(view.pose)});
@@ -307,6 +328,34 @@ void Pipeline::detectNew(FrameResult &result)
                                    result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
   for (const Detection &detection : result.detections)
     adopt(detection);
+}
+
+void Pipeline::detectSingle(FrameResult &result)
+{
+  const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
+  result.lines = detectLines(m_views.back().gradient, result.saliency->p_background, m_camera, wMc.R, inhibited(),
+                             m_options.detection.profile, m_options.lines);
+  for (const LineDetection &line : result.lines)
+    adopt(line);
+}
+
+/// One view: the range is that of the prior on the radius.
+void Pipeline::adopt(const LineDetection &detection)
+{
+  const View &view = m_views.back();
+  const Pose wMc = cameraAt(view.pose);
+  const Trunk guess = trunkFromRelative(wMc, detection.relative, m_options.smoothing.prior_radius);
+  TrackingPrediction prediction;
+  prediction.relative = detection.relative;
+  prediction.range = elevation(detection.relative, guess, wMc);
+  const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
+  if (tracked.status != TrackingStatus::tracked || !tracked.left_used || !tracked.right_used)
+    return;
+  const Trunk seen = trunkFromRelative(wMc, tracked.optimum, m_options.smoothing.prior_radius);
+  MapTrunk &trunk = m_map.add(m_smoother.addTrunk(seen), seen);
+  observe(trunk, view.pose, prediction, tracked, view.time_s);
+  trunk.innovation2 = 0;
+  m_smoother.update();
 }
 
 /// A detection becomes a candidate, with what the views of the window saw of it.

@@ -3,7 +3,7 @@
 /// \file
 /// All options of the pipeline: one aggregate a stage.
 
-#include <bole/detection/detector.h>
+#include <bole/detection/line_detector.h>
 #include <bole/gradient/gradient.h>
 #include <bole/map/trunk_map.h>
 #include <bole/motion/point_motion.h>
@@ -27,6 +27,8 @@ struct FlowOptions
 {
   bool use_points = true;        ///< relative poses from point features
   bool use_saliency = true;      ///< motion saliency: off leaves detection ungated
+  bool detect_lines = false;     ///< the paper's one-frame detector beside (a plain video has it on) the window
+  bool detect_window = true;     ///< the detector that asks a window of frames
   int detect_every = 1;          ///< frames between two runs of the detector, 1 to 100
   double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
   double trunk_low = 0.25;       ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
@@ -47,6 +49,7 @@ struct PipelineOptions
   GradientOptions gradient;
   SaliencyOptions saliency;
   DetectorOptions detection;
+  LineDetectorOptions lines;
   TrackingOptions tracking;
   SmootherOptions smoothing;
   MapOptions map;

@@ -47,7 +47,8 @@ struct FrameResult
   FrameStatus frame_status = FrameStatus::ok;
   Pose wMb;                         ///< as known right after this frame
   std::vector<TrackedTrunk> trunks; ///< known trunks that might be in view
-  std::vector<Detection> detections; ///< new ones
+  std::vector<Detection> detections; ///< new ones, of the window
+  std::vector<LineDetection> lines;  ///< new ones, of this frame alone
   std::optional<Saliency> saliency;
   std::vector<std::pair<const char *, double>> timing_ms; ///< a stage each, in flow order
   UpdateStatus smoother_status = UpdateStatus::ok;
@@ -91,6 +92,7 @@ private:
 
   void addPose(const Frame &frame, FrameResult &result);
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
+  void addTurn(std::size_t a, std::size_t b, const RelativePoseEstimate &estimate);
   void estimateSaliency(const Frame &frame, FrameResult &result);
   void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
   double misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const;
@@ -103,7 +105,9 @@ private:
   ElevationRange elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const;
   void keepView(const Frame &frame, Gradient gradient);
   void detectNew(FrameResult &result);
+  void detectSingle(FrameResult &result);
   void adopt(const Detection &detection);
+  void adopt(const LineDetection &detection);
   std::vector<InhibitedRange> inhibited() const;
   void reviewMap();
   Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/detection/line_detector.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+void LineDetectorOptions::validate() const
+{
+  const auto require = [](const char *name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+  };
+  require("lines.border_a", border_a, -1e4, 0);
+  require("lines.border_b", border_b, -100, 100);
+  require("lines.foreground_a", foreground_a, -1e3, 0);
+  require("lines.foreground_b", foreground_b, -100, 100);
+  require("lines.inhibition_px", inhibition_px, 0.5, 100);
+  require("lines.threshold", threshold, 0, 1);
+  require("lines.width_min_px", width_min_px, 2, 1000);
+  require("lines.width_max_px", width_max_px, width_min_px, 5000);
+}
+
+namespace
+{
+double logistic(double x, double a, double b) { return 1 / (1 + std::exp(a * x + b)); }
+
+/// Eq. 21 put right; distances in the image from the column to the nearest bark.
+double notInhibited(double q, const std::vector<InhibitedRange> &known, double fx, double sigma_px)
+{
+  double sum = 0;
+  for (const InhibitedRange &range : known) {
+    const double d_px = fx * std::max({0.0, q - range.q_left, range.q_right - q});
+    sum += std::exp(-0.5 * d_px * d_px / (sigma_px * sigma_px));
+  }
+  return 1 - std::min(1.0, sum);
+}
+
+struct Line
+{
+  double q, p;
+};
+
+/// Local maxima of the probability above the threshold, at least \p apart samples from a better one.
+std::vector<Line> maxima(const std::vector<double> &p, const LevelProfile &grid, double threshold, int apart)
+{
+  std::vector<Line> lines;
+  const int n = static_cast<int>(p.size());
+  for (int i = 0; i < n; ++i) {
+    const auto first = p.begin() + std::max(0, i - apart), last = p.begin() + std::min(n, i + apart + 1);
+    const double value = p[static_cast<std::size_t>(i)];
+    if (value >= threshold && std::max_element(first, last) - p.begin() == i)
+      lines.push_back({grid.q_first + grid.step * i, value});
+  }
+  return lines;
+}
+
+RelativeTrunk relativeOf(const LevelProfile &grid, double q_left, double q_right)
+{
+  const double left = std::atan(q_left), right = std::atan(q_right);
+  RelativeTrunk relative;
+  relative.cRt = grid.cRl * Eigen::AngleAxisd(0.5 * (left + right), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  relative.log_ratio = std::log(std::sin(0.5 * (left - right)));
+  return relative;
+}
+} // namespace
+
+std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<float> &p_background,
+                                       const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
+                                       const std::vector<InhibitedRange> &known, const ProfileOptions &profile,
+                                       const LineDetectorOptions &options)
+{
+  const bool is_split = gradient.negative.getSize() > 0 && !options.either_polarity;
+  const LevelProfile falling =
+      computeLevelProfile(is_split ? gradient.negative : gradient.signed_x, camera, wRc, profile);
+  const LevelProfile rising = is_split ? computeLevelProfile(gradient.positive, camera, wRc, profile) : falling;
+  const LevelProfile background = computeLevelProfile(p_background, camera, wRc, profile);
+
+  std::vector<double> p_left(falling.mean.size(), 0.0), p_right = p_left;
+  for (std::size_t i = 0; i < falling.mean.size(); ++i) {
+    if (background.mean[i] <= 0) // the line is not in the image
+      continue;
+    const double q = falling.q_first + falling.step * static_cast<double>(i);
+    const double gate = logistic(1 - background.mean[i], options.foreground_a, options.foreground_b) * // Eq. 20
+                        notInhibited(q, known, camera.fx, options.inhibition_px);                      // Eq. 21
+    const double fall = -falling.mean[i], rise = rising.mean[i];
+    p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, options.border_b);
+    p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, options.border_b);
+  }
+
+  const auto lefts = maxima(p_left, falling, options.threshold, 6);
+  const auto rights = maxima(p_right, falling, options.threshold, 6);
+  std::vector<std::pair<Line, Line>> pairs;
+  for (const Line &left : lefts)
+    for (const Line &right : rights) {
+      const double width_px = (left.q - right.q) * camera.fx;
+      if (width_px >= options.width_min_px && width_px <= options.width_max_px)
+        pairs.emplace_back(left, right);
+    }
+  std::sort(pairs.begin(), pairs.end(),
+            [](const auto &a, const auto &b) { return a.first.p * a.second.p > b.first.p * b.second.p; });
+  std::vector<LineDetection> found;
+  std::vector<InhibitedRange> taken;
+  for (const auto &[left, right] : pairs) {
+    if (std::any_of(taken.begin(), taken.end(), [&, l = left, r = right](const InhibitedRange &range) {
+          return l.q > range.q_right && r.q < range.q_left;
+        }))
+      continue;
+    taken.push_back({right.q, left.q});
+    found.push_back({relativeOf(falling, left.q, right.q), left.p, right.p});
+  }
+  return found;
+}
+} // namespace bole
