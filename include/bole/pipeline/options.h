@@ -27,7 +27,7 @@ struct FlowOptions
 {
   bool use_points = true;        ///< relative poses from point features
   bool use_saliency = true;      ///< motion saliency: off leaves detection ungated
-  bool detect_lines = false;     ///< the paper's one-frame detector beside (a plain video has it on) the window
+  bool detect_lines = false;     ///< the one-frame detector too; always on where no odometry gives a range
   bool detect_window = true;     ///< the detector that asks a window of frames
   int detect_every = 1;          ///< frames between two runs of the detector, 1 to 100
   double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
