@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The estimation of vpMbTrunkTracker: predict, scan, servo, judge.
+#include <bole/vpMbTrunkTracker.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <visp3/core/vpExponentialMap.h>
+#include <visp3/core/vpVelocityTwistMatrix.h>
+
+using bole::Border;
+using bole::Pose;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Status = vpMbTrunkTracker::Status;
+
+namespace
+{
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+const std::array<Border, 2> kBorders{Border::left, Border::right};
+
+Matrix6d twistMatrix(const vpHomogeneousMatrix &aMb)
+{
+  const vpVelocityTwistMatrix V(aMb);
+  Matrix6d m;
+  for (unsigned i = 0; i < 6; ++i)
+    for (unsigned j = 0; j < 6; ++j)
+      m(int(i), int(j)) = V[i][j];
+  return m;
+}
+
+/// Twist of the camera that takes it from \p from to \p to: to = exp(-xi) from.
+Vector6d twistBetween(const vpHomogeneousMatrix &from, const vpHomogeneousMatrix &to)
+{
+  const vpColVector xi = vpExponentialMap::inverse(from * to.inverse());
+  Vector6d v;
+  for (unsigned i = 0; i < 6; ++i)
+    v(int(i)) = xi[i];
+  return v;
+}
+
+vpHomogeneousMatrix moved(const vpHomogeneousMatrix &cMo, const Vector6d &xi)
+{
+  vpColVector v(6);
+  for (unsigned i = 0; i < 6; ++i)
+    v[i] = xi(int(i));
+  return vpExponentialMap::direct(v).inverse() * cMo;
+}
+
+Vector3d centre(const vpHomogeneousMatrix &cMo) { return Pose::fromVisp(cMo).inverse().t; }
+
+/// Cost of following a peak, half a squared deviation: how its contrast differs from what is expected, how far it is.
+double peakCost(const bole::ContrastPeak &peak, double expected_offset, double sigma_px, double reference, bool signs)
+{
+  const double away = (peak.offset_px - expected_offset) / sigma_px;
+  double strength = std::log(std::abs(peak.contrast) / std::abs(reference));
+  if (!signs)
+    strength = std::min(strength, 0.0);
+  const double turned = signs && peak.contrast * reference < 0 ? 3 : 0;
+  return 0.5 * away * away + 0.5 * strength * strength / (0.6 * 0.6) + turned;
+}
+} // namespace
+
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails)
+{
+  Prediction prediction{m_cMo, m_posterior};
+  const int frames = m_frames_since_good + 1;
+  if (m_prior) {
+    prediction.cMo = m_prior->cMo;
+    prediction.covariance = m_prior->covariance;
+    return prediction;
+  }
+  const Pose before = Pose::fromVisp(m_reference_cMo);
+  Pose now = before;
+  double turn_sigma = m_options.turn_sigma_rad;
+  const bole::RotationAlignment turn = m_aligner.align(
+      m_reference, thumbnails, bole::PinholeCamera::fromVisp(m_cam, int(m_I.getWidth()), int(m_I.getHeight())));
+  if (turn.ok)
+    now.R = turn.c2Rc1 * before.R;
+  else
+    turn_sigma = 0.05;
+  Vector3d at = before.inverse().t;
+  if (m_has_step)
+    at += m_options.velocity_gain * frames * centre(m_step); // m_step holds the last step as a pose at its end
+  now.t = -(now.R * at);
+  prediction.cMo = now.toVisp();
+  const Matrix6d carried = twistMatrix(prediction.cMo * m_reference_cMo.inverse());
+  Vector6d variance;
+  variance.head<3>().setConstant(std::pow(m_options.step_sigma_m, 2) * frames);
+  variance.tail<3>().setConstant(turn_sigma * turn_sigma);
+  prediction.covariance = carried * m_posterior * carried.transpose();
+  prediction.covariance.diagonal() += variance;
+  return prediction;
+}
+
+void vpMbTrunkTracker::predictTrunks(const vpImage<unsigned char> &I)
+{
+  m_in_view.clear();
+  const bool far = (clippingFlag & vpPolygon3D::FAR_CLIPPING) != 0;
+  for (std::size_t k = 0; k < m_trunks.size(); ++k) {
+    vpMbtDistanceTrunk &trunk = m_trunks[k];
+    trunk.predict(m_cMo, I.getWidth(), I.getHeight());
+    if (trunk.isVisible() && far && trunk.inCamera().radius / trunk.relative().ratio() > distFarClip)
+      trunk.border(Border::left).visible = trunk.border(Border::right).visible = false;
+    if (trunk.isVisible() && trunk.isTracked())
+      m_in_view.push_back(k);
+  }
+  std::sort(m_in_view.begin(), m_in_view.end(), [&](std::size_t a, std::size_t b) {
+    return m_trunks[a].relative().ratio() / m_trunks[a].inCamera().radius >
+           m_trunks[b].relative().ratio() / m_trunks[b].inCamera().radius;
+  });
+  for (std::size_t i = 0; i < m_in_view.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      m_trunks[m_in_view[i]].hideBehind(m_trunks[m_in_view[j]]);
+  const auto gone = [&](std::size_t k) { return !m_trunks[k].isVisible(); };
+  m_in_view.erase(std::remove_if(m_in_view.begin(), m_in_view.end(), gone), m_in_view.end());
+}
+
+double vpMbTrunkTracker::expectedSigma(const vpMbtDistanceTrunk &trunk, Border side, const Matrix6d &covariance) const
+{
+  const Eigen::Vector2d middle = trunk.border(side).line.at(0.5);
+  const Vector3d m((middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1);
+  Eigen::Matrix<double, 1, 6> row;
+  vpMbtDistanceTrunk::residual(trunk.inCamera(), side, m, &row);
+  const double pose = focal() * focal() * (row * covariance * row.transpose())(0);
+  return std::sqrt(pose + m_options.border_sigma_px * m_options.border_sigma_px);
+}
+
+void vpMbTrunkTracker::scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px)
+{
+  for (std::size_t k : m_in_view) {
+    vpMbtDistanceTrunk &trunk = m_trunks[k];
+    double sigma = 0;
+    for (Border side : kBorders)
+      if (trunk.border(side).visible)
+        sigma = std::max(sigma, expectedSigma(trunk, side, covariance));
+    trunk.scan(I, int(std::ceil(std::min(std::max(3 * sigma, m_options.scan_min_px), max_half_px))));
+  }
+}
+
+std::vector<float> vpMbTrunkTracker::response(const vpMbtDistanceTrunk::BorderState &state)
+{
+  const std::vector<float> &g = state.contrast;
+  float reference = float(state.remembered_contrast);
+  const bool known = state.remembered_frames >= 2;
+  if (!known)
+    for (float v : g)
+      reference = std::max(reference, std::abs(v));
+  std::vector<float> sharp(g.size(), 0.f), wide(g.size(), 0.f);
+  for (std::size_t k = 0; k < g.size(); ++k) {
+    const float share = reference != 0 ? g[k] / reference : 0;
+    sharp[k] = std::min(known ? std::max(share, 0.f) : std::abs(share), 1.f);
+  }
+  for (std::size_t k = 1; k + 1 < g.size(); ++k)
+    wide[k] = std::max({sharp[k], 0.9f * sharp[k - 1], 0.9f * sharp[k + 1]});
+  return wide;
+}
+
+Vector6d vpMbTrunkTracker::agree(const Matrix6d &covariance)
+{
+  std::vector<bole::BallotBorder> borders;
+  Eigen::Matrix<double, 1, 6> row;
+  for (std::size_t k : m_in_view)
+    for (Border side : kBorders) {
+      const auto &state = m_trunks[k].border(side);
+      if (!state.visible)
+        continue;
+      const Eigen::Vector2d middle = state.line.at(0.5);
+      vpMbtDistanceTrunk::residual(
+          m_trunks[k].inCamera(), side,
+          {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
+      borders.push_back({-focal() * row, response(state)});
+    }
+  return bole::vote(borders, covariance, m_options.vote).twist;
+}
+
+void vpMbTrunkTracker::choosePeaks(const Vector6d &twist, double sigma_px, double reach_px)
+{
+  Eigen::Matrix<double, 1, 6> row;
+  for (std::size_t k : m_in_view)
+    for (Border side : kBorders) {
+      const auto &state = m_trunks[k].border(side);
+      if (!state.visible)
+        continue;
+      const Eigen::Vector2d middle = state.line.at(0.5);
+      vpMbtDistanceTrunk::residual(
+          m_trunks[k].inCamera(), side,
+          {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
+      const double expected = -focal() * (row * twist)(0);
+      const bool signs = state.remembered_frames >= 2;
+      double reference = state.remembered_contrast;
+      if (!signs)
+        for (const auto &peak : state.peaks)
+          if (std::abs(peak.contrast) > std::abs(reference))
+            reference = peak.contrast;
+      int best = -1;
+      double least = 4.5; // three standard deviations
+      for (int p = 0; p < int(state.peaks.size()); ++p) {
+        const double cost = peakCost(state.peaks[std::size_t(p)], expected, sigma_px, reference, signs);
+        if (cost < least)
+          least = cost, best = p;
+      }
+      m_trunks[k].choose(side, best, reach_px);
+    }
+}
+
+void vpMbTrunkTracker::computeVVSInit()
+{
+  unsigned int n = 0;
+  for (std::size_t k : m_in_view) {
+    m_trunks[k].initInteractionMatrixError();
+    n += m_trunks[k].nbFeature;
+  }
+  m_L.resize(n, 6, false, false);
+  m_error.resize(n, false);
+  m_w.resize(n, false);
+  m_w = 1;
+  m_piece_weight.resize(n, false);
+}
+
+void vpMbTrunkTracker::computeVVSInteractionMatrixAndResidu()
+{
+  unsigned int at = 0;
+  for (std::size_t k : m_in_view) {
+    vpMbtDistanceTrunk &trunk = m_trunks[k];
+    trunk.computeInteractionMatrixError(m_cMo);
+    for (unsigned int i = 0; i < trunk.nbFeature; ++i, ++at) {
+      for (unsigned int c = 0; c < 6; ++c)
+        m_L[at][c] = trunk.L[i][c];
+      m_error[at] = trunk.error[i];
+      m_piece_weight[at] = trunk.weight[i];
+    }
+  }
+}
+
+void vpMbTrunkTracker::normalEquations(Matrix6d &H, Vector6d &b) const
+{
+  H.setZero();
+  b.setZero();
+  const double scale = std::pow(focal() / m_options.border_sigma_px, 2);
+  unsigned int at = 0;
+  for (std::size_t k : m_in_view) {
+    const vpMbtDistanceTrunk &trunk = m_trunks[k];
+    const int n = int(trunk.nbFeature);
+    if (n == 0)
+      continue;
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> L(m_L[at], n, 6);
+    const Eigen::Map<const Eigen::VectorXd> e(m_error.data + at, n), w(m_w.data + at, n), share(m_piece_weight.data + at, n);
+    at += unsigned(n);
+    const Eigen::VectorXd W = scale * w.cwiseProduct(share);
+    // the lean of the real trunk about its foot is not in the model: two unknowns with a prior, eliminated
+    const bole::Cylinder c = Pose::fromVisp(m_cMo) * trunk.object();
+    const Matrix3d cRt = bole::relativeTrunk(c).cRt;
+    Eigen::Matrix<double, 6, 2> turn;
+    for (int i = 0; i < 2; ++i)
+      turn.col(i) << cRt.col(i).cross(c.foot), -cRt.col(i);
+    const Eigen::Matrix<double, Eigen::Dynamic, 2> J = L * turn;
+    Eigen::Matrix2d S = J.transpose() * W.asDiagonal() * J;
+    S.diagonal().array() += 1 / (m_options.lean_sigma_rad * m_options.lean_sigma_rad);
+    const Eigen::Matrix<double, 6, 2> LWJ = L.transpose() * W.asDiagonal() * J;
+    const Eigen::Vector2d JWe = J.transpose() * W.cwiseProduct(e);
+    const Eigen::Matrix2d S_inverse = S.inverse();
+    H += L.transpose() * W.asDiagonal() * L - LWJ * S_inverse * LWJ.transpose();
+    b -= L.transpose() * W.cwiseProduct(e) - LWJ * S_inverse * JWe;
+  }
+}
+
+void vpMbTrunkTracker::servo(const Prediction &prediction)
+{
+  computeVVSInit();
+  m_robust.setMinMedianAbsoluteDeviation(m_options.border_sigma_px / 1.48 / focal());
+  const Matrix6d prior_information = prediction.covariance.inverse();
+  for (unsigned int iteration = 0; iteration < m_maxIter; ++iteration) {
+    computeVVSInteractionMatrixAndResidu();
+    if (m_error.size() > 0)
+      computeVVSWeights(m_robust, m_error, m_w);
+    Matrix6d H;
+    Vector6d b;
+    normalEquations(H, b);
+    H += prior_information;
+    b += prior_information * twistBetween(m_cMo, prediction.cMo);
+    Vector6d xi;
+    if (isoJoIdentity)
+      xi = H.ldlt().solve(b);
+    else { // only the estimated degrees of freedom, given in the object frame
+      const Matrix6d V = twistMatrix(m_cMo);
+      Matrix6d J;
+      for (unsigned i = 0; i < 6; ++i)
+        for (unsigned j = 0; j < 6; ++j)
+          J(int(i), int(j)) = oJo[i][j];
+      const Matrix6d VJ = V * J;
+      const Matrix6d HJ = VJ.transpose() * H * VJ;
+      xi = VJ * HJ.completeOrthogonalDecomposition().solve(VJ.transpose() * b);
+    }
+    if (!xi.allFinite())
+      break;
+    m_cMo = moved(m_cMo, m_lambda * xi);
+    if (xi.norm() < 1e-5)
+      break;
+  }
+  computeVVSInteractionMatrixAndResidu();
+}
+
+double vpMbTrunkTracker::support() const
+{
+  double visible = 0, agree = 0;
+  unsigned int at = 0;
+  for (std::size_t k : m_in_view)
+    for (Border side : kBorders) {
+      const auto &state = m_trunks[k].border(side);
+      if (!state.visible)
+        continue;
+      visible += 1;
+      for (const auto &piece : state.pieces)
+        if (piece.used)
+          agree += m_piece_weight[at] * m_w[at], ++at;
+    }
+  return visible > 0 ? agree / visible : 0;
+}
+
+Status vpMbTrunkTracker::estimate(const vpImage<unsigned char> &I, const Prediction &prediction)
+{
+  m_cMo = prediction.cMo;
+  predictTrunks(I);
+  if (m_in_view.empty()) {
+    computeVVSInit();
+    return Status::no_trunk;
+  }
+  scanTrunks(I, prediction.covariance, m_options.scan_max_px);
+  const Vector6d twist = agree(prediction.covariance);
+  choosePeaks(twist, m_options.border_sigma_px, 4);
+  m_cMo = moved(m_cMo, twist);
+  servo(prediction);
+  for (int k = 0; k < m_options.refinements; ++k) {
+    Matrix6d H;
+    Vector6d b;
+    normalEquations(H, b);
+    predictTrunks(I);
+    const Matrix6d narrowed = (prediction.covariance.inverse() + H).inverse();
+    scanTrunks(I, narrowed, m_options.refine_px);
+    choosePeaks(Vector6d::Zero(), m_options.border_sigma_px, 3);
+    servo(prediction);
+  }
+  return support() < m_options.min_support ? Status::lost : Status::tracked;
+}
+
+void vpMbTrunkTracker::keep(const Prediction &prediction)
+{
+  Matrix6d H;
+  Vector6d b;
+  normalEquations(H, b);
+  m_posterior = (prediction.covariance.inverse() + H).inverse();
+  m_posterior = 0.5 * (m_posterior + m_posterior.transpose()).eval();
+  Matrix6d S = Matrix6d::Identity();
+  S.diagonal().tail<3>().setConstant(1 / m_options.lever_m);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(S * H * S);
+  int unobserved = 0;
+  while (unobserved < 6 && eigen.eigenvalues()(unobserved) * m_options.unobserved_m * m_options.unobserved_m < 1)
+    ++unobserved;
+  m_unobserved = eigen.eigenvectors().leftCols(unobserved);
+}
+
+double vpMbTrunkTracker::computeCurrentProjectionError(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cMo,
+                                                       const vpCameraParameters &cam)
+{
+  std::vector<std::vector<double>> lines;
+  drawBorders(cMo, cam, I.getWidth(), I.getHeight(), false, lines);
+  double sum = 0;
+  int n = 0;
+  for (const auto &l : lines) {
+    const Eigen::Vector2d foot(l[2], l[1]), top(l[4], l[3]);
+    const Eigen::Vector2d along = (top - foot).normalized();
+    const int length = int((top - foot).norm());
+    for (int k = 0; k < length; k += 2) {
+      const Eigen::Vector2d p = foot + k * along;
+      const int u = int(std::lround(p.x())), v = int(std::lround(p.y()));
+      if (u < 1 || v < 1 || u + 1 >= int(I.getWidth()) || v + 1 >= int(I.getHeight()))
+        continue;
+      const auto grey = [&](int du, int dv) { return double(I[unsigned(v + dv)][unsigned(u + du)]); };
+      const Eigen::Vector2d g(grey(1, -1) + 2 * grey(1, 0) + grey(1, 1) - grey(-1, -1) - 2 * grey(-1, 0) - grey(-1, 1),
+                              grey(-1, 1) + 2 * grey(0, 1) + grey(1, 1) - grey(-1, -1) - 2 * grey(0, -1) - grey(1, -1));
+      const double norm = g.norm();
+      sum += norm > 0 ? std::asin(std::min(1.0, std::abs(g.dot(along)) / norm)) * 180 / M_PI : 90;
+      ++n;
+    }
+  }
+  return n > 0 ? sum / n : 90;
+}
