@@ -172,10 +172,13 @@ std::vector<TrunkRecord> TrunkMap::records() const
   for (const MapTrunk &trunk : m_trunks) {
     TrunkRecord record;
     record.id = trunk.id;
-    record.xy = trunk.trunk.xy;
+    record.xy = trunk.trunk.axisAt(kBreastHeight).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
-    record.covariance_xy = trunk.covariance.topLeftCorner<2, 2>();
+    Eigen::Matrix<double, 2, 5> J = Eigen::Matrix<double, 2, 5>::Zero(); // of the place at breast height
+    J.leftCols<2>().setIdentity();
+    J.rightCols<2>() = kBreastHeight * Eigen::Matrix2d::Identity();
+    record.covariance_xy = J * trunk.covariance * J.transpose();
     record.variance_radius = trunk.covariance(2, 2) * record.radius * record.radius;
     record.observations = trunk.observations;
     record.first_seen_s = trunk.first_seen_s;

@@ -19,7 +19,7 @@ namespace bole
 /// 2 times that of the lens, at which every output pixel sees the input image, so no made-up border
 /// enters the gradients.
 ///
-/// Without distortion and shrinking the image is handed over as it is. Cost at 320x240: 0.2 ms.
+/// Without distortion and shrinking the image is handed over as it is. Cost at 320x240: a fraction of a millisecond.
 /// Not for two threads at once (it keeps a scratch image).
 /// Law (a test): an image drawn through the lens comes out as one drawn through camera().
 class Rectifier
