@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The command as its users run it: a whole flight, and their mistakes.
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace
+{
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
+
+struct Outcome
+{
+  int status = 0;
+  std::string text;
+};
+
+Outcome run(const std::string &arguments)
+{
+  Outcome outcome;
+  FILE *pipe = popen((std::string(BOLE_EXECUTABLE) + " " + arguments + " 2>&1").c_str(), "r");
+  std::array<char, 4096> buffer;
+  while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
+    outcome.text.append(buffer.data(), n);
+  outcome.status = pclose(pipe);
+  return outcome;
+}
+
+std::string freshFolder(const std::string &name)
+{
+  const std::string folder = testing::TempDir() + "bole_" + name;
+  fs::remove_all(folder);
+  return folder;
+}
+
+void copyFlight(const std::string &to)
+{
+  fs::remove_all(to);
+  fs::copy(kFlight, to, fs::copy_options::recursive);
+}
+
+TEST(Track, MapsTheDemonstrationFlight)
+{
+  const std::string folder = freshFolder("demo");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video").status, 0);
+  for (const char *file : {"trajectory.tum", "trajectory_online.tum", "trunks.csv", "map.svg", "timing.csv",
+                           "summary.json", "graph.g2o"})
+    EXPECT_TRUE(fs::exists(folder + "/" + file)) << file;
+  ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
+  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
+  const std::string text = evaluation.dump();
+  EXPECT_THAT(text, HasSubstr("precision"));
+  std::ifstream trunks(folder + "/trunks.csv");
+  int confirmed = 0;
+  for (std::string line; std::getline(trunks, line);)
+    confirmed += line.find("confirmed") != std::string::npos;
+  EXPECT_GE(confirmed, 3);
+  EXPECT_EQ(run("solve " + folder + "/graph.g2o").status, 0);
+}
+
+void expectRefused(const std::string &arguments, const std::string &folder, const std::string &names)
+{
+  const Outcome outcome = run("track " + arguments + " -o " + folder + " --no-video");
+  EXPECT_NE(outcome.status, 0) << arguments;
+  EXPECT_THAT(outcome.text, HasSubstr(names));
+  EXPECT_FALSE(fs::exists(folder + "/trunks.csv"));
+}
+
+TEST(Track, RefusesAMissingInput) { expectRefused("/nowhere/flight", freshFolder("missing"), "/nowhere/flight"); }
+
+TEST(Track, RefusesAnEmptyFolder)
+{
+  const std::string empty = freshFolder("empty_input");
+  fs::create_directories(empty);
+  expectRefused(empty, freshFolder("empty"), empty);
+}
+
+TEST(Track, RefusesAnUnknownKey)
+{
+  const std::string config = testing::TempDir() + "bole_bad.yaml";
+  std::ofstream(config) << "detection:\n  windwo: 3\n";
+  expectRefused(kFlight + " --config " + config, freshFolder("key"), config + ":2");
+}
+
+TEST(Track, RefusesOdometryThatIsNoNumber)
+{
+  const std::string flight = freshFolder("nan_flight");
+  copyFlight(flight);
+  std::ofstream(flight + "/mav0/odom0/data.csv") << "#t,x,y,z,w,x,y,z\n0,nan,0,1,1,0,0,0\n";
+  expectRefused(flight, freshFolder("nan"), "odom0/data.csv:2");
+}
+
+TEST(Track, RefusesStampsThatGoBack)
+{
+  const std::string flight = freshFolder("back_flight");
+  copyFlight(flight);
+  std::ofstream(flight + "/mav0/cam0/data.csv") << "#timestamp [ns],filename\n100000000,0000100000000.png\n0,0000000000000.png\n";
+  expectRefused(flight, freshFolder("back"), "cam0/data.csv:3");
+}
+
+TEST(Track, PassesOverATruncatedImage)
+{
+  const std::string flight = freshFolder("cut_flight"), folder = freshFolder("cut");
+  copyFlight(flight);
+  fs::resize_file(flight + "/mav0/cam0/data/0000500000000.png", 900);
+  ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video --frames 12").status, 0);
+  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  EXPECT_THAT(summary.at("frames").dump(), HasSubstr("corrupt"));
+}
+} // namespace

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/so3.h>
+#include <bole/tracking/trunk_tracker.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace
+{
+using namespace bole;
+
+const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0, 0, 1.2});
+
+RelativeTrunk seen(double roll = 0)
+{
+  Trunk trunk;
+  trunk.xy = {4, 0.4};
+  trunk.log_radius = std::log(0.2);
+  Pose wMc = kForward;
+  wMc.R = wMc.R * expSo3({0, 0, roll});
+  return relativeTrunk(wMc, Pose(), trunk);
+}
+
+/// The trunk as a flat area of grey \p inside on \p outside, its borders smooth over a pixel.
+vpImage<unsigned char> drawn(const PinholeCamera &camera, const RelativeTrunk &trunk, int inside, int outside)
+{
+  vpImage<unsigned char> image(240, 320);
+  const Eigen::Vector3d left = trunk.borderNormal(Border::left), right = trunk.borderNormal(Border::right);
+  for (int v = 0; v < 240; ++v)
+    for (int u = 0; u < 320; ++u) {
+      const Eigen::Vector3d ray = camera.ray(Eigen::Vector2d(u, v));
+      const double d_left = -left.dot(ray) * camera.fx, d_right = -right.dot(ray) * camera.fx;
+      const double cover = std::clamp(std::min(d_left, d_right) + 0.5, 0.0, 1.0);
+      image[v][u] = static_cast<unsigned char>(std::lround(outside + cover * (inside - outside)));
+    }
+  return image;
+}
+
+TrackingPrediction predictionNear(const RelativeTrunk &truth, const Vector4d &error)
+{
+  TrackingPrediction prediction;
+  prediction.relative = truth.plus(error);
+  prediction.covariance.diagonal() << 1e-4, 1e-4, 4e-4, 1e-2;
+  return prediction;
+}
+
+void expectFound(const vpImage<unsigned char> &image, const RelativeTrunk &truth)
+{
+  const PinholeCamera camera;
+  const TrackingResult result = trackTrunk(computeGradient(image), camera,
+                                           predictionNear(truth, {0.005, 0, 0.015, 0.05}), TrackingOptions());
+  ASSERT_EQ(result.status, TrackingStatus::tracked) << toString(result.status);
+  const Vector4d error = result.optimum.minus(truth);
+  EXPECT_LT(std::abs(error(2)) * camera.fx, 0.15);                 // bearing [px]
+  EXPECT_LT(std::abs(error(3)), 0.02);                             // r/d
+  EXPECT_GT(result.F.trace(), 1);
+  EXPECT_LT((result.F - result.F.transpose()).norm(), 1e-9 * result.F.norm());
+}
+
+TEST(TrunkTracker, FindsADarkTrunk) { expectFound(drawn(PinholeCamera(), seen(), 40, 200), seen()); }
+TEST(TrunkTracker, FindsABrightTrunk) { expectFound(drawn(PinholeCamera(), seen(), 220, 90), seen()); }
+TEST(TrunkTracker, FindsATrunkUnderRoll) { expectFound(drawn(PinholeCamera(), seen(0.25), 40, 200), seen(0.25)); }
+
+TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
+{
+  vpImage<unsigned char> image(240, 320, 0);
+  const TrackingResult result = trackTrunk(computeGradient(image), PinholeCamera(),
+                                           predictionNear(seen(), Vector4d::Zero()), TrackingOptions());
+  EXPECT_EQ(result.status, TrackingStatus::no_border);
+}
+
+TEST(TrunkTracker, NoticesABorderOfTheOtherPolarity)
+{
+  TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  prediction.left_contrast = -0.2;
+  prediction.right_contrast = 0.2;
+  const auto image = drawn(PinholeCamera(), seen(), 220, 90);
+  EXPECT_EQ(trackTrunk(computeGradient(image), PinholeCamera(), prediction, TrackingOptions()).status,
+            TrackingStatus::sign_changed);
+}
+
+TEST(TrunkTracker, NeverTracksFromNaN)
+{
+  TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  prediction.relative.log_ratio = std::numeric_limits<double>::quiet_NaN();
+  const auto image = drawn(PinholeCamera(), seen(), 40, 200);
+  EXPECT_EQ(trackTrunk(computeGradient(image), PinholeCamera(), prediction, TrackingOptions()).status,
+            TrackingStatus::not_visible);
+}
+
+TEST(TrunkEnergy, GradientAgreesWithCentralDifferences)
+{
+  const PinholeCamera camera;
+  const Gradient gradient = computeGradient(drawn(camera, seen(), 40, 200), {3.0, false, 3.0});
+  const TrunkEnergy energy(gradient, camera, {}, {true, 0.1}, {true, 0.1}, EnergyOptions());
+  const RelativeTrunk at = seen().plus({0.003, 0.01, 0.006, 0.04});
+  Vector4d f;
+  energy.evaluate(at, &f);
+  for (int i = 0; i < 4; ++i) {
+    const Vector4d h = 2e-5 * Vector4d::Unit(i);
+    const double numeric = (energy.evaluate(at.plus(h)) - energy.evaluate(at.plus(-h))) / 4e-5;
+    EXPECT_NEAR(f(i), numeric, 0.05 * f.norm() + 1e-3) << "parameter " << i;
+  }
+}
+
+TEST(TrunkEnergy, BrightnessScalesNothing)
+{
+  const PinholeCamera camera;
+  const RelativeTrunk at = seen();
+  const auto curvatureOf = [&](int inside, int outside) {
+    const Gradient gradient = computeGradient(drawn(camera, seen(), inside, outside));
+    TrunkEnergy probe(gradient, camera, {}, {}, {}, EnergyOptions());
+    const double c = std::abs(probe.contrastAt(at, Border::left)), d = std::abs(probe.contrastAt(at, Border::right));
+    return TrunkEnergy(gradient, camera, {}, {true, c}, {true, d}, EnergyOptions()).curvature(at);
+  };
+  const auto weak = curvatureOf(100, 150), strong = curvatureOf(50, 250);
+  EXPECT_FALSE(weak.negative);
+  EXPECT_LT((weak.F - strong.F).norm(), 0.03 * strong.F.norm());
+}
+} // namespace
