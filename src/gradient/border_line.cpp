@@ -109,13 +109,17 @@ MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line)
   const double step = rows > 1 ? 1.0 / (rows - 1) : 0;
   for (int i = 0; i < rows; ++i) {
     const double x = line.x_top + line.slope * i;
-    if (!(x >= 0 && x < cols - 1))
+    if (!(x >= 1 && x < cols - 2))
       continue;
     const int column = static_cast<int>(x);
-    const float *pixel = g[line.row_begin + i] + column;
-    const double slope = pixel[1] - pixel[0];
+    const float *p = g[line.row_begin + i] + column - 1;
+    // Catmull-Rom: with linear interpolation the optimum of an upright line would snap to whole columns
+    const double t = x - column;
+    const double c1 = 0.5 * (p[2] - p[0]), c2 = p[0] - 2.5 * p[1] + 2 * p[2] - 0.5 * p[3];
+    const double c3 = 0.5 * (p[3] - p[0]) + 1.5 * (p[1] - p[2]);
+    const double slope = c1 + t * (2 * c2 + t * 3 * c3);
     const double weight = i * step;
-    sum.mean += pixel[0] + (x - column) * slope;
+    sum.mean += p[1] + t * (c1 + t * (c2 + t * c3));
     sum.by_top += (1 - weight) * slope;
     sum.by_bottom += weight * slope;
   }

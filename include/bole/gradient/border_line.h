@@ -45,7 +45,7 @@ BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative
 Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const RelativeTrunk &relative,
                                            Border border, const BorderLine &line);
 
-/// Mean of an image along a line, one sample a row, linear between columns, and its derivatives by the
+/// Mean of an image along a line, one sample a row, cubic between columns, and its derivatives by the
 /// horizontal displacement of the first and last row. Samples outside the image count as zero.
 struct MeanGradient
 {
@@ -54,6 +54,6 @@ struct MeanGradient
 };
 MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line);
 
-/// Only the mean, for scans: about 0.15 us for 100 rows.
+/// Only the mean, linear between columns, for scans: about 0.15 us for 100 rows.
 double meanAlongOnly(const vpImage<float> &g, const BorderLine &line);
 } // namespace bole
