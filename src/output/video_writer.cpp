@@ -75,6 +75,7 @@ struct VideoWriter::Libav
 void VideoWriter::Libav::open(int w, int h, const std::string &name)
 {
   AVFormatContext *context = nullptr;
+  av_log_set_level(AV_LOG_ERROR); // the encoder talks of each video it ends
   check(avformat_alloc_output_context2(&context, nullptr, "mp4", name.c_str()), "no mp4 writer");
   format.reset(context);
   const AVCodec *encoder = avcodec_find_encoder_by_name("libx264");
