@@ -75,7 +75,6 @@ struct VideoWriter::Libav
 void VideoWriter::Libav::open(int w, int h, const std::string &name)
 {
   AVFormatContext *context = nullptr;
-  av_log_set_level(AV_LOG_ERROR); // the encoder talks of each video it ends
   check(avformat_alloc_output_context2(&context, nullptr, "mp4", name.c_str()), "no mp4 writer");
   format.reset(context);
   const AVCodec *encoder = avcodec_find_encoder_by_name("libx264");
@@ -87,6 +86,7 @@ void VideoWriter::Libav::open(int w, int h, const std::string &name)
     throw vpException(vpException::ioError, fmt::format("{}: no video encoder in libavcodec", file.path()));
 
   codec.reset(avcodec_alloc_context3(encoder));
+  codec->log_level_offset = 64; // the encoder would tell of every video it ends
   codec->width = w;
   codec->height = h;
   codec->time_base = kTimeBase;
