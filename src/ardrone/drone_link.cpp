@@ -1,37 +1,27 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/ardrone/drone_link.h>
 
-#include "socket.h"
+#include "receivers.h"
+#include "video_stamps.h"
 
-#include <array>
-#include <atomic>
 #include <condition_variable>
-#include <cstdlib>
 #include <mutex>
-#include <thread>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-constexpr std::array<std::uint8_t, 4> kWakeUp = {1, 0, 0, 0};
-constexpr std::size_t kLargestRead = 1 << 16;
-constexpr Milliseconds kPoll{50}, kConnect{500};
-constexpr std::int64_t kJump_ns = 5'000'000'000;    // no link delays a packet so long
-constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
-constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 } // namespace
 
+/// What the two receiving threads bring together for the consumer.
 struct DroneLink::State
 {
-  State(const ArDroneAddress &a, const Options &o, LinkTap t)
+  State(const ArDroneAddress &a, const Options &o)
       : address(a),
         options(o),
-        tap(std::move(t)),
         commands(a.host, a.at_port),
-        generation(a.generation),
         video_clock(o.clock),
         navdata_clock(o.clock),
         odometry(o.odometry)
@@ -40,177 +30,58 @@ struct DroneLink::State
 
   const ArDroneAddress address;
   const Options options;
-  const LinkTap tap;
   AtChannel commands;
-  std::atomic<bool> running{true};
-  std::atomic<int> generation;
-  std::thread video_thread, navdata_thread;
 
-  mutable std::mutex mutex; // guards all below
+  mutable std::mutex mutex; // guards all below but the receivers
   std::condition_variable frame_came;
   std::optional<LiveFrame> newest;
   LinkCounters counters;
   ClockFit video_clock, navdata_clock;
-  NavdataOdometry odometry;
-  std::int64_t last_navdata_ns = 0;
-  std::optional<std::int64_t> last_given_stamp_ns;
-
-  // The video thread's own.
-  std::optional<ClockUnwrapper> pave_time;
-  std::int64_t stamp_shift_ns = 0, last_stamp_ns = 0, last_arrival_ns = 0, fresh_stamp_ns = 0;
-  bool has_stamp = false;
-  struct Jump
-  {
-    std::int64_t raw_ns, arrival_ns;
-  };
-  std::optional<Jump> jumped;
-  std::optional<VideoDecoder> decoder;
-  int decoder_generation = 0;
-  // The navdata thread's own.
+  VideoStamps stamps;
+  std::int64_t fresh_stamp_ns = 0;
   ClockUnwrapper navdata_time{kNavdataTimePeriod_us};
   std::optional<std::uint32_t> last_sequence;
+  std::int64_t last_navdata_ns = 0;
+  NavdataOdometry odometry;
+  std::optional<std::int64_t> last_given_stamp_ns;
 
-  void seen(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
-            std::size_t size) const
+  std::unique_ptr<VideoReceiver> video; // last: their threads end before the rest goes
+  std::unique_ptr<NavdataReceiver> navdata;
+
+  void start(const LinkTap &tap)
   {
-    if (tap)
-      tap(channel, arrival_ns, data, size);
+    VideoReceiver::Callbacks of_video;
+    of_video.tap = tap;
+    of_video.connected = [this] {
+      const std::lock_guard<std::mutex> lock(mutex);
+      ++counters.connections;
+    };
+    of_video.frame = [this](DecodedFrame &&frame, const VideoDecoder::Counters &counted,
+                            std::int64_t arrival_ns) {
+      publish(std::move(frame), counted, arrival_ns);
+    };
+    NavdataReceiver::Callbacks of_navdata;
+    of_navdata.tap = tap;
+    of_navdata.packet = [this](const std::uint8_t *data, std::size_t size,
+                               std::int64_t arrival_ns) {
+      return takeNavdata(data, size, arrival_ns);
+    };
+    video = std::make_unique<VideoReceiver>(address, options, std::move(of_video));
+    navdata = std::make_unique<NavdataReceiver>(address, options.full_navdata, commands,
+                                                std::move(of_navdata));
   }
 
-  // -- video
-
-  void runVideo()
-  {
-    std::vector<std::uint8_t> buffer(kLargestRead);
-    while (running) {
-      const int wanted = generation;
-      if (wanted != 1) {
-        if (const Socket socket = Socket::connectTcp(address.host, address.video_port, kConnect);
-            socket.valid()) {
-          generation = 2;
-          receiveStream(socket, buffer);
-          continue;
-        }
-      }
-      if (wanted != 2)
-        receiveDatagrams(buffer);
-      if (running)
-        std::this_thread::sleep_for(std::chrono::duration<double>(options.retry_s));
-    }
-  }
-
-  void connected(VideoDecoder &video)
-  {
-    video.restart();
-    seen(LinkChannel::video_connected, steadyNowNs(), nullptr, 0);
-    const std::lock_guard<std::mutex> lock(mutex);
-    ++counters.connections;
-  }
-
-  bool silent(std::int64_t since_ns) const
-  {
-    return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > options.silence_s;
-  }
-
-  VideoDecoder &decoderFor(int g)
-  {
-    if (!decoder || decoder_generation != g) {
-      decoder.emplace(g);
-      decoder_generation = g;
-    }
-    return *decoder;
-  }
-  void receiveStream(const Socket &socket, std::vector<std::uint8_t> &buffer)
-  {
-    VideoDecoder &video = decoderFor(2);
-    connected(video);
-    std::int64_t last_data_ns = steadyNowNs();
-    while (running && !silent(last_data_ns)) {
-      std::size_t size = 0;
-      const auto read = socket.receive(buffer.data(), buffer.size(), size, kPoll);
-      if (read == Socket::Read::closed)
-        return;
-      if (read == Socket::Read::data) {
-        last_data_ns = steadyNowNs();
-        handle(video, buffer.data(), size, last_data_ns);
-      }
-    }
-  }
-
-  void receiveDatagrams(std::vector<std::uint8_t> &buffer)
-  {
-    const Socket socket = Socket::connectUdp(address.host, address.video_port);
-    bool is_connected = false;
-    std::int64_t last_data_ns = steadyNowNs(), last_wake_ns = 0;
-    while (running && socket.valid() && !silent(last_data_ns)) {
-      const std::int64_t now_ns = steadyNowNs();
-      if (now_ns - last_wake_ns > kWakeAgain_ns) {
-        socket.send(kWakeUp.data(), kWakeUp.size());
-        last_wake_ns = now_ns;
-      }
-      std::size_t size = 0;
-      const auto read = socket.receive(buffer.data(), buffer.size(), size, kPoll);
-      if (read == Socket::Read::closed && !is_connected && generation == 0)
-        return; // nobody listens: perhaps it is a drone 2 after all
-      if (read != Socket::Read::data)
-        continue;
-      last_data_ns = steadyNowNs();
-      generation = 1;
-      VideoDecoder &video = decoderFor(1);
-      if (!is_connected)
-        connected(video);
-      is_connected = true;
-      handle(video, buffer.data(), size, last_data_ns);
-    }
-  }
-
-  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size,
-              std::int64_t arrival_ns)
-  {
-    seen(LinkChannel::video, arrival_ns, data, size);
-    for (DecodedFrame &decoded : video.decode(data, size))
-      publish(std::move(decoded), video.counters(), arrival_ns);
-  }
-
-  /// Drone time of a frame, going on over wraps and reboots.
-  std::int64_t stampOf(const DecodedFrame &frame, std::int64_t arrival_ns)
-  {
-    if (!frame.timestamp_ms)
-      return arrival_ns; // an AR.Drone 1 says nothing about time
-    if (!pave_time)
-      pave_time.emplace(kPaveTimePeriod_ms);
-    const std::int64_t raw_ns = pave_time->unwrap(*frame.timestamp_ms) * 1'000'000;
-    const std::int64_t expected_ns = last_stamp_ns + arrival_ns - last_arrival_ns;
-    if (!has_stamp || std::abs(raw_ns + stamp_shift_ns - expected_ns) <= kJump_ns) {
-      jumped.reset();
-      return raw_ns + stamp_shift_ns;
-    }
-    // One frame alone may have a damaged stamp; two that agree are a clock that started anew.
-    if (jumped &&
-        std::abs(raw_ns - jumped->raw_ns - (arrival_ns - jumped->arrival_ns)) <= kJump_ns) {
-      stamp_shift_ns = expected_ns - raw_ns;
-      ++counters.clock_jumps;
-      jumped.reset();
-    }
-    else {
-      jumped = Jump{raw_ns, arrival_ns};
-    }
-    return expected_ns;
-  }
-
-  void publish(DecodedFrame &&decoded, const VideoDecoder::Counters &video, std::int64_t arrival_ns)
+  void publish(DecodedFrame &&decoded, const VideoDecoder::Counters &counted,
+               std::int64_t arrival_ns)
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    counters.video = video;
+    counters.video = counted;
     LiveFrame frame;
-    frame.stamp_ns = stampOf(decoded, arrival_ns);
-    if (has_stamp && frame.stamp_ns <= last_stamp_ns)
-      frame.stamp_ns = last_stamp_ns + 1; // two in a burst, or a damaged stamp
-    else if (decoded.status == FrameStatus::ok)
+    const VideoStamps::Stamp stamp = stamps.next(decoded.timestamp_ms, arrival_ns);
+    counters.clock_jumps = stamps.jumps();
+    frame.stamp_ns = stamp.ns;
+    if (stamp.is_measured && decoded.status == FrameStatus::ok)
       video_clock.add(frame.stamp_ns, arrival_ns);
-    has_stamp = true;
-    last_stamp_ns = frame.stamp_ns;
-    last_arrival_ns = arrival_ns;
     frame.status = decoded.status;
     frame.message = std::move(decoded.message);
     frame.picture = std::move(decoded.picture);
@@ -223,48 +94,6 @@ struct DroneLink::State
     counters.dropped += newest ? 1 : 0;
     newest = std::move(frame);
     frame_came.notify_one();
-  }
-
-  // -- navdata
-
-  void runNavdata()
-  {
-    std::vector<std::uint8_t> buffer(kLargestRead);
-    const Socket socket = Socket::connectUdp(address.host, address.navdata_port);
-    std::int64_t last_wake_ns = 0, last_alive_ns = 0, last_config_ns = 0, last_data_ns = 0;
-    while (running) {
-      const std::int64_t now_ns = steadyNowNs();
-      if (now_ns - last_data_ns > kWakeAgain_ns && now_ns - last_wake_ns > kWakeAgain_ns) {
-        socket.send(kWakeUp.data(), kWakeUp.size());
-        last_wake_ns = now_ns;
-      }
-      if (now_ns - last_alive_ns > kKeepAlive_ns) {
-        commands.resetWatchdog();
-        last_alive_ns = now_ns;
-      }
-      std::size_t size = 0;
-      const auto read = socket.receive(buffer.data(), buffer.size(), size, kPoll);
-      if (read == Socket::Read::closed)
-        std::this_thread::sleep_for(kPoll); // the drone is not up yet
-      if (read != Socket::Read::data)
-        continue;
-      last_data_ns = steadyNowNs();
-      seen(LinkChannel::navdata, last_data_ns, buffer.data(), size);
-      const std::optional<std::uint32_t> state = takeNavdata(buffer.data(), size, last_data_ns);
-      if (state && last_data_ns - last_config_ns > kWakeAgain_ns && asksForConfig(*state)) {
-        commands.config("general:navdata_demo", options.full_navdata ? "FALSE" : "TRUE");
-        commands.acknowledgeConfig();
-        last_config_ns = last_data_ns;
-      }
-    }
-  }
-
-  bool asksForConfig(std::uint32_t bits) const
-  {
-    const auto has = [bits](DroneState bit) {
-      return (bits & static_cast<std::uint32_t>(bit)) != 0;
-    };
-    return has(DroneState::bootstrap) || has(DroneState::demo_mode) == options.full_navdata;
   }
 
   /// \return the state bits of a good packet.
@@ -366,17 +195,11 @@ DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options
 DroneLink::DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap)
 {
   options.validate();
-  m_state = std::make_unique<State>(address, options, std::move(tap));
-  m_state->video_thread = std::thread([this] { m_state->runVideo(); });
-  m_state->navdata_thread = std::thread([this] { m_state->runNavdata(); });
+  m_state = std::make_unique<State>(address, options);
+  m_state->start(tap);
 }
 
-DroneLink::~DroneLink()
-{
-  m_state->running = false;
-  m_state->video_thread.join();
-  m_state->navdata_thread.join();
-}
+DroneLink::~DroneLink() = default;
 
 bool DroneLink::next(LiveFrame &frame, double timeout_s)
 {
@@ -403,7 +226,7 @@ std::optional<BodyState> DroneLink::body() const
   return m_state->odometry.newest();
 }
 
-int DroneLink::generation() const { return m_state->generation; }
+int DroneLink::generation() const { return m_state->video->generation(); }
 LinkCounters DroneLink::counters() const
 {
   const std::lock_guard<std::mutex> lock(m_state->mutex);

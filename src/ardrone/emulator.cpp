@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/drone_clock.h>
 #include <bole/ardrone/emulator.h>
-#include <bole/ardrone/h264.h>
-#include <bole/ardrone/pave.h>
-#include <bole/ardrone/uvlc.h>
 
-#include "socket.h"
+#include "emulator_packets.h"
+#include "emulator_wire.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cmath>
 #include <condition_variable>
-#include <map>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -22,32 +16,33 @@ namespace bole
 {
 namespace
 {
-constexpr std::size_t kDatagram = 1 << 16, kMostCommands = 100'000, kMostPending = 1 << 20;
-constexpr std::int64_t kSecond_ns = 1'000'000'000, kWatchdog_ns = 2 * kSecond_ns,
-                       kClientLost_ns = 10 * kSecond_ns;
-constexpr std::int64_t kWrapSoon_ms = 3000, kDemoEvery_ns = kSecond_ns / 15;
-constexpr std::uint32_t kUsualState =
-    0x0f800080 | 0x10; // threads up, camera ready, altitude control
+constexpr std::size_t kMostCommands = 100'000;
+constexpr std::int64_t kSecond_ns = 1'000'000'000, kWatchdog_ns = 2 * kSecond_ns;
 constexpr Milliseconds kTick{2};
-constexpr std::uint32_t kLanded = 2, kFlying = 3, kEmergencyBit = 1u << 8, kTakeOffBit = 1u << 9;
+constexpr std::uint32_t kEmergencyBit = 1u << 8, kTakeOffBit = 1u << 9;
+
+std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(s * 1e9); }
+
+bool within(std::int64_t now_ns, double from_s, double for_s)
+{
+  return from_s >= 0 && now_ns >= nanoseconds(from_s) && now_ns < nanoseconds(from_s + for_s);
+}
+
+DronePackets::Options packetOptions(const PacketFeed &feed, const ArDroneEmulator::Options &options)
+{
+  return {feed.generation(), feed.frameRateHz(), options.bit_rate, options.key_interval,
+          options.clock_wrap};
+}
 } // namespace
 
+/// Flies the feed in the serving thread, and injects the faults.
 struct ArDroneEmulator::State
 {
-  enum class Port
-  {
-    video,
-    navdata
-  };
-  struct Outgoing
-  {
-    Port port;
-    std::vector<std::uint8_t> bytes;
-  };
+  using Port = DroneWire::Port;
 
   std::unique_ptr<PacketFeed> feed;
-  Options options;
-  int generation = 2;
+  const Options options;
+  const int generation;
   std::thread thread;
   std::atomic<bool> running{false};
 
@@ -58,42 +53,22 @@ struct ArDroneEmulator::State
   bool finished = false;
 
   // The serving thread's own.
-  Socket navdata_socket, at_socket, video_socket, video_client;
-  std::optional<sockaddr_in> navdata_client, video_peer;
-  std::int64_t navdata_seen_ns = 0, video_seen_ns = 0, video_since_ns = 0;
-  std::vector<std::uint8_t> pending; // of the TCP client
-  std::multimap<std::int64_t, Outgoing> queue;
-  std::int64_t last_video_due_ns = 0;
+  DroneWire wire;
+  DronePackets packets;
   std::mt19937 random;
-  bool configured = false, wants_full = false, rebooted = false, ground = false, emergency = false;
-  std::int64_t last_command_ns = 0, last_demo_ns = -kSecond_ns;
-  std::int64_t last_sequence = 0;
+  bool rebooted = false, ground = false, emergency = false;
+  std::int64_t last_command_ns = 0, last_sequence = 0;
   std::int64_t start_ns = -1; // host's clock at flight time 0
-  std::int64_t boot_ns = 0;   // flight time of the last boot
-  std::int64_t clock_ms = 100'000, navdata_clock_us = 50'000'000;
-  std::uint32_t frame_number = 0, navdata_sequence = 0, stream_position = 0;
-  std::unique_ptr<H264Encoder> encoder;
-  bool force_key = true;
   vpImage<unsigned char> frozen;
 
   State(std::unique_ptr<PacketFeed> f, const Options &o)
-      : feed(std::move(f)), options(o), generation(feed->generation()), random(o.seed)
+      : feed(std::move(f)),
+        options(o),
+        generation(feed->generation()),
+        wire(o.host, generation, o.navdata_port, o.video_port, o.at_port),
+        packets(packetOptions(*feed, o)),
+        random(o.seed)
   {
-    navdata_socket = Socket::bindUdp(o.host, o.navdata_port);
-    at_socket = Socket::bindUdp(o.host, o.at_port);
-    listenVideo();
-    if (o.clock_wrap) {
-      clock_ms = kPaveTimePeriod_ms - kWrapSoon_ms;
-      navdata_clock_us = kNavdataTimePeriod_us - kWrapSoon_ms * 1000;
-    }
-  }
-
-  void listenVideo()
-  {
-    video_socket = generation == 2 ? Socket::listenTcp(options.host, options.video_port)
-                                   : Socket::bindUdp(options.host, options.video_port);
-    if (options.video_port == 0) // once: the same again after a reboot
-      options.video_port = video_socket.localPort();
   }
 
   double chance() { return std::uniform_real_distribution<double>(0, 1)(random); }
@@ -104,7 +79,7 @@ struct ArDroneEmulator::State
   {
     FeedPacket packet;
     bool has_packet = false, has_more = true;
-    while (running && (has_more || !queue.empty() || !pending.empty())) {
+    while (running && (has_more || !wire.isIdle())) {
       service();
       if (!has_packet && has_more) {
         has_packet = has_more = feed->next(packet);
@@ -129,8 +104,9 @@ struct ArDroneEmulator::State
 
   bool readyToStart(std::int64_t now_ns) const
   {
-    const bool video = video_client.valid() || video_peer.has_value();
-    return video && ((navdata_client && configured) || now_ns - video_since_ns > kSecond_ns / 2);
+    return wire.hasVideoListener() &&
+           ((wire.hasNavdataListener() && packets.isConfigured()) ||
+            now_ns - wire.videoSinceNs() > kSecond_ns / 2);
   }
 
   std::int64_t flightTime(std::int64_t now_ns) const
@@ -156,59 +132,15 @@ struct ArDroneEmulator::State
 
   void service()
   {
-    std::array<std::uint8_t, 2048> buffer{};
-    std::size_t size = 0;
-    sockaddr_in sender = {};
     const std::int64_t now_ns = steadyNowNs();
-    while (navdata_socket.receiveFrom(buffer.data(), buffer.size(), size, sender,
-                                      Milliseconds(0)) == Socket::Read::data) {
-      if (isDown(now_ns))
-        continue;
-      navdata_client = sender;
-      navdata_seen_ns = now_ns;
-      if (!configured)
-        sendNavdata({}, flightTime(now_ns)); // bootstrap: says only that it is there
-    }
-    while (at_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
-           Socket::Read::data) {
-      if (isDown(now_ns))
-        continue;
-      navdata_seen_ns = now_ns;
-      for (AtCommand &command : parseAtCommands(
-               std::string(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size))))
+    const bool is_down = start_ns >= 0 && rebooting(flightTime(now_ns));
+    const DroneWire::Received came = wire.receive(now_ns, is_down);
+    for (const std::string &text : came.commands)
+      for (AtCommand &command : parseAtCommands(text))
         obey(std::move(command), now_ns);
-    }
-    serviceVideo(now_ns);
-    if (navdata_client && now_ns - navdata_seen_ns > kClientLost_ns)
-      navdata_client.reset();
+    if (came.navdata_asked && !packets.isConfigured())
+      sendNavdata({}, flightTime(now_ns)); // bootstrap: says only that it is there
     sendDue(now_ns);
-  }
-
-  void serviceVideo(std::int64_t now_ns)
-  {
-    if (!video_socket.valid())
-      return; // rebooting
-    if (generation == 2) {
-      if (video_socket.waitReadable(Milliseconds(0)))
-        if (Socket client = video_socket.accept(); client.valid()) {
-          video_client = std::move(client);
-          pending.clear();
-          video_since_ns = now_ns;
-        }
-      return;
-    }
-    std::array<std::uint8_t, 64> buffer{};
-    std::size_t size = 0;
-    sockaddr_in sender = {};
-    while (video_socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
-           Socket::Read::data) {
-      if (!video_peer)
-        video_since_ns = now_ns;
-      video_peer = sender;
-      video_seen_ns = now_ns;
-    }
-    if (video_peer && now_ns - video_seen_ns > kClientLost_ns)
-      video_peer.reset();
   }
 
   void obey(AtCommand &&command, std::int64_t now_ns)
@@ -221,10 +153,8 @@ struct ArDroneEmulator::State
     last_sequence = command.sequence;
     last_command_ns = now_ns;
     if (command.name == "CONFIG" && command.arguments.size() == 2 &&
-        command.arguments[0] == "general:navdata_demo") {
-      configured = true;
-      wants_full = command.arguments[1] == "FALSE";
-    }
+        command.arguments[0] == "general:navdata_demo")
+      packets.configure(command.arguments[1] == "FALSE");
     if (command.name == "REF" && !command.arguments.empty()) {
       const auto bits =
           static_cast<std::uint32_t>(std::strtol(command.arguments[0].c_str(), nullptr, 10));
@@ -237,82 +167,92 @@ struct ArDroneEmulator::State
 
   // -- sending
 
+  /// Encodes a picture, the one that the camera froze on where it did.
+  void prepare(FeedPacket &packet)
+  {
+    if (packet.kind != FeedPacket::Kind::picture)
+      return;
+    const bool is_frozen = within(packet.stamp_ns, options.freeze_at_s, options.freeze_for_s);
+    if (is_frozen && frozen.getSize() == 0)
+      frozen = packet.image;
+    if (is_frozen)
+      count(&Counters::frozen);
+    packet.bytes = packets.picture(is_frozen ? frozen : packet.image, packet.stamp_ns);
+  }
+
   void launch(const FeedPacket &packet)
   {
     const std::int64_t now_ns = packet.sent_ns;
-    if (!rebooted && options.reboot_at_s >= 0 && now_ns >= seconds(options.reboot_at_s))
+    if (!rebooted && options.reboot_at_s >= 0 && now_ns >= nanoseconds(options.reboot_at_s))
       goDown(now_ns);
     if (rebooting(now_ns)) {
-      frame_number = stream_position = 0;
-      force_key = true;
+      packets.forgetPicture();
       return;
     }
-    if (!video_socket.valid())
-      listenVideo();
+    wire.comeUp();
     {
       const std::lock_guard<std::mutex> lock(mutex);
       counters.flight_s = static_cast<double>(now_ns) * 1e-9;
     }
     switch (packet.kind) {
     case FeedPacket::Kind::picture:
-      sendPicture(packet);
+      if (within(packet.stamp_ns, options.stall_at_s, options.stall_for_s))
+        count(&Counters::stalled);
+      else
+        post(Port::video, packet.bytes, &Counters::frames);
       break;
     case FeedPacket::Kind::navdata:
       sendNavdata(packet.navdata, packet.stamp_ns);
       break;
     case FeedPacket::Kind::raw_video:
-      post(Port::video, packet.bytes);
-      count(&Counters::frames);
+      post(Port::video, packet.bytes, &Counters::frames);
       break;
     case FeedPacket::Kind::raw_navdata:
-      post(Port::navdata, packet.bytes);
-      count(&Counters::navdata);
+      post(Port::navdata, packet.bytes, &Counters::navdata);
       break;
     case FeedPacket::Kind::video_connected: // the recorded client connected anew: so must ours
       if (packet.sent_ns > 0)
-        video_client.close();
+        wire.closeVideoClient();
       break;
     }
   }
 
-  static std::int64_t seconds(double s) { return static_cast<std::int64_t>(s * 1e9); }
-  static bool within(std::int64_t now_ns, double from_s, double for_s)
-  {
-    return from_s >= 0 && now_ns >= seconds(from_s) && now_ns < seconds(from_s + for_s);
-  }
-  bool isDown(std::int64_t now_ns) const { return start_ns >= 0 && rebooting(flightTime(now_ns)); }
   bool rebooting(std::int64_t now_ns) const
   {
     return within(now_ns, options.reboot_at_s, options.reboot_for_s * options.speed);
   }
 
-  void count(std::size_t Counters::*counter)
-  {
-    const std::lock_guard<std::mutex> lock(mutex);
-    ++(counters.*counter);
-  }
-
   void goDown(std::int64_t now_ns)
   {
     rebooted = true;
-    video_client.close();
-    video_socket.close();
-    video_peer.reset();
-    navdata_client.reset();
-    pending.clear();
-    queue.clear();
-    configured = false;
-    boot_ns = now_ns + seconds(options.reboot_for_s * options.speed);
-    clock_ms = 0;
-    navdata_clock_us = 0;
-    frame_number = navdata_sequence = stream_position = 0;
+    wire.goDown();
+    packets.reboot(now_ns + nanoseconds(options.reboot_for_s * options.speed));
     last_sequence = 0;
-    force_key = true;
     count(&Counters::reboots);
   }
 
-  void post(Port port, std::vector<std::uint8_t> bytes)
+  void count(std::size_t Counters::*counter, std::size_t times = 1)
   {
+    const std::lock_guard<std::mutex> lock(mutex);
+    counters.*counter += times;
+  }
+
+  void sendNavdata(const Navdata &navdata, std::int64_t stamp_ns)
+  {
+    if (!wire.hasNavdataListener())
+      return;
+    DronePackets::Condition condition{ground, emergency, false};
+    condition.command_watchdog =
+        last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns;
+    auto bytes = packets.status(navdata, stamp_ns, condition);
+    if (!bytes.empty())
+      post(Port::navdata, std::move(bytes), &Counters::navdata);
+  }
+
+  /// Sends \p bytes, or what the faults leave of them.
+  void post(Port port, std::vector<std::uint8_t> bytes, std::size_t Counters::*counter)
+  {
+    count(counter);
     if (options.loss > 0 && chance() < options.loss)
       return count(&Counters::lost);
     const bool may = port == Port::video ? options.corrupt_video : options.corrupt_navdata;
@@ -323,139 +263,11 @@ struct ArDroneEmulator::State
             static_cast<std::uint8_t>(std::uniform_int_distribution<int>(1, 255)(random));
       count(port == Port::video ? &Counters::corrupted_frames : &Counters::corrupted_navdata);
     }
-    std::int64_t due_ns = steadyNowNs() + seconds(options.jitter_s * chance());
-    if (port == Port::video && generation == 2) // a stream keeps its order
-      due_ns = last_video_due_ns = std::max(due_ns, last_video_due_ns);
-    queue.emplace(due_ns, Outgoing{port, std::move(bytes)});
+    wire.post(port, std::move(bytes), steadyNowNs() + nanoseconds(options.jitter_s * chance()));
     sendDue(steadyNowNs());
   }
 
-  void sendDue(std::int64_t now_ns)
-  {
-    flush();
-    while (!queue.empty() && queue.begin()->first <= now_ns) {
-      const Outgoing out = std::move(queue.begin()->second);
-      queue.erase(queue.begin());
-      if (out.port == Port::navdata) {
-        if (navdata_client)
-          navdata_socket.sendTo(out.bytes.data(), out.bytes.size(), *navdata_client);
-      }
-      else if (generation == 1) {
-        if (video_peer && video_socket.valid())
-          video_socket.sendTo(out.bytes.data(), out.bytes.size(), *video_peer);
-      }
-      else if (video_client.valid()) {
-        if (pending.size() + out.bytes.size() > kMostPending) {
-          count(&Counters::refused);
-          continue;
-        }
-        pending.insert(pending.end(), out.bytes.begin(), out.bytes.end());
-        flush();
-      }
-    }
-  }
-
-  void flush()
-  {
-    if (pending.empty())
-      return;
-    if (!video_client.valid()) {
-      pending.clear();
-      return;
-    }
-    const std::int64_t sent = video_client.sendSome(pending.data(), pending.size());
-    if (sent < 0) {
-      video_client.close();
-      pending.clear();
-      return;
-    }
-    pending.erase(pending.begin(), pending.begin() + static_cast<std::ptrdiff_t>(sent));
-  }
-
-  void prepare(FeedPacket &packet)
-  {
-    if (packet.kind != FeedPacket::Kind::picture)
-      return;
-    vpImage<unsigned char> image = packet.image;
-    if (within(packet.stamp_ns, options.freeze_at_s, options.freeze_for_s)) {
-      if (frozen.getSize() == 0)
-        frozen = image;
-      image = frozen;
-      count(&Counters::frozen);
-    }
-    ++frame_number;
-    packet.bytes =
-        generation == 1 ? encodeUvlc(image, frame_number) : encodeFrame(image, packet.stamp_ns);
-  }
-
-  void sendPicture(const FeedPacket &packet)
-  {
-    if (within(packet.stamp_ns, options.stall_at_s, options.stall_for_s))
-      return count(&Counters::stalled);
-    post(Port::video, packet.bytes);
-    count(&Counters::frames);
-  }
-
-  std::vector<std::uint8_t> encodeFrame(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
-  {
-    const int width = static_cast<int>(image.getWidth()),
-              height = static_cast<int>(image.getHeight());
-    if (!encoder) {
-      encoder = std::make_unique<H264Encoder>(width, height, feed->frameRateHz(), options.bit_rate,
-                                              options.key_interval);
-    }
-    const auto encoded = encoder->encode(image, force_key);
-    force_key = false;
-    PaveHeader header;
-    header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
-    header.coded_width = static_cast<std::uint16_t>(encoder->codedWidth());
-    header.coded_height = static_cast<std::uint16_t>(encoder->codedHeight());
-    header.display_width = static_cast<std::uint16_t>(width);
-    header.display_height = static_cast<std::uint16_t>(height);
-    header.frame_number = frame_number;
-    header.timestamp_ms = static_cast<std::uint32_t>(clock_ms + (stamp_ns - boot_ns) / 1'000'000);
-    header.frame_type = encoded.is_key ? PaveFrameType::idr : PaveFrameType::p;
-    header.stream_position = stream_position;
-    header.header1_size = encoded.sps_size;
-    header.header2_size = encoded.pps_size;
-    stream_position += header.payload_size;
-    auto bytes = encodePaveHeader(header);
-    bytes.insert(bytes.end(), encoded.bytes.begin(), encoded.bytes.end());
-    return bytes;
-  }
-
-  void sendNavdata(Navdata navdata, std::int64_t stamp_ns)
-  {
-    if (!navdata_client)
-      return;
-    if (configured && !wants_full && stamp_ns - last_demo_ns < kDemoEvery_ns)
-      return;
-    last_demo_ns = stamp_ns;
-    navdata.state = kUsualState | (ground ? 0u : 1u);
-    const auto raise = [&](DroneState bit, bool on) {
-      navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u;
-    };
-    raise(DroneState::bootstrap, !configured);
-    raise(DroneState::demo_mode, configured && !wants_full);
-    raise(DroneState::command_watchdog,
-          last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns);
-    raise(DroneState::emergency, emergency);
-    navdata.sequence = ++navdata_sequence;
-    if (!configured) {
-      navdata.demo.reset();
-      navdata.physical.reset();
-    }
-    else if (!wants_full) {
-      navdata.physical.reset();
-    }
-    else {
-      navdata.time = navdataTimeWord(navdata_clock_us + (stamp_ns - boot_ns) / 1000);
-    }
-    if (navdata.demo)
-      navdata.demo->control_state = (ground ? kLanded : kFlying) << 16;
-    post(Port::navdata, encodeNavdata(navdata));
-    count(&Counters::navdata);
-  }
+  void sendDue(std::int64_t now_ns) { count(&Counters::refused, wire.sendDue(now_ns)); }
 };
 
 void ArDroneEmulator::Options::validate() const
@@ -510,9 +322,9 @@ ArDroneAddress ArDroneEmulator::address() const
 {
   ArDroneAddress address;
   address.host = m_state->options.host;
-  address.navdata_port = m_state->navdata_socket.localPort();
-  address.at_port = m_state->at_socket.localPort();
-  address.video_port = m_state->options.video_port;
+  address.navdata_port = m_state->wire.navdataPort();
+  address.at_port = m_state->wire.atPort();
+  address.video_port = m_state->wire.videoPort();
   address.generation = m_state->generation;
   return address;
 }

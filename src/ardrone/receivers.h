@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The two threads that drain a drone's sockets.
+
+#include "socket.h"
+
+#include <bole/ardrone/drone_link.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace bole
+{
+/// Keeps the video open, decodes all of it and hands on every frame. Starts with the constructor,
+/// ends with the destructor; the callbacks run in its thread.
+class VideoReceiver
+{
+public:
+  struct Callbacks
+  {
+    LinkTap tap; ///< may be empty
+    std::function<void()> connected;
+    std::function<void(DecodedFrame &&, const VideoDecoder::Counters &, std::int64_t arrival_ns)>
+        frame;
+  };
+  VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options,
+                Callbacks callbacks);
+  ~VideoReceiver();
+  int generation() const { return m_generation; }
+
+private:
+  void run();
+  void receiveStream(const Socket &socket, std::vector<std::uint8_t> &buffer);
+  void receiveDatagrams(std::vector<std::uint8_t> &buffer);
+  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size,
+              std::int64_t arrival_ns);
+  void begin(VideoDecoder &video);
+  VideoDecoder &decoderFor(int generation);
+  bool isSilent(std::int64_t since_ns) const;
+
+  const ArDroneAddress m_address;
+  const DroneLink::Options m_options;
+  const Callbacks m_callbacks;
+  std::atomic<int> m_generation; ///< 0: not known yet
+  std::optional<VideoDecoder> m_decoder;
+  int m_decoder_generation = 0;
+  std::atomic<bool> m_running{true};
+  std::thread m_thread;
+};
+
+/// Keeps the navdata coming and the drone's communication watchdog content. As VideoReceiver.
+class NavdataReceiver
+{
+public:
+  struct Callbacks
+  {
+    LinkTap tap; ///< may be empty
+    /// Takes a packet; returns its state bits where it was a good one.
+    std::function<std::optional<std::uint32_t>(const std::uint8_t *data, std::size_t size,
+                                               std::int64_t arrival_ns)>
+        packet;
+  };
+  NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands,
+                  Callbacks callbacks);
+  ~NavdataReceiver();
+
+private:
+  void run();
+  bool asksForConfig(std::uint32_t bits) const;
+
+  const ArDroneAddress m_address;
+  const bool m_full_navdata;
+  AtChannel &m_commands;
+  const Callbacks m_callbacks;
+  std::atomic<bool> m_running{true};
+  std::thread m_thread;
+};
+} // namespace bole
