@@ -28,6 +28,7 @@ Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d &phi);
 /// Inverse of rightJacobianSo3(phi), |phi| < 2 pi.
 Eigen::Matrix3d inverseRightJacobianSo3(const Eigen::Vector3d &phi);
 
-/// The rotation nearest to \p R (Frobenius norm); removes the drift of long products.
+/// A rotation beside the nearly orthonormal \p R (at most twice as far from it as the nearest one);
+/// removes the drift of long products.
 Eigen::Matrix3d orthonormalized(const Eigen::Matrix3d &R);
 } // namespace bole

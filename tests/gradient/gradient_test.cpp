@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/gradient/gradient.h>
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <visp3/core/vpException.h>
+
+namespace
+{
+using namespace bole;
+
+vpImage<unsigned char> painted(unsigned rows, unsigned cols, const std::function<double(int, int)> &value)
+{
+  vpImage<unsigned char> image(rows, cols);
+  for (unsigned v = 0; v < rows; ++v)
+    for (unsigned u = 0; u < cols; ++u)
+      image[v][u] = static_cast<unsigned char>(std::lround(value(static_cast<int>(u), static_cast<int>(v))));
+  return image;
+}
+
+vpImage<unsigned char> noise(unsigned rows, unsigned cols)
+{
+  std::mt19937 random(7);
+  std::uniform_int_distribution<int> grey(0, 255);
+  return painted(rows, cols, [&](int, int) { return grey(random); });
+}
+
+/// The convolution by its definition, pixel by pixel: Gaussian down, derivative of a Gaussian across.
+double bruteForce(const vpImage<unsigned char> &I, int u, int v, double sigma)
+{
+  const int radius = static_cast<int>(std::ceil(3 * sigma));
+  double sum = 0, weight = 0, ramp = 0;
+  for (int i = -radius; i <= radius; ++i) {
+    weight += std::exp(-0.5 * i * i / (sigma * sigma));
+    ramp += i * i * std::exp(-0.5 * i * i / (sigma * sigma));
+  }
+  for (int dv = -radius; dv <= radius; ++dv)
+    for (int du = -radius; du <= radius; ++du)
+      sum += du * std::exp(-0.5 * (du * du + dv * dv) / (sigma * sigma)) / (weight * ramp) *
+             I[std::clamp(v + dv, 0, static_cast<int>(I.getRows()) - 1)]
+              [std::clamp(u + du, 0, static_cast<int>(I.getCols()) - 1)];
+  return sum / 255;
+}
+
+TEST(Gradient, IsTheConvolutionByItsDefinitionUpToTheEdges)
+{
+  const auto I = noise(31, 43);
+  for (const double sigma : {0.7, 1.0, 2.2}) {
+    const Gradient gradient = computeGradient(I, {sigma, false, 3});
+    for (int v = 0; v < 31; ++v)
+      for (int u = 0; u < 43; ++u)
+        ASSERT_NEAR(gradient.signed_x[v][u], bruteForce(I, u, v, sigma), 2e-6) << u << "," << v << " sigma " << sigma;
+  }
+}
+
+TEST(Gradient, OfARampIsItsSlopeInFullScaleAPixel)
+{
+  const auto I = painted(40, 80, [](int u, int) { return 20 + 2.0 * u; });
+  const Gradient gradient = computeGradient(I);
+  EXPECT_NEAR(gradient.signed_x[20][40], 2.0 / 255, 1e-6);
+}
+
+TEST(Gradient, KnowsNothingOfWhatChangesDownwardsOnly)
+{
+  const auto I = painted(40, 80, [](int, int v) { return 5.0 * v; });
+  const Gradient gradient = computeGradient(I);
+  for (int v = 0; v < 40; ++v)
+    for (int u = 0; u < 80; ++u)
+      EXPECT_NEAR(gradient.signed_x[v][u], 0, 1e-6);
+}
+
+TEST(Gradient, PeaksAtAStepWithTheSignOfItsBrightness)
+{
+  const auto I = painted(30, 60, [](int u, int) { return u < 30 ? 200 : 40; });
+  const Gradient gradient = computeGradient(I);
+  for (int u = 0; u < 60; ++u)
+    EXPECT_GE(gradient.signed_x[15][u] + 1e-6f, std::min(gradient.signed_x[15][29], gradient.signed_x[15][30]));
+  EXPECT_NEAR(gradient.signed_x[15][29], gradient.signed_x[15][30], 1e-6); // the step is between the two
+  EXPECT_LT(gradient.signed_x[15][29], -0.1);
+}
+
+TEST(Gradient, SplitPartsAreMadeOnlyWhenAskedForAndNeverChangeSign)
+{
+  const auto I = noise(40, 60);
+  EXPECT_EQ(computeGradient(I).negative.getSize(), 0u);
+  const Gradient gradient = computeGradient(I, {1, true, 3});
+  ASSERT_EQ(gradient.negative.getSize(), I.getSize());
+  for (unsigned i = 0; i < I.getSize(); ++i) {
+    EXPECT_LE(gradient.negative.bitmap[i], 0);
+    EXPECT_GE(gradient.positive.bitmap[i], 0);
+  }
+}
+
+/// Split first, then blur (Eq. 3): with blur first the two would cancel on noise.
+TEST(Gradient, SplitPartsAddUpToTheBlurredSobelDerivative)
+{
+  const auto I = noise(60, 60);
+  const Gradient gradient = computeGradient(I, {1, true, 2});
+  const auto sobel = [&](int u, int v) {
+    double sum = 0;
+    for (int dv = -1; dv <= 1; ++dv)
+      sum += (dv == 0 ? 2 : 1) * (I[v + dv][u + 1] - I[v + dv][u - 1]);
+    return sum / (8 * 255.0);
+  };
+  double sum = 0, negative = 0, weight = 0;
+  for (int dv = -8; dv <= 8; ++dv)
+    for (int du = -8; du <= 8; ++du) {
+      const double w = std::exp(-0.5 * (du * du + dv * dv) / 4.0), s = sobel(30 + du, 30 + dv);
+      sum += w * s;
+      negative += w * std::min(s, 0.0);
+      weight += w;
+    }
+  EXPECT_NEAR(gradient.negative[30][30] + gradient.positive[30][30], sum / weight, 1e-4);
+  EXPECT_NEAR(gradient.negative[30][30], negative / weight, 5e-4);
+}
+
+TEST(GradientOptions, AnOptionOutOfRangeIsNamed)
+{
+  GradientOptions options;
+  options.sigma_px = 0.1;
+  try {
+    options.validate();
+    FAIL() << "no exception";
+  }
+  catch (const vpException &error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("gradient.sigma_px = 0.1, must be in [0.5, 5]"));
+  }
+}
+} // namespace
