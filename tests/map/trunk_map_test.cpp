@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The life of a trunk: what it must show before it is confirmed, and what loses it.
+#include <bole/map/trunk_map.h>
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <visp3/core/vpException.h>
+
+namespace
+{
+using namespace bole;
+
+Trunk trunkAt(double x, double y, double radius = 0.15)
+{
+  Trunk trunk;
+  trunk.xy = {x, y};
+  trunk.log_radius = std::log(radius);
+  return trunk;
+}
+
+/// A map in which trunks are added and seen as the pipeline would.
+class Life : public testing::Test
+{
+protected:
+  MapTrunk &add(const Trunk &trunk)
+  {
+    m_map.trunks().reserve(64); // references stay good
+    MapTrunk &added = m_map.add(m_next++, trunk);
+    added.covariance = 1e-4 * Matrix5d::Identity();
+    return added;
+  }
+  /// \p views more views, the bearing sweeping \p parallax in all of them.
+  void see(MapTrunk &trunk, int views, double parallax = 0.2, double innovation2 = 0.1, double range = 4)
+  {
+    for (int i = 0; i < views; ++i, m_time_s += 0.1)
+      m_map.recordView(trunk, {m_time_s, 0.5 + parallax * i / std::max(1, views - 1), range, -0.1, 0.1, innovation2});
+  }
+  void miss(MapTrunk &trunk, int frames)
+  {
+    for (int i = 0; i < frames; ++i)
+      m_map.recordMiss(trunk);
+  }
+  MapTrunk &confirmed(const Trunk &at, int views = 20)
+  {
+    MapTrunk &trunk = add(at);
+    see(trunk, views);
+    m_map.review();
+    EXPECT_EQ(trunk.status, TrunkStatus::confirmed);
+    return trunk;
+  }
+
+  MapOptions m_options;
+  TrunkMap m_map{m_options};
+  std::size_t m_next = 0;
+  double m_time_s = 0;
+};
+} // namespace
+
+TEST_F(Life, StartsAsACandidate)
+{
+  MapTrunk &trunk = add(trunkAt(3, 1));
+  see(trunk, m_options.confirm_observations - 1);
+  EXPECT_TRUE(m_map.review().empty());
+  EXPECT_EQ(trunk.status, TrunkStatus::candidate);
+}
+
+TEST_F(Life, IsConfirmedByEnoughViewsThatFit)
+{
+  MapTrunk &trunk = add(trunkAt(3, 1));
+  see(trunk, m_options.confirm_observations);
+  const auto changes = m_map.review();
+  ASSERT_EQ(changes.size(), 1u);
+  EXPECT_EQ(changes[0].id, trunk.id);
+  EXPECT_EQ(changes[0].from, TrunkStatus::candidate);
+  EXPECT_EQ(changes[0].to, TrunkStatus::confirmed);
+  EXPECT_TRUE(m_map.review().empty()); // and stays so
+  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 1);
+}
+
+TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
+{
+  struct Case
+  {
+    const char *what;
+    std::function<void(MapTrunk &)> spoil;
+  };
+  const std::vector<Case> cases = {
+      {"parallax", [](MapTrunk &t) { t.bearing_low = t.bearing_high = 0; }},
+      {"place", [&](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e4; }},
+      {"radius known", [&](MapTrunk &t) { t.covariance(2, 2) = 1; }},
+      {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
+      {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
+      {"misses", [&](MapTrunk &t) { t.misses = t.hits; }},
+      {"innovation", [&](MapTrunk &t) { t.innovation2 = 1.1 * m_options.confirm_innovation_px * m_options.confirm_innovation_px; }},
+  };
+  for (const Case &c : cases) {
+    TrunkMap map(m_options);
+    MapTrunk &trunk = map.add(0, trunkAt(3, 1));
+    trunk.covariance = 1e-4 * Matrix5d::Identity();
+    for (int i = 0; i < 20; ++i)
+      map.recordView(trunk, {0.1 * i, 0.02 * i, 7, 0, 0, 0.1});
+    MapTrunk spoilt = trunk;
+    c.spoil(trunk);
+    map.review();
+    EXPECT_NE(trunk.status, TrunkStatus::confirmed) << c.what;
+    trunk = spoilt; // and it was only that
+    map.review();
+    EXPECT_EQ(trunk.status, TrunkStatus::confirmed) << c.what;
+  }
+}
+
+TEST_F(Life, WhatCameNearMustHaveBeenForeground)
+{
+  MapTrunk &trunk = add(trunkAt(3, 1));
+  see(trunk, 20);
+  for (int i = 0; i < 5; ++i)
+    m_map.recordForeground(trunk, m_options.near_range - 0.1, 0.05);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::lost);
+  EXPECT_TRUE(trunk.removed);
+
+  MapTrunk &far = add(trunkAt(3, -4));
+  see(far, 20);
+  for (int i = 0; i < 5; ++i)
+    m_map.recordForeground(far, m_options.near_range + 0.1, 0.05); // says nothing that far away
+  m_map.review();
+  EXPECT_EQ(far.status, TrunkStatus::confirmed);
+}
+
+TEST_F(Life, ACandidateWhosePredictionsFailIsGivenUp)
+{
+  MapTrunk &trunk = add(trunkAt(3, 1));
+  const double bad = 1.1 * m_options.doubt_slack * m_options.confirm_innovation_px;
+  see(trunk, m_options.doubt_observations - 1, 0.2, bad * bad);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::candidate); // too early to say
+  see(trunk, 1, 0, bad * bad);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::lost);
+  EXPECT_TRUE(trunk.removed);
+}
+
+TEST_F(Life, ACandidateThatIsMissedForLongLeavesTheMap)
+{
+  MapTrunk &trunk = add(trunkAt(3, 1));
+  see(trunk, 3);
+  miss(trunk, m_options.lost_misses - 1);
+  EXPECT_TRUE(m_map.review().empty());
+  miss(trunk, 1);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::lost);
+  EXPECT_TRUE(trunk.removed);
+}
+
+TEST_F(Life, AConfirmedTrunkThatIsLostKeepsItsPlaceAndComesBackUnderItsId)
+{
+  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
+  const int id = trunk.id;
+  miss(trunk, m_options.lost_misses);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::lost);
+  EXPECT_FALSE(trunk.removed); // still predicted, so it can be found again
+  EXPECT_TRUE(m_map.review().empty());
+  see(trunk, 1);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::confirmed);
+  EXPECT_EQ(trunk.id, id);
+}
+
+TEST_F(Life, AViewEndsARowOfMisses)
+{
+  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
+  for (int i = 0; i < 5; ++i) {
+    miss(trunk, m_options.lost_misses - 1);
+    see(trunk, 1);
+    EXPECT_TRUE(m_map.review().empty());
+  }
+}
+
+TEST_F(Life, TwoTrunksInOnePlaceBecomeOne)
+{
+  MapTrunk &old = confirmed(trunkAt(3, 1), 60);
+  MapTrunk &duplicate = add(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance - 0.01, 1));
+  see(duplicate, 3);
+  const auto changes = m_map.review();
+  ASSERT_EQ(changes.size(), 1u);
+  EXPECT_EQ(changes[0].id, duplicate.id);
+  EXPECT_EQ(changes[0].into, old.id);
+  EXPECT_EQ(duplicate.status, TrunkStatus::merged);
+  EXPECT_TRUE(duplicate.removed);
+  EXPECT_FALSE(old.removed);
+  EXPECT_TRUE(m_map.review().empty()); // a merged trunk merges no more
+}
+
+TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
+{
+  confirmed(trunkAt(3, 1));
+  confirmed(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance + 0.01, 1));
+  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 2);
+}
+
+TEST_F(Life, OfTwoReadingsOfOnePlaceTheSilhouetteStaysNotTheEdgeOnTheBark)
+{
+  MapTrunk &narrow = add(trunkAt(3, 1, 0.08)), &wide = add(trunkAt(3.05, 1, 0.2));
+  see(narrow, 9);
+  see(wide, 9);
+  m_map.review();
+  EXPECT_EQ(narrow.status, TrunkStatus::merged);
+  EXPECT_NE(wide.status, TrunkStatus::merged);
+
+  MapTrunk &followed = add(trunkAt(-3, 1, 0.08)), &chance = add(trunkAt(-3.05, 1, 0.2));
+  see(followed, 9);
+  see(chance, 2); // little behind it
+  m_map.review();
+  EXPECT_EQ(chance.status, TrunkStatus::merged);
+  EXPECT_NE(followed.status, TrunkStatus::merged);
+}
+
+TEST_F(Life, ParallaxIsTheSpreadOfTheBearingsAlsoAcrossHalfATurn)
+{
+  MapTrunk &trunk = add(trunkAt(-3, 0));
+  for (const double bearing : {3.10, -3.10, 3.05})
+    m_map.recordView(trunk, {0, bearing, 3, 0, 0, 0});
+  EXPECT_NEAR(trunk.parallax(), 2 * M_PI - 6.2 + 0.05, 1e-12);
+}
+
+TEST_F(Life, AnyHistoryKeepsItsLaws)
+{
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform;
+  for (int step = 0; step < 3000; ++step) {
+    if (m_map.trunks().size() < 40 && uniform(random) < 0.05)
+      add(trunkAt(6 * uniform(random), 6 * uniform(random), 0.06 + 0.3 * uniform(random)));
+    if (m_map.trunks().empty())
+      continue;
+    MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(uniform(random) * static_cast<double>(m_map.trunks().size()))];
+    if (!trunk.removed && uniform(random) < 0.7)
+      see(trunk, 1 + static_cast<int>(4 * uniform(random)), 0.1, 2 * uniform(random));
+    else if (!trunk.removed)
+      miss(trunk, 1 + static_cast<int>(4 * uniform(random)));
+    std::vector<MapTrunk> before = m_map.trunks();
+    for (const MapChange &change : m_map.review()) {
+      const auto id = static_cast<std::size_t>(change.id);
+      EXPECT_FALSE(before[id].removed) << "what left the map stays as it was";
+      EXPECT_NE(change.to, TrunkStatus::candidate) << "nothing becomes a candidate again";
+      EXPECT_EQ(change.to == TrunkStatus::merged, change.into >= 0);
+      if (change.into >= 0) {
+        EXPECT_NE(m_map.trunks()[static_cast<std::size_t>(change.into)].id, change.id);
+        EXPECT_TRUE(m_map.trunks()[id].removed);
+      }
+    }
+    int counted = 0;
+    for (const TrunkStatus status : {TrunkStatus::candidate, TrunkStatus::confirmed, TrunkStatus::lost, TrunkStatus::merged})
+      counted += m_map.count(status);
+    ASSERT_EQ(counted, static_cast<int>(m_map.trunks().size()));
+  }
+  EXPECT_GT(m_map.count(TrunkStatus::merged), 0);
+}
+
+TEST_F(Life, RecordsTellThePlaceAtBreastHeight)
+{
+  Trunk leaning = trunkAt(3, 1);
+  leaning.lean = {0.1, -0.05};
+  MapTrunk &trunk = add(leaning);
+  trunk.covariance.diagonal() << 0.01, 0.02, 0.04, 1e-3, 2e-3;
+  see(trunk, 4);
+  const TrunkRecord record = m_map.records().at(0);
+  EXPECT_LT((record.xy - Eigen::Vector2d(3 + 0.13, 1 - 0.065)).norm(), 1e-12);
+  EXPECT_NEAR(record.covariance_xy(0, 0), 0.01 + 1.3 * 1.3 * 1e-3, 1e-12);
+  EXPECT_NEAR(record.covariance_xy(1, 1), 0.02 + 1.3 * 1.3 * 2e-3, 1e-12);
+  EXPECT_NEAR(record.variance_radius, 0.04 * 0.15 * 0.15, 1e-12);
+  EXPECT_EQ(record.observations, 4);
+  EXPECT_NEAR(record.last_seen_s - record.first_seen_s, 0.3, 1e-12);
+}
+
+TEST(MapOptions, AnOptionOutOfRangeIsNamed)
+{
+  MapOptions options;
+  options.lost_misses = 0;
+  try {
+    TrunkMap map(options);
+    FAIL() << "no exception";
+  }
+  catch (const vpException &error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("map.lost_misses = 0, must be in [1, 1000]"));
+  }
+}
