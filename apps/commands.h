@@ -10,6 +10,7 @@ namespace bole::apps
 {
 void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
+void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
 void addRecord(CLI::App &app);  ///< a live flight to disk
 void addReplay(CLI::App &app);  ///< a recorded flight, served again

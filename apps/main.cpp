@@ -12,6 +12,7 @@ int main(int argc, char **argv)
   app.require_subcommand(1);
   bole::apps::addTrack(app);
   bole::apps::addEvaluate(app);
+  bole::apps::addCompare(app);
   bole::apps::addCalibrateSaliency(app);
   bole::apps::addShowSaliency(app);
   bole::apps::addSimulate(app);

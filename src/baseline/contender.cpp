@@ -2,13 +2,43 @@
 #include <bole/baseline/contender.h>
 #include <bole/vpMbTrunkTracker.h>
 
-#include <chrono>
+#include <ctime>
 #include <fmt/format.h>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
 #include <visp3/mbt/vpMbEdgeTracker.h>
 #include <visp3/mbt/vpMbGenericTracker.h>
 
 namespace bole
 {
+namespace
+{
+/// ViSP tells std::cout and std::cerr of every model and every setPose(); not while this lives.
+class Silence
+{
+public:
+  Silence() : m_out(std::cout.rdbuf(nullptr)), m_err(std::cerr.rdbuf(nullptr)) {}
+  ~Silence()
+  {
+    std::cout.rdbuf(m_out); // also clears the state that writing to nothing has set
+    std::cerr.rdbuf(m_err);
+  }
+  Silence(const Silence &) = delete;
+  Silence &operator=(const Silence &) = delete;
+
+private:
+  std::streambuf *m_out, *m_err;
+};
+
+/// Time that this thread has computed: what other programs take from the processor does not count.
+double threadTime_ms()
+{
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * double(t.tv_sec) + 1e-6 * double(t.tv_nsec);
+}
+} // namespace
+
 const char *toString(TrackerKind kind)
 {
   switch (kind) {
@@ -26,6 +56,7 @@ const char *toString(Help help)
   case Help::alone: return "alone";
   case Help::prior: return "prior";
   case Help::reinitialised: return "re-initialised";
+  case Help::truth: return "true pose";
   }
   return "?";
 }
@@ -36,14 +67,21 @@ std::string EdgeSettings::text() const
                      far_m);
 }
 
-Contender::Contender(TrackerKind kind, Help help, const EdgeSettings &settings)
-  : m_kind(kind), m_help(help), m_settings(settings)
+Contender::Contender(TrackerKind kind, Help help, const EdgeSettings &settings, const std::string &trunk_xml)
+  : m_kind(kind), m_help(help), m_settings(settings), m_trunk_xml(trunk_xml)
 {
 }
 Contender::~Contender() = default;
 Contender::Contender(Contender &&) noexcept = default;
 
 std::string Contender::name() const { return fmt::format("{}, {}", toString(m_kind), toString(m_help)); }
+
+std::string Contender::settingsText() const
+{
+  if (m_kind != TrackerKind::trunk)
+    return m_settings.text();
+  return fmt::format("{}, far {:g} m", m_trunk_xml.empty() ? "defaults" : m_trunk_xml, m_settings.far_m);
+}
 
 std::unique_ptr<vpMbTracker> Contender::make(const std::string &cao_path, const PinholeCamera &camera) const
 {
@@ -81,6 +119,8 @@ std::unique_ptr<vpMbTracker> Contender::make(const std::string &cao_path, const 
     }
     tracker = std::move(generic);
   }
+  if (m_kind == TrackerKind::trunk && !m_trunk_xml.empty())
+    tracker->loadConfigFile(m_trunk_xml, false);
   tracker->setCameraParameters(camera.toVisp());
   tracker->setAngleAppear(vpMath::rad(85));
   tracker->setAngleDisappear(vpMath::rad(89));
@@ -94,42 +134,53 @@ std::unique_ptr<vpMbTracker> Contender::make(const std::string &cao_path, const 
 void Contender::start(const std::string &cao_path, const PinholeCamera &camera, const vpImage<unsigned char> &image,
                       const Pose &cMo)
 {
+  const Silence silence;
+  cv::setNumThreads(1); // of ViSP's KLT: everybody has one thread
   m_tracker = make(cao_path, camera);
   m_trunk = dynamic_cast<vpMbTrunkTracker *>(m_tracker.get());
   m_tracker->initFromPose(image, cMo.toVisp());
   m_cMo = cMo;
 }
 
+void Contender::giveHelp(const TestFlight &flight, std::size_t k, const Pose &predicted,
+                         const vpImage<unsigned char> &image)
+{
+  if (m_help == Help::truth)
+    m_tracker->setPose(image, flight.frames[k].cMo.toVisp());
+  if (m_help != Help::prior)
+    return;
+  if (!m_trunk) {
+    m_tracker->setPose(image, predicted.toVisp());
+    return;
+  }
+  const vpMatrix before = m_trunk->getPoseCovariance();
+  Matrix6d P;
+  for (unsigned i = 0; i < 6; ++i)
+    for (unsigned j = 0; j < 6; ++j)
+      P(int(i), int(j)) = before[i][j];
+  const Matrix6d covariance = flight.predictedCovariance(predicted, m_cMo, P);
+  vpMatrix Q(6, 6);
+  for (unsigned i = 0; i < 6; ++i)
+    for (unsigned j = 0; j < 6; ++j)
+      Q[i][j] = covariance(int(i), int(j));
+  m_trunk->setMotionPrior(predicted.toVisp(), Q);
+}
+
 Answer Contender::track(const TestFlight &flight, std::size_t k, const vpImage<unsigned char> &image)
 {
-  const auto begin = std::chrono::steady_clock::now();
+  const Silence silence;
+  const double begin_ms = threadTime_ms();
   Answer answer;
   const Pose predicted = flight.predicted(k, m_cMo);
-    try {
-    if (m_help == Help::prior) {
-      if (m_trunk) {
-        const vpMatrix before = m_trunk->getPoseCovariance();
-        Matrix6d P;
-        for (unsigned i = 0; i < 6; ++i)
-          for (unsigned j = 0; j < 6; ++j)
-            P(int(i), int(j)) = before[i][j];
-        const Matrix6d covariance = flight.predictedCovariance(predicted, m_cMo, P);
-        vpMatrix Q(6, 6);
-        for (unsigned i = 0; i < 6; ++i)
-          for (unsigned j = 0; j < 6; ++j)
-            Q[i][j] = covariance(int(i), int(j));
-        m_trunk->setMotionPrior(predicted.toVisp(), Q);
-      } else
-        m_tracker->setPose(image, predicted.toVisp());
-    }
+  try {
+    giveHelp(flight, k, predicted, image);
     m_tracker->track(image);
   }
   catch (const std::exception &error) { // vpException, and cv::Exception out of ViSP's KLT
     answer.complained = true;
     answer.message = error.what();
   }
-  const vpHomogeneousMatrix cMo = m_tracker->getPose();
-  answer.cMo = Pose::fromVisp(cMo);
+  answer.cMo = Pose::fromVisp(m_tracker->getPose());
   if (answer.complained && m_help == Help::reinitialised) {
     try {
       m_tracker->initFromPose(image, predicted.toVisp());
@@ -143,7 +194,7 @@ Answer Contender::track(const TestFlight &flight, std::size_t k, const vpImage<u
   if (answer.complained && m_help == Help::prior && !m_trunk)
     answer.cMo = predicted;
   m_cMo = answer.cMo.isFinite() ? answer.cMo : predicted;
-  answer.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  answer.ms = threadTime_ms() - begin_ms;
   return answer;
 }
 } // namespace bole

@@ -21,12 +21,20 @@ struct TestFrame
   std::optional<Pose> odometry;  ///< cMo by odometry alone: drifts away from cMo
 };
 
+/// More is wrong.
+struct Limits
+{
+  double position_m = 0.3;
+  double rotation_deg = 5;
+};
+
 struct TestFlight
 {
   std::string name;
   PinholeCamera camera;
   std::vector<TestFrame> frames;
   std::vector<Cylinder> trunks; ///< true model, world frame
+  Limits limits; ///< what counts as wrong at the scale of this flight
   /// Odometry knows height, roll and pitch for good (sonar, gravity) and drifts in x, y and yaw only.
   bool upright = true;
   Vector6d step_sigma = Vector6d::Constant(0.01);     ///< of odometry's step, world frame: t [m], rotation [rad]
