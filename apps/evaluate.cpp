@@ -16,6 +16,7 @@ void addEvaluate(CLI::App &app)
   struct Arguments
   {
     std::string run, sequence;
+    EvaluationOptions options;
     bool is_verbose = false;
   };
   const auto arguments = std::make_shared<Arguments>();
@@ -24,14 +25,22 @@ void addEvaluate(CLI::App &app)
   command->add_option("RUN", arguments->run, "Folder written by `bole track`")->required();
   command
       ->add_option("SEQUENCE", arguments->sequence,
-                   "EuRoC/ASL folder with ground truth (and trees.csv)")
+                   "EuRoC/ASL folder with ground truth (and trees.csv), or another run to be "
+                   "compared with")
       ->required();
   command->add_flag("-v,--verbose", arguments->is_verbose,
                     "List every match, miss and false positive");
+  command->add_flag("--align-start", arguments->options.align_start,
+                    "Lay the run's first frame on the sequence's: for live runs, whose stamps are "
+                    "the drone's");
   command->footer("Prints a table and writes RUN/evaluation.json.\n"
-                  "Example: bole evaluate run/park data/park-forward --verbose");
+                  "Examples:\n"
+                  "  bole evaluate run/park data/park-forward --verbose\n"
+                  "  bole evaluate run/live data/park-forward --align-start\n"
+                  "  bole evaluate run/live run/park --align-start");
   command->callback([arguments] {
-    const Evaluation evaluation = evaluate(arguments->run, arguments->sequence);
+    const Evaluation evaluation = 
+        evaluate(arguments->run, arguments->sequence, arguments->options);
     std::fputs(toTable(evaluation, arguments->is_verbose).c_str(), stdout);
     writeAtomically(arguments->run + "/evaluation.json", toJson(evaluation));
   });

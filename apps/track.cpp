@@ -9,7 +9,9 @@
 #include <bole/output/progress.h>
 #include <bole/pipeline/config.h>
 
+#include <chrono>
 #include <cstdio>
+#include <deque>
 #include <fmt/format.h>
 #include <memory>
 
@@ -27,6 +29,7 @@ struct Arguments
   SourceOptions source;
   bool is_shown = false, has_video = true, is_without_odometry = false;
   std::size_t frames_most = 0;
+  double give_up_s = ArDroneSource::Options().give_up_s;
 };
 
 std::unique_ptr<FrameSource> openInput(const Arguments &arguments)
@@ -34,7 +37,7 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments)
   if (!ArDroneSource::accepts(arguments.input))
     return openSource(arguments.input, arguments.source);
   ArDroneSource::Options options;
-  options.give_up_s = 10;
+  options.give_up_s = arguments.give_up_s;
   return std::make_unique<ArDroneSource>(ArDroneAddress::parse(arguments.input), options);
 }
 
@@ -75,16 +78,76 @@ private:
   std::unique_ptr<vpDisplayX> m_display;
 };
 
+/// [ms] since the last byte of a live frame came.
+std::optional<double> ageOf(const Frame &frame)
+{
+  if (frame.arrival_ns == 0 || frame.status != FrameStatus::ok)
+    return std::nullopt;
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return 1e-6 * static_cast<double>(std::chrono::nanoseconds(now).count() - frame.arrival_ns);
+}
+
+/// Frames of which nothing is known wait for one of which something is: at the end of a flight nobody
+/// knows where the drone went.
+class Flight
+{
+public:
+  Flight(Pipeline &pipeline, TrackOutput &output, Window &window)
+    : m_pipeline(pipeline), m_output(output), m_window(window)
+  {
+  }
+
+  void take(Frame frame)
+  {
+    if (frame.status == FrameStatus::missing && !frame.wMb_odometry) {
+      m_silent.push_back(std::move(frame));
+      return;
+    }
+    for (const Frame &silent : m_silent)
+      process(silent);
+    m_silent.clear();
+    process(frame);
+  }
+  void finish()
+  {
+    m_output.addSilence(m_silent.size());
+    m_pipeline.finish();
+  }
+
+private:
+  void process(const Frame &frame)
+  {
+    const FrameResult result = m_pipeline.process(frame);
+    m_window.show(m_output.add(frame, result, ageOf(frame)));
+  }
+
+  Pipeline &m_pipeline;
+  TrackOutput &m_output;
+  Window &m_window;
+  std::deque<Frame> m_silent;
+};
+
+void report(const Arguments &arguments, const TrackOutput &output, std::size_t count)
+{
+  fmt::print("{} frames, {} trunks confirmed, median {:.1f} ms a frame. Look at {}/overlay.mp4 and {}/map.svg\n", count,
+             output.confirmed(), output.timing().medianTotal_ms(), arguments.run, arguments.run);
+  if (const auto median = output.timing().age_ms(0.5))
+    fmt::print("Age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, most {:.1f} ms\n",
+               *median, *output.timing().age_ms(0.99), *output.timing().age_ms(1));
+}
+
 void track(const Arguments &arguments)
 {
   const PipelineOptions options = readOptions(arguments);
   const auto source = openInput(arguments);
+  const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   if (!source->note().empty())
     std::fprintf(stderr, "bole: %s\n", source->note().c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
   TrackOutput output(arguments.run, arguments.input, arguments.config, *source, arguments.has_video);
   Window window(arguments.is_shown);
+  Flight flight(pipeline, output, window);
   Progress progress(source->size(), stderr);
   endAtInterrupt();
   std::size_t count = 0;
@@ -96,20 +159,21 @@ void track(const Arguments &arguments)
       frame.wMb_odometry.reset();
       frame.gyro.clear();
     }
-    const FrameResult result = pipeline.process(frame);
-    window.show(output.add(frame, result));
-    progress.update(++count, output.trunksInView(), toString(frame.status));
+    const FrameStatus status = frame.status;
+    flight.take(std::move(frame));
+    progress.update(++count, output.trunksInView(), toString(status));
     if (count % 50 == 0)
       output.write(pipeline, false);
   }
   progress.finish();
   if (count == 0)
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
-  pipeline.finish();
+  flight.finish();
+  if (live != nullptr)
+    output.setLink(live->counters());
   output.write(pipeline, !interrupted());
   output.finish();
-  fmt::print("{} frames, {} trunks confirmed, median {:.1f} ms a frame. Look at {}/overlay.mp4 and {}/map.svg\n", count,
-             output.confirmed(), output.medianTotal_ms(), arguments.run, arguments.run);
+  report(arguments, output, count);
 }
 } // namespace
 
@@ -131,6 +195,8 @@ void addTrack(CLI::App &app)
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();
   command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)");
+  command->add_option("--give-up", arguments->give_up_s, "Silence of a live drone that ends its flight [s]")
+      ->capture_default_str();
   command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
   command->footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, graph.g2o, overlay.mp4, saliency.mp4, map.svg,\n"

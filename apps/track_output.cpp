@@ -59,7 +59,7 @@ TrackOutput::TrackOutput(const std::string &run, const std::string &input, const
   }
 }
 
-vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result)
+vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, std::optional<double> age_ms)
 {
   ++m_summary.frames[frame.status];
   if (!result.step_from_odometry && m_summary.timing.frames.size() == 1)
@@ -67,6 +67,7 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result)
   FrameTiming timing;
   timing.index = frame.index;
   timing.stamp_ns = frame.stamp_ns;
+  timing.age_ms = age_ms;
   for (const auto &[stage, ms] : result.timing_ms) {
     if (timing.stages_ms.size() >= m_summary.timing.stages.size())
       m_summary.timing.stages.emplace_back(stage);
@@ -102,6 +103,24 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result)
   if (m_saliency && result.saliency)
     m_saliency->write(drawSaliency(frame.image, m_camera, overlay.foreground, overlay.text), frame.stamp_ns);
   return picture;
+}
+
+void TrackOutput::addSilence(std::size_t frames)
+{
+  if (frames == 0)
+    return;
+  m_summary.frames[FrameStatus::missing] += frames;
+  m_summary.figures["missing_after_the_last_image"] = static_cast<double>(frames);
+}
+
+void TrackOutput::setLink(const LinkCounters &link)
+{
+  auto &figures = m_summary.figures;
+  figures["live_frames_dropped"] = static_cast<double>(link.dropped + link.video.skipped);
+  figures["live_connections"] = static_cast<double>(link.connections);
+  figures["live_navdata"] = static_cast<double>(link.navdata_packets);
+  figures["live_navdata_refused"] = static_cast<double>(link.navdata_refused);
+  figures["live_navdata_late"] = static_cast<double>(link.navdata_late);
 }
 
 void TrackOutput::write(const Pipeline &pipeline, bool is_complete)

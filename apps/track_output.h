@@ -3,6 +3,7 @@
 /// \file
 /// The folder that `bole track` writes, every file atomically.
 
+#include <bole/ardrone/drone_link.h>
 #include <bole/output/map_svg.h>
 #include <bole/output/summary_json.h>
 #include <bole/output/video_writer.h>
@@ -20,8 +21,13 @@ public:
   TrackOutput(const std::string &run, const std::string &input, const std::string &preset, const FrameSource &source,
               bool has_video);
 
-  /// Takes in a frame and returns its overlay (empty for a frame without an image).
-  vpImage<vpRGBa> add(const Frame &frame, const FrameResult &result);
+  /// Takes in a frame and returns its overlay (empty for a frame without an image). \p age_ms: of a live frame when
+  /// \p result was there.
+  vpImage<vpRGBa> add(const Frame &frame, const FrameResult &result, std::optional<double> age_ms = {});
+  /// Counts \p frames missing ones at the end of the flight, of which nothing is known.
+  void addSilence(std::size_t frames);
+  /// What came of the drone's packets.
+  void setLink(const LinkCounters &link);
   /// Writes all but the videos, as known now.
   void write(const Pipeline &pipeline, bool is_complete);
   /// Ends the videos.
@@ -29,7 +35,7 @@ public:
 
   std::size_t trunksInView() const { return m_in_view; }
   int confirmed() const { return m_confirmed; }
-  double medianTotal_ms() const { return m_summary.timing.medianTotal_ms(); }
+  const TimingTable &timing() const { return m_summary.timing; }
 
 private:
   std::string m_run;

@@ -15,7 +15,8 @@
 /// given out and waits for one where there is none. What came in between is dropped, never queued,
 /// so the age of an image does not depend on the speed of the program. Broken images are no
 /// exceptions: acquire() leaves the image as it was and getStatus() says why; only open() throws,
-/// when no drone answers in time. Reading never moves the drone.
+/// when no drone answers in time. Where no image comes in time the status is `missing`, with the
+/// navdata of that instant. Reading never moves the drone.
 ///
 /// Images are those of the lens, not rectified: ArDroneSource does that. One thread may use an
 /// object at a time.
@@ -83,4 +84,9 @@ private:
   bole::LinkTap m_tap;
   std::unique_ptr<bole::DroneLink> m_link;
   bole::LiveFrame m_frame;
+  struct Instant
+  {
+    std::int64_t stamp_ns = 0, arrival_ns = 0;
+  };
+  Instant m_last_whole; ///< of the frame before those that are missing
 };

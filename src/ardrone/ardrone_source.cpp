@@ -90,10 +90,6 @@ struct ArDroneSource::State
     frame.message = live.message;
     frame.arrival_ns = live.arrival_ns;
     frame.stamp_ns = std::max(live.stamp_ns, last_stamp_ns + 1);
-    if (live.status == FrameStatus::missing) // says when, on the drone's clock
-      frame.stamp_ns = std::max(
-          frame.stamp_ns, live.stamp_ns + steadyNowNs() - live.arrival_ns -
-                              static_cast<std::int64_t>(options.grabber.frame_timeout_s * 5e8));
     last_stamp_ns = frame.stamp_ns;
     const bool usable = live.status == FrameStatus::ok || live.status == FrameStatus::stale;
     if (usable) {

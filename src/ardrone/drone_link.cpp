@@ -218,6 +218,13 @@ bool DroneLink::next(LiveFrame &frame, double timeout_s)
   return true;
 }
 
+void DroneLink::addMotion(LiveFrame &frame)
+{
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  m_state->addNavdata(frame);
+  m_state->last_given_stamp_ns = frame.stamp_ns;
+}
+
 std::optional<BodyState> DroneLink::body() const
 {
   const std::lock_guard<std::mutex> lock(m_state->mutex);

@@ -9,6 +9,8 @@ namespace bole
 {
 namespace
 {
+constexpr const char *kOnlyUvlc =
+    "; only UVLC is decoded, not P264 (set the drone's video:video_codec to 32, not 64)";
 constexpr int kTableQuantiser = 31;
 constexpr std::uint32_t kEndOfSequence = 31;
 constexpr int kLargestResolution = 5;
@@ -109,8 +111,8 @@ struct Decoder
     const auto number = bits.read(32);
     if (format < 1 || format > 2 || resolution < 1 || resolution > kLargestResolution ||
         type != 0) {
-      complain(fmt::format("picture header: format {}, resolution {}, type {}", format, resolution,
-                           type));
+      complain(fmt::format("picture header: format {}, resolution {}, type {}{}", format, resolution,
+                           type, kOnlyUvlc));
       return false;
     }
     YuvPicture &picture = result.picture;
@@ -162,7 +164,8 @@ struct Decoder
   {
     if (quant != kTableQuantiser) {
       complain(
-          fmt::format("group {}: quantiser {}, only {} is known", group, quant, kTableQuantiser));
+          fmt::format("group {}: quantiser {}, only {} is known{}", group, quant, kTableQuantiser,
+                      kOnlyUvlc));
       return false;
     }
     const int columns = (result.picture.width + 15) / 16;

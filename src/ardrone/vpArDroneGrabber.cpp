@@ -3,6 +3,7 @@
 
 #include "socket.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
 
@@ -43,8 +44,12 @@ void vpArDroneGrabber::waitForFirstImage()
   connect();
   const std::int64_t end_ns =
       bole::steadyNowNs() + static_cast<std::int64_t>(m_options.open_timeout_s * 1e9);
+  std::string why; // the last image was no whole one
   do {
-    if (m_link->next(m_frame, 0.05) && m_frame.status == bole::FrameStatus::ok) {
+    if (!m_link->next(m_frame, 0.05))
+      continue;
+    why = m_frame.message;
+    if (m_frame.status == bole::FrameStatus::ok) {
       width = static_cast<unsigned>(m_frame.picture.width);
       height = static_cast<unsigned>(m_frame.picture.height);
       init = true;
@@ -54,9 +59,9 @@ void vpArDroneGrabber::waitForFirstImage()
   const bool answered = m_link->counters().connections > 0;
   close();
   throw vpException(vpException::ioError,
-                    fmt::format("{}: {} within {} s", m_address.toString(),
+                    fmt::format("{}: {} within {} s{}{}", m_address.toString(),
                                 answered ? "no whole image" : "no drone answers",
-                                m_options.open_timeout_s));
+                                m_options.open_timeout_s, why.empty() ? "" : ": ", why));
 }
 
 void vpArDroneGrabber::open(vpImage<unsigned char> &I)
@@ -76,12 +81,18 @@ void vpArDroneGrabber::grab()
   bole::LiveFrame frame;
   const bole::LiveFrame last = std::move(m_frame);
   if (!getLink().next(frame, m_options.frame_timeout_s)) {
-    const double waited_s = static_cast<double>(bole::steadyNowNs() - last.arrival_ns) * 1e-9;
+    if (last.status != bole::FrameStatus::missing)
+      m_last_whole = {last.stamp_ns, last.arrival_ns};
+    const std::int64_t waited_ns = bole::steadyNowNs() - m_last_whole.arrival_ns;
     frame.status = bole::FrameStatus::missing;
-    frame.message = fmt::format("no image for {:.1f} s", waited_s);
+    frame.message = fmt::format("no image for {:.1f} s", static_cast<double>(waited_ns) * 1e-9);
     frame.number = last.number;
-    frame.stamp_ns = last.stamp_ns;
     frame.arrival_ns = last.arrival_ns;
+    // On the drone's clock; half a timeout early, so that the frame that comes next is not before.
+    frame.stamp_ns = std::max(last.stamp_ns + 1,
+                              m_last_whole.stamp_ns + waited_ns -
+                                  static_cast<std::int64_t>(m_options.frame_timeout_s * 5e8));
+    m_link->addMotion(frame);
   }
   m_frame = std::move(frame);
 }

@@ -25,14 +25,15 @@ TrajectoryReport report(const std::vector<PosePair> &pairs)
   return result;
 }
 
-std::vector<PosePair> pairsOf(const std::string &path, const Trajectory &truth)
+/// What a run is compared with.
+struct Reference
 {
-  std::vector<PosePair> pairs = pairPoses(readTumTrajectory(path), truth);
-  if (pairs.empty())
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: none of its stamps lies in the ground truth's", path));
-  return pairs;
-}
+  Trajectory trajectory, odometry;
+  std::size_t frames = 0;
+  std::int64_t first_stamp_ns = 0;
+  std::vector<TruthTrunk> trunks;
+  std::vector<TrunkVisibility> visibility;
+};
 
 /// True poses at the stamps of the frames.
 std::vector<Pose> truePoses(const AslSource &source)
@@ -43,41 +44,110 @@ std::vector<Pose> truePoses(const AslSource &source)
       poses.push_back(*wMb);
   return poses;
 }
+
+Reference readSequence(const std::string &sequence)
+{
+  const AslSource source(sequence);
+  if (source.truth().empty())
+    throw vpException(
+        vpException::ioError,
+        fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
+  Reference reference;
+  reference.trajectory = source.truth();
+  reference.odometry = source.odometry();
+  reference.frames = source.size();
+  reference.first_stamp_ns =
+      source.stamps().empty() ? source.truth().front().stamp_ns : source.stamps().front();
+  reference.trunks = readTruthTrunks(sequence);
+  reference.visibility =
+      trunkVisibility(reference.trunks, truePoses(source), source.bMc(), source.camera());
+  return reference;
+}
+
+Reference readRun(const std::string &run)
+{
+  Reference reference;
+  reference.trajectory = readTumTrajectory(run + "/trajectory.tum");
+  if (reference.trajectory.empty())
+    throw vpException(vpException::ioError, fmt::format("{}/trajectory.tum: no poses", run));
+  reference.frames = reference.trajectory.size();
+  reference.first_stamp_ns = reference.trajectory.front().stamp_ns;
+  for (const TrunkRecord &trunk : readTrunks(run + "/trunks.csv"))
+    if (trunk.status == TrunkStatus::confirmed)
+      reference.trunks.push_back({trunk.id, trunk.xy, trunk.radius, 0});
+  TrunkVisibility expected;
+  expected.is_expected = true;
+  reference.visibility.assign(reference.trunks.size(), expected);
+  return reference;
+}
+
+bool isRun(const std::string &folder)
+{
+  return std::filesystem::exists(std::filesystem::path(folder) / "trajectory.tum");
+}
+
+std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns,
+                              const Trajectory &truth)
+{
+  Trajectory estimate = readTumTrajectory(path);
+  for (StampedPose &pose : estimate)
+    pose.stamp_ns += shift_ns;
+  std::vector<PosePair> pairs = pairPoses(estimate, truth);
+  if (pairs.empty())
+    throw vpException(
+        vpException::badValue,
+        fmt::format("{}: none of its stamps lies in the ground truth's; if the run was live, "
+                    "--align-start lays its first frame on the sequence's",
+                    path));
+  return pairs;
+}
+
+std::int64_t startOf(const std::string &path)
+{
+  const Trajectory estimate = readTumTrajectory(path);
+  if (estimate.empty())
+    throw vpException(vpException::ioError, fmt::format("{}: no poses", path));
+  return estimate.front().stamp_ns;
+}
 } // namespace
 
-Evaluation evaluate(const std::string &run, const std::string &sequence)
+Evaluation evaluate(const std::string &run, const std::string &sequence,
+                    const EvaluationOptions &options)
 {
   const auto in_run = [&](const char *name) {
     return (std::filesystem::path(run) / name).string();
   };
   if (!std::filesystem::is_directory(run))
     throw vpException(vpException::ioError, fmt::format("{}: no such folder", run));
-  const AslSource source(sequence);
-  if (source.truth().empty())
-    throw vpException(
-        vpException::ioError,
-        fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
 
   Evaluation evaluation;
   evaluation.run = run;
   evaluation.sequence = sequence;
-  evaluation.frames = source.size();
-  const std::vector<PosePair> pairs = pairsOf(in_run("trajectory.tum"), source.truth());
+  evaluation.is_against_run = isRun(sequence);
+  const Reference reference =
+      evaluation.is_against_run ? readRun(sequence) : readSequence(sequence);
+  evaluation.frames = reference.frames;
+  std::int64_t shift_ns = 0;
+  if (options.align_start) {
+    shift_ns = reference.first_stamp_ns - startOf(in_run("trajectory.tum"));
+    evaluation.time_shift_s = static_cast<double>(shift_ns) * 1e-9;
+  }
+
+  const auto pairs = pairsOf(in_run("trajectory.tum"), shift_ns, reference.trajectory);
   evaluation.smoothed = report(pairs);
   if (std::filesystem::exists(in_run("trajectory_online.tum")))
-    evaluation.online = report(pairsOf(in_run("trajectory_online.tum"), source.truth()));
-  if (!source.odometry().empty()) {
+    evaluation.online =
+        report(pairsOf(in_run("trajectory_online.tum"), shift_ns, reference.trajectory));
+  if (!reference.odometry.empty()) {
     std::vector<PosePair> odometry;
     for (const PosePair &pair : pairs)
-      if (const auto wMb = interpolate(source.odometry(), pair.stamp_ns))
+      if (const auto wMb = interpolate(reference.odometry, pair.stamp_ns))
         odometry.push_back({pair.stamp_ns, *wMb, pair.truth});
     evaluation.odometry = report(odometry);
   }
-  const std::vector<TruthTrunk> truth = readTruthTrunks(sequence);
-  if (!truth.empty())
-    evaluation.trunks = trunkMetrics(
-        readTrunks(in_run("trunks.csv")), truth,
-        trunkVisibility(truth, truePoses(source), source.bMc(), source.camera()), alignAll(pairs));
+  if (!reference.trunks.empty() || evaluation.is_against_run)
+    evaluation.trunks = trunkMetrics(readTrunks(in_run("trunks.csv")), reference.trunks,
+                                     reference.visibility, alignAll(pairs));
   return evaluation;
 }
 } // namespace bole

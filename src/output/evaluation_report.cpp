@@ -38,7 +38,23 @@ void addErrors(std::string &text, const std::string &name, const TrunkErrors &er
       errors.radius_rmse, errors.radius_bias);
 }
 
-void addTrunks(std::string &text, const TrunkMetrics &trunks)
+void addBins(std::string &text, const TrunkMetrics &trunks)
+{
+  add(text, "  predicted sigma {:.3f} m, NEES/2 {:.2f} (first pose as gauge; 1 when honest)\n",
+      trunks.all.predicted_sigma, trunks.all.nees_half);
+  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match",
+      "median", "RMSE", "sigma", "NEES/2", "r RMSE", "r bias");
+  addErrors(text, "all", trunks.all);
+  add(text, "  by nearest range\n");
+  for (const TrunkBin &bin : trunks.by_range)
+    addErrors(text, "  " + bin.name, bin.errors);
+  add(text, "  by change of bearing\n");
+  for (const TrunkBin &bin : trunks.by_parallax)
+    addErrors(text, "  " + bin.name, bin.errors);
+}
+
+/// \p is_against_run: the errors have no bins of visibility, and no truth to be honest about.
+void addTrunks(std::string &text, const TrunkMetrics &trunks, bool is_against_run)
 {
   add(text,
       "\nTrunks: {} confirmed, {} matched one to one under {} m after alignment in x, y, yaw\n"
@@ -51,17 +67,10 @@ void addTrunks(std::string &text, const TrunkMetrics &trunks)
         std::pair(Alignment::xy_yaw_scale, "and scale")})
     add(text, "  {:<20} {:10.3f} {:8.3f}\n", name, trunks.all.median[index(alignment)],
         trunks.all.rmse[index(alignment)]);
-  add(text, "  predicted sigma {:.3f} m, NEES/2 {:.2f} (first pose as gauge; 1 when honest)\n",
-      trunks.all.predicted_sigma, trunks.all.nees_half);
-  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match",
-      "median", "RMSE", "sigma", "NEES/2", "r RMSE", "r bias");
-  addErrors(text, "all", trunks.all);
-  add(text, "  by nearest range\n");
-  for (const TrunkBin &bin : trunks.by_range)
-    addErrors(text, "  " + bin.name, bin.errors);
-  add(text, "  by change of bearing\n");
-  for (const TrunkBin &bin : trunks.by_parallax)
-    addErrors(text, "  " + bin.name, bin.errors);
+  if (is_against_run)
+    add(text, "  radius difference {:.3f} m RMSE\n", trunks.all.radius_rmse);
+  else
+    addBins(text, trunks);
 }
 
 void addVerbose(std::string &text, const TrunkMetrics &trunks)
@@ -176,6 +185,9 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
   std::string text;
   add(text, "{} against {}: {} of {} frames\n\n", evaluation.run, evaluation.sequence,
       evaluation.smoothed.absolute[0].poses, evaluation.frames);
+  if (evaluation.time_shift_s)
+    add(text, "  The run's stamps were shifted by {:+.3f} s: first frame on first frame.\n\n",
+        *evaluation.time_shift_s);
   add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]",
       "x, y, yaw", "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");
   addTrajectory(text, "smoothed", evaluation.smoothed);
@@ -184,7 +196,7 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
   if (evaluation.odometry)
     addTrajectory(text, "odometry", *evaluation.odometry);
   if (evaluation.trunks) {
-    addTrunks(text, *evaluation.trunks);
+    addTrunks(text, *evaluation.trunks, evaluation.is_against_run);
     if (verbose)
       addVerbose(text, *evaluation.trunks);
   }
@@ -195,6 +207,9 @@ std::string toJson(const Evaluation &evaluation)
 {
   Json json = {
       {"run", evaluation.run}, {"sequence", evaluation.sequence}, {"frames", evaluation.frames}};
+  json["against_run"] = evaluation.is_against_run;
+  if (evaluation.time_shift_s)
+    json["time_shift_s"] = *evaluation.time_shift_s;
   json["trajectory"]["smoothed"] = toJson(evaluation.smoothed);
   if (evaluation.online)
     json["trajectory"]["online"] = toJson(*evaluation.online);

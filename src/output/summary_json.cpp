@@ -55,6 +55,8 @@ Json timingJson(const TimingTable &timing)
   Json json = {{"median_frame_ms", timing.medianTotal_ms()}, {"percentile95_frame_ms", timing.percentile95_ms()}};
   for (std::size_t i = 0; i < timing.stages.size(); ++i)
     json["median_stage_ms"][timing.stages[i]] = timing.medianStage_ms(i);
+  if (const auto median = timing.age_ms(0.5))
+    json["age_ms"] = {{"median", *median}, {"percentile99", *timing.age_ms(0.99)}, {"most", *timing.age_ms(1)}};
   return json;
 }
 

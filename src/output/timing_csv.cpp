@@ -41,17 +41,30 @@ double TimingTable::medianStage_ms(std::size_t stage) const
   return quantile(std::move(values), 0.5);
 }
 
+std::optional<double> TimingTable::age_ms(double part) const
+{
+  std::vector<double> values;
+  for (const FrameTiming &frame : frames)
+    if (frame.age_ms)
+      values.push_back(*frame.age_ms);
+  return values.empty() ? std::nullopt : std::optional<double>(quantile(std::move(values), part));
+}
+
 void writeTiming(const std::string &path, const TimingTable &timing)
 {
   std::string text = "frame,timestamp [s]";
   for (const std::string &stage : timing.stages)
     text += "," + stage + " [ms]";
-  text += ",total [ms]\n";
+  const bool has_ages = timing.age_ms(0).has_value();
+  text += has_ages ? ",total [ms],age [ms]\n" : ",total [ms]\n";
   for (const FrameTiming &frame : timing.frames) {
     fmt::format_to(std::back_inserter(text), "{},{:.9f}", frame.index, static_cast<double>(frame.stamp_ns) * 1e-9);
     for (std::size_t i = 0; i < timing.stages.size(); ++i)
       fmt::format_to(std::back_inserter(text), ",{:.4f}", i < frame.stages_ms.size() ? frame.stages_ms[i] : 0.0);
-    fmt::format_to(std::back_inserter(text), ",{:.4f}\n", frame.total_ms);
+    fmt::format_to(std::back_inserter(text), ",{:.4f}", frame.total_ms);
+    if (has_ages)
+      text += frame.age_ms ? fmt::format(",{:.4f}", *frame.age_ms) : ",";
+    text += '\n';
   }
   writeAtomically(path, text);
 }

@@ -229,6 +229,30 @@ TEST_P(Live, AFrozenCameraIsStale)
   EXPECT_GT(stale, 0);
 }
 
+TEST_P(Live, AStallOfTheVideoKeepsTheMotion)
+{
+  ArDroneEmulator::Options options;
+  options.stall_at_s = 1;
+  options.stall_for_s = 1.5;
+  const auto emulator = emulate(GetParam(), 80, options);
+  const auto frames = fly(addressOf(*emulator));
+  expectRisingStamps(frames);
+  int missing = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const Frame &frame = frames[i], &before = frames[i - 1];
+    if (frame.status != FrameStatus::missing || !frame.wMb_odometry || !before.wMb_odometry)
+      continue;
+    // about 1.05 m/s (forward and swaying) is flown over the time that the stamps say has passed
+    const double seconds = static_cast<double>(frame.stamp_ns - before.stamp_ns) * 1e-9;
+    EXPECT_NEAR((frame.wMb_odometry->t - before.wMb_odometry->t).norm(), 1.05 * seconds,
+                0.1 + 0.1 * seconds);
+    EXPECT_FALSE(frame.gyro.empty());
+    EXPECT_TRUE(frame.odometry_covariance);
+    ++missing;
+  }
+  EXPECT_GT(missing, 0);
+}
+
 TEST_P(Live, SilenceIsMissingFramesAndThenAnEnd)
 {
   const auto emulator = emulate(GetParam(), 30);

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/geometry/so3.h>
+#include <bole/input/asl_source.h>
 #include <bole/output/assignment.h>
+#include <bole/output/evaluation.h>
 #include <bole/output/trajectory_metrics.h>
+#include <bole/output/trajectory_writer.h>
 #include <bole/output/trunk_metrics.h>
+#include <bole/output/trunks_csv.h>
 #include <bole/output/visibility.h>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <numeric>
 #include <random>
+#include <visp3/core/vpException.h>
 
 using namespace bole;
 
@@ -344,4 +350,58 @@ TEST(Visibility, AddsUpWhatSeveralNearerTrunksHide)
   const std::vector<TruthTrunk> most = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05),
                                         tree(2, 3.2, 0.02, 0.06)};
   EXPECT_EQ(trunkVisibility(most, still, kForward, PinholeCamera())[0].frames, 0u);
+}
+
+/// Runs made up from the true flight: moved in the plane, and by another clock.
+class RunAgainst : public testing::Test
+{
+protected:
+  static constexpr const char *kFlight = BOLE_SOURCE_DIR "/data/park-forward";
+
+  std::string writeRun(const std::string &name, double metres_off, std::int64_t ns_off,
+                       const std::vector<TrunkRecord> &map) const
+  {
+    const std::string folder = testing::TempDir() + "bole_evaluate_" + name;
+    std::filesystem::create_directories(folder);
+    const AslSource source(kFlight);
+    Trajectory run;
+    for (const std::int64_t stamp_ns : source.stamps())
+      if (const auto wMb = interpolate(source.truth(), stamp_ns)) {
+        run.push_back({stamp_ns + ns_off, *wMb});
+        run.back().wMb.t.x() += metres_off;
+      }
+    writeTrajectory(folder + "/trajectory.tum", run);
+    writeTrunks(folder + "/trunks.csv", map);
+    return folder;
+  }
+};
+
+TEST_F(RunAgainst, ALiveRunIsComparedByItsFirstFrameWhenAsked)
+{
+  const std::string run = writeRun("live", 0, 100'000'000'000, {});
+  EXPECT_THROW(evaluate(run, kFlight), vpException);
+  const Evaluation evaluation = evaluate(run, kFlight, {true});
+  ASSERT_TRUE(evaluation.time_shift_s);
+  EXPECT_NEAR(*evaluation.time_shift_s, -100, 1e-9);
+  EXPECT_EQ(evaluation.smoothed.absolute[0].poses, AslSource(kFlight).size());
+  EXPECT_LT(evaluation.smoothed.absolute[0].ate, 1e-4);
+}
+
+TEST_F(RunAgainst, AnotherRunStandsForTheTruth)
+{
+  TrunkRecord candidate = confirmed(3, 9, 9);
+  candidate.status = TrunkStatus::candidate;
+  const std::string one =
+      writeRun("one", 0, 0, {confirmed(1, 5, 1, 0.2), confirmed(2, 7, -2, 0.3), candidate});
+  const std::string other =
+      writeRun("other", 2, 0, {confirmed(7, 7.1, 1, 0.25), confirmed(8, 20, 4)});
+  const Evaluation evaluation = evaluate(other, one);
+  EXPECT_TRUE(evaluation.is_against_run);
+  ASSERT_TRUE(evaluation.trunks);
+  EXPECT_DOUBLE_EQ(evaluation.trunks->recall, 0.5);    // of its two confirmed trunks
+  EXPECT_DOUBLE_EQ(evaluation.trunks->precision, 0.5);
+  EXPECT_NEAR(evaluation.trunks->all.median[2], 0.1, 1e-4); // after the shift by 2 m
+  EXPECT_NEAR(evaluation.trunks->all.radius_rmse, 0.05, 1e-4);
+  EXPECT_NEAR(evaluation.smoothed.absolute[0].ate, 2, 1e-4);
+  EXPECT_NEAR(evaluation.smoothed.absolute[2].ate, 0, 1e-4);
 }

@@ -92,6 +92,9 @@ public:
   /// The newest frame not yet given out; waits for one at most \p timeout_s. False when there is
   /// none.
   bool next(LiveFrame &frame, double timeout_s);
+  /// Adds what the navdata say to a frame that did not come: body, gyro and covariance at
+  /// frame.stamp_ns. It counts as given out.
+  void addMotion(LiveFrame &frame);
   /// The newest navdata; nothing before the first and after a second without any.
   std::optional<BodyState> body() const;
   /// 1 or 2; 0 while it is not known.

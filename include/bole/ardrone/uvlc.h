@@ -29,6 +29,8 @@
 /// too; any
 ///   other is refused (c, d). Order zigzag, orthonormal 8x8 DCT, no level shift: the DC is positive
 ///   (a, d).
+/// - P264, the drone's other video (video:video_codec 64 instead of 32, in the enumerations of the
+///   SDK and of xcs), is not documented and not read; the message says so.
 ///
 /// Deviation: (a) prints the DC as a signed number; intra pictures only have DC >= 0, and a bright
 /// block (mean above 191) needs all ten bits, so it is read without sign, as (d) does.

@@ -20,9 +20,18 @@ struct TrajectoryReport
       over_second; ///< relative errors between consecutive frames and over 1 s
 };
 
+struct EvaluationOptions
+{
+  /// The run's first pose is at the stamp of the sequence's first frame: for live flights, whose
+  /// stamps are the drone's.
+  bool align_start = false;
+};
+
 struct Evaluation
 {
   std::string run, sequence;
+  bool is_against_run = false;              ///< `sequence` is another run
+  std::optional<double> time_shift_s;       ///< added to the run's stamps, where that was asked for
   std::size_t frames = 0;                   ///< of the sequence
   TrajectoryReport smoothed;                ///< trajectory.tum
   std::optional<TrajectoryReport> online;   ///< trajectory_online.tum
@@ -30,10 +39,12 @@ struct Evaluation
   std::optional<TrunkMetrics> trunks;       ///< where the sequence has trees.csv
 };
 
-/// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence.
-/// Errors: vpException naming the file that is missing or faulty, or that has no common stamps with
-/// the truth.
-Evaluation evaluate(const std::string &run, const std::string &sequence);
+/// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with
+/// another run: then its smoothed trajectory and its confirmed trunks stand for the truth, all of
+/// them expected, and what is measured is how alike two runs are. Errors: vpException naming the
+/// file that is missing or faulty, or that has no common stamps with the truth.
+Evaluation evaluate(const std::string &run, const std::string &sequence,
+                    const EvaluationOptions &options = {});
 
 /// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match
 /// or its nearest neighbour, and every false positive and duplicate.

@@ -4,6 +4,7 @@
 /// What each frame cost, by stage.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@ struct FrameTiming
   std::int64_t stamp_ns = 0;
   std::vector<double> stages_ms; ///< in the order of TimingTable::stages
   double total_ms = 0;           ///< of the whole frame, without input and output
+  /// Live: from the arrival of the frame's last byte until the map knew of it.
+  std::optional<double> age_ms;
 };
 
 struct TimingTable
@@ -27,8 +30,12 @@ struct TimingTable
   double medianStage_ms(std::size_t stage) const;
   /// The cost that 95 % of the frames stay below.
   double percentile95_ms() const;
+  /// The age of the frames that have one, below which a part \p quantile of them stays; nothing
+  /// where none has.
+  std::optional<double> age_ms(double quantile) const;
 };
 
-/// Header "frame,timestamp [s],<stage> [ms],...,total [ms]", one line a frame, atomically.
+/// Header "frame,timestamp [s],<stage> [ms],...,total [ms]", and "age [ms]" for a live run; one line
+/// a frame, atomically.
 void writeTiming(const std::string &path, const TimingTable &timing);
 } // namespace bole
