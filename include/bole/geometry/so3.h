@@ -28,7 +28,6 @@ Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d &phi);
 /// Inverse of rightJacobianSo3(phi), |phi| < 2 pi.
 Eigen::Matrix3d inverseRightJacobianSo3(const Eigen::Vector3d &phi);
 
-/// A rotation beside the nearly orthonormal \p R (at most twice as far from it as the nearest one);
-/// removes the drift of long products.
+/// A rotation beside \p R, at most twice as far as the nearest; removes the drift of long products.
 Eigen::Matrix3d orthonormalized(const Eigen::Matrix3d &R);
 } // namespace bole
