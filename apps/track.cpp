@@ -190,6 +190,9 @@ void addTrack(CLI::App &app)
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path,
                       "Poses for a video: TUM or ASL csv; `none` withholds odometry and gyro");
+  command->add_option("--odometry-offset", arguments->source.odometry_offset_s,
+                      "Added to the stamps of --odometry so that they count as the video's do [s]")
+      ->capture_default_str();
   command->add_option("--rate", arguments->source.frame_rate_hz, "Frames a second of numbered images")
       ->capture_default_str();
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")

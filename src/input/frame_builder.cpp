@@ -88,7 +88,7 @@ void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int6
   throw vpException(
       vpException::badValue,
       fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s "
-                  "(odometry_offset_s shifts them)",
+                  "(odometry_offset_s, --odometry-offset, shifts them)",
                   odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9,
                   source, first_ns * 1e-9, last_ns * 1e-9));
 }

@@ -192,6 +192,16 @@ std::size_t VideoDecoder::frames() const
   return count > 0 ? static_cast<std::size_t>(count) : 0;
 }
 
+std::int64_t VideoDecoder::duration_ns() const
+{
+  const AVFormatContext &format = *m_libav->format;
+  const AVStream &stream = *format.streams[m_libav->stream];
+  const AVRational nanoseconds{1, 1'000'000'000};
+  if (stream.duration != AV_NOPTS_VALUE && stream.duration > 0)
+    return av_rescale_q(stream.duration, stream.time_base, nanoseconds);
+  return format.duration > 0 ? av_rescale_q(format.duration, {1, AV_TIME_BASE}, nanoseconds) : 0;
+}
+
 bool VideoDecoder::next(Picture &picture)
 {
   while (m_ready.empty() && !m_is_at_end)
@@ -214,7 +224,9 @@ void VideoDecoder::decodeMore()
     av_packet_unref(&packet);
     return;
   }
-  if (has_packet && packet.pts != AV_NOPTS_VALUE && (packet.flags & AV_PKT_FLAG_DISCARD) == 0)
+  const bool is_hidden = has_packet && (packet.flags & AV_PKT_FLAG_DISCARD) != 0;
+  m_counted += is_hidden;
+  if (has_packet && packet.pts != AV_NOPTS_VALUE && !is_hidden)
     m_pending.insert(packet.pts);
   // A damaged packet is an error here; its place in m_pending is reported when a later picture
   // comes.
@@ -226,6 +238,7 @@ void VideoDecoder::decodeMore()
   }
   if (!has_packet) {
     reportLost(std::numeric_limits<std::int64_t>::max());
+    reportMissing();
     m_is_at_end = true;
   }
 }
@@ -258,9 +271,30 @@ void VideoDecoder::reportLost(std::int64_t before)
     lost.stamp_ns = stampOf(*m_pending.begin());
     lost.is_damaged = true;
     lost.message = "could not be decoded";
-    m_ready.push_back(std::move(lost));
+    emit(std::move(lost));
     m_pending.erase(m_pending.begin());
   }
+}
+
+/// A file that was cut off: its container counts more pictures than came.
+void VideoDecoder::reportMissing()
+{
+  constexpr std::size_t kMostBelievable = 10'000'000; // four days at 30 Hz: the count itself is damaged
+  if (frames() > kMostBelievable)
+    return;
+  while (m_counted < frames()) {
+    Picture missing;
+    missing.stamp_ns = stampOf(AV_NOPTS_VALUE);
+    missing.is_damaged = missing.is_missing = true;
+    missing.message = fmt::format("the file ends before it: {} frames by its container", frames());
+    emit(std::move(missing));
+  }
+}
+
+void VideoDecoder::emit(Picture picture)
+{
+  m_ready.push_back(std::move(picture));
+  ++m_counted;
 }
 
 void VideoDecoder::take(const AVFrame &frame)
@@ -285,6 +319,6 @@ void VideoDecoder::take(const AVFrame &frame)
     cv::Mat target(grey.rows, grey.cols, CV_8UC1, picture.image.bitmap);
     grey.copyTo(target);
   }
-  m_ready.push_back(std::move(picture));
+  emit(std::move(picture));
 }
 } // namespace bole

@@ -15,11 +15,12 @@ struct AVPacket;
 
 namespace bole
 {
-/// A picture, or the place of one that could not be decoded (then the image is empty).
+/// A picture, or the place of one that could not be decoded or is not in the file (then the image is empty).
 struct Picture
 {
   std::int64_t stamp_ns = 0; ///< since the first picture
   bool is_damaged = false;
+  bool is_missing = false; ///< the container counts it and the file ends before it
   std::string message;
   vpImage<unsigned char> image;
 };
@@ -28,8 +29,9 @@ struct Picture
 ///
 /// Every packet of the stream must end in a picture: one that does not (lost reference, damaged
 /// data) is reported in its place as damaged, so that nothing is skipped silently. Pictures the
-/// decoder had to conceal are damaged too. A rotation by quarter turns that the file asks for is
-/// applied.
+/// decoder had to conceal are damaged too. A file that was cut off goes on with missing pictures up
+/// to the count of its container (AVI, MP4; Matroska has none). A rotation by quarter turns that the
+/// file asks for is applied.
 class VideoDecoder
 {
 public:
@@ -43,6 +45,8 @@ public:
   bool next(Picture &picture);
   /// By the file's own count, 0 when it does not say.
   std::size_t frames() const;
+  /// By the file's own word [ns], 0 when it does not say.
+  std::int64_t duration_ns() const;
 
 private:
   struct Libav;
@@ -50,6 +54,8 @@ private:
   void decodeMore();
   void take(const AVFrame &frame);
   void reportLost(std::int64_t before);
+  void reportMissing();
+  void emit(Picture picture);
   std::int64_t stampOf(std::int64_t pts);
 
   std::string m_path;
@@ -60,5 +66,6 @@ private:
   bool m_has_first = false;
   std::int64_t m_last_stamp_ns = -1;
   bool m_is_at_end = false;
+  std::size_t m_counted = 0; ///< pictures handed out and packets that are not to be shown
 };
 } // namespace bole

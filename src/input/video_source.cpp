@@ -58,9 +58,10 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
   m_state = std::make_unique<State>(path, options);
   Recording recording;
   recording.odometry = readOdometry(options);
-  // The length of a video is only known at its end, so only odometry that is over before it begins
-  // is refused.
-  requireOverlap(recording.odometry, 0, std::numeric_limits<std::int64_t>::max(),
+  // A video that does not tell its length meets every odometry that is not over before it begins.
+  const std::int64_t duration_ns = m_state->decoder.duration_ns();
+  requireOverlap(recording.odometry, 0,
+                 duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_state->builder = std::make_unique<FrameBuilder>(m_state->camera, options, std::move(recording));
 }
@@ -73,7 +74,9 @@ bool VideoSource::next(Frame &frame)
   if (!m_state->take(picture))
     return false;
   ImageFile file;
-  file.status = picture.is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
+  file.status = picture.is_missing   ? FrameStatus::missing
+                : picture.is_damaged ? FrameStatus::corrupt
+                                     : FrameStatus::ok;
   file.message = std::move(picture.message);
   file.image = std::move(picture.image);
   m_state->builder->build(picture.stamp_ns, std::move(file), frame);

@@ -139,6 +139,45 @@ TEST_F(Sources, DamagedFramesOfAVideoAreReportedInTheirPlace)
   }
 }
 
+TEST_F(Sources, AVideoThatWasCutOffReportsTheRestAsMissing)
+{
+  writeVideo("v.avi", 12, 10);
+  std::size_t cut = 0; // in the middle of the eighth picture
+  {
+    std::ifstream file(path("v.avi"), std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    cut = bytes.find("movi");
+    for (int i = 0; i < 8; ++i)
+      cut = bytes.find("00dc", cut + 4);
+  }
+  std::filesystem::resize_file(path("v.avi"), cut + 200);
+  VideoSource source(path("v.avi"));
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 12u);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].status, i < 7    ? FrameStatus::ok
+                                : i == 7 ? FrameStatus::corrupt
+                                         : FrameStatus::missing)
+        << i << ": " << frames[i].message;
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 100000000);
+    EXPECT_EQ(frames[i].index, i);
+  }
+  EXPECT_THAT(frames[11].message, HasSubstr("12 frames by its container"));
+}
+
+TEST_F(Sources, RefusesOdometryThatBeginsAfterTheVideoOrIsOverBeforeIt)
+{
+  writeVideo("v.avi", 12, 10); // 1.2 s
+  m_flight.write("late.tum", "500 0 0 0 0 0 0 1\n501 0 0 0 0 0 0 1\n");
+  m_flight.write("early.tum", "-9 0 0 0 0 0 0 1\n-8 0 0 0 0 0 0 1\n");
+  for (const char *name : {"late.tum", "early.tum"}) {
+    SourceOptions options;
+    options.odometry_path = path(name);
+    EXPECT_THAT(messageOf([&] { openSource(path("v.avi"), options); }),
+                testing::AllOf(HasSubstr(path(name)), HasSubstr("never meet"), HasSubstr("--odometry-offset")));
+  }
+}
+
 TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
 {
   writeVideo("v.avi", 10, 10);

@@ -12,10 +12,12 @@ namespace bole
 ///
 /// Stamps are the container's, counted from the first frame. A packet that does not become a
 /// picture, or becomes one that the decoder had to conceal, is a frame with the status `corrupt`;
-/// the picture before again is `stale`; another size is `resized`. vpVideoReader is not used: it
-/// gives no stamps and repeats the last picture when decoding fails.
+/// the picture before again is `stale`; another size is `resized`; those that the container counts
+/// beyond the end of a file that was cut off are `missing` (AVI, MP4; Matroska does not count).
+/// vpVideoReader is not used: it gives no stamps and repeats the last picture when decoding fails.
 ///
-/// Errors: vpException naming the file when it is no video, or the camera is of another size.
+/// Errors: vpException naming the file when it is no video, the camera is of another size, or the
+/// odometry is over before the video begins or begins after it is over.
 class VideoSource : public FrameSource
 {
 public:
