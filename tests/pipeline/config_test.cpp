@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/input/camera_file.h>
 #include <bole/pipeline/config.h>
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <visp3/core/vpException.h>
@@ -42,6 +44,24 @@ TEST(Config, PaperPresetIsRead)
   readConfig(BOLE_SOURCE_DIR "/config/paper.yaml", options);
   EXPECT_EQ(options.tracking.energy.form, EnergyForm::paper);
   EXPECT_FALSE(options.flow.use_points);
+}
+
+/// Every file of config/ is a preset, and the cameras of the drones stand beside theirs.
+TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
+{
+  const std::string defaults = toYaml(PipelineOptions());
+  std::vector<std::string> names;
+  for (const auto &entry : std::filesystem::directory_iterator(BOLE_SOURCE_DIR "/config")) {
+    if (!entry.is_regular_file())
+      continue;
+    PipelineOptions options;
+    EXPECT_NO_THROW(readConfig(entry.path().string(), options)) << entry.path();
+    names.push_back(entry.path().stem().string());
+    EXPECT_EQ(toYaml(options) == defaults, names.back() == "default") << names.back();
+  }
+  EXPECT_THAT(names, testing::IsSupersetOf({"default", "paper", "ardrone1", "ardrone2", "tabletop"}));
+  EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone1.yaml").model.pinhole.width, 320);
+  EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone2.yaml").model.pinhole.width, 640);
 }
 
 TEST(Config, ReadingWhatWasWrittenChangesNothing)
