@@ -40,13 +40,13 @@ std::string sensorYaml(const CameraModel &camera, const Pose &bMc, double rate_h
                       : camera.distortion == Distortion::fov       ? "fov"
                                                                    : "radial-tangential";
   const auto &c = camera.coefficients;
+  const int count = camera.distortion == Distortion::fov ? 1 : 4; // as readCamera() wants them
   const PinholeCamera &p = camera.pinhole;
   return fmt::format(
       "sensor_type: camera\ncomment: simulated front camera\nT_BS:\n  cols: 4\n  rows: 4\n"
       "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
-      "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}, {}, {}, "
-      "{}]\n",
-      matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, model, c[0], c[1], c[2], c[3]);
+      "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
+      matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, model, fmt::join(c.begin(), c.begin() + count, ", "));
 }
 
 void writePng(const std::string &path, const cv::Mat &image)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/geometry/so3.h>
+#include <bole/input/camera_file.h>
 #include <bole/simulation/simulated_flight.h>
 
 #include <filesystem>
@@ -62,6 +63,21 @@ TEST_F(SimulatedFlight, SameSceneSameBytes)
   recordFlight(scene, {(m_folder / "c").string(), 3, false, false});
   EXPECT_NE(contents(m_folder / "a/mav0/cam0/data/0000000000000.png"),
             contents(m_folder / "c/mav0/cam0/data/0000000000000.png"));
+}
+
+TEST_F(SimulatedFlight, ItsCameraFileIsReadForEveryLens)
+{
+  for (const Distortion distortion : {Distortion::none, Distortion::radial_tangential, Distortion::equidistant, Distortion::fov}) {
+    SceneOptions scene;
+    scene.renderer.camera.distortion = distortion;
+    scene.renderer.camera.coefficients = {{0.1, 0, 0, 0}};
+    if (distortion == Distortion::none)
+      scene.renderer.camera.coefficients = {{0, 0, 0, 0}};
+    recordFlight(scene, {(m_folder / "flight").string(), 1, false, true});
+    const CameraModel read = readCamera((m_folder / "flight/mav0/cam0/sensor.yaml").string()).model;
+    EXPECT_EQ(read.distortion, distortion);
+    EXPECT_EQ(read.coefficients, scene.renderer.camera.coefficients);
+  }
 }
 
 TEST_F(SimulatedFlight, DoesNotReplaceAFolderUnasked)
