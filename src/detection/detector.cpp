@@ -83,71 +83,77 @@ PairHypothesis makePair(const PlaneView &view, const ProfilePeak &left, const Pr
   return pair;
 }
 
+/// How well the window agrees with one peak of the current view, if its border stood at each of the ranges swept. The
+/// border of a trunk is a vertical line that hardly moves over a window, so the curves of two borders add up to that
+/// of their pair.
+struct RangeCurve
+{
+  std::vector<float> sum;  ///< of agreement over the views that see it, by range
+  std::vector<short> seen; ///< those views
+};
+
+/// Ranges swept, uniform in inverse depth: near enough for no focus to fall between two.
+std::vector<double> sweptRanges(const DetectorOptions &options)
+{
+  constexpr int kRanges = 80;
+  const double far = 1 / (1.2 * options.range_max), near = 1 / options.range_min;
+  std::vector<double> ranges;
+  for (int i = 0; i < kRanges; ++i)
+    ranges.push_back(1 / (far + (near - far) * i / (kRanges - 1)));
+  return ranges;
+}
+
+RangeCurve sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<double> &ranges)
+{
+  RangeCurve curve{std::vector<float>(ranges.size(), 0.f), std::vector<short>(ranges.size(), 0)};
+  const PlaneView &now = views.back();
+  const Vector2d direction = (now.forward + peak.q * now.left).normalized();
+  for (std::size_t v = 0; v + 1 < views.size(); ++v) {
+    const Vector2d offset = now.position - views[v].position;
+    const double ahead0 = views[v].forward.dot(offset), ahead1 = views[v].forward.dot(direction);
+    const double left0 = views[v].left.dot(offset), left1 = views[v].left.dot(direction);
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      const double ahead = ahead0 + ranges[i] * ahead1;
+      const double q = (left0 + ranges[i] * left1) / ahead;
+      if (ahead < 0.2 || !views[v].profile->covers(q))
+        continue;
+      ++curve.seen[i];
+      curve.sum[i] += static_cast<float>(agreement(views[v].profile->strongestNear(q, peak.contrast), peak.contrast));
+    }
+  }
+  return curve;
+}
+
 struct SweepResult
 {
   double range = 0, agreement = 0;
-  int views = 0;
 };
 
-/// Mean agreement of the views, every \p stride-th, with the pair at \p range.
-double windowAgreement(const std::vector<PlaneView> &views, const PairHypothesis &pair, double range,
-                       std::size_t stride, int &seen)
+/// The ranges at which the window agrees with the pair and with neither neighbour more, best first.
+std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &left, const RangeCurve &right,
+                               const std::vector<double> &ranges, const DetectorOptions &options)
 {
-  const Vector2d xy = views.back().position + range * pair.direction;
-  double sum = 0;
-  seen = 0;
-  for (std::size_t i = (views.size() - 2) % stride; i + 1 < views.size(); i += stride) {
-    const LevelProfile &profile = *views[i].profile;
-    const auto columns = bordersOf(views[i], xy, pair.s * range);
-    if (!columns || !profile.covers(columns->q_left) || !profile.covers(columns->q_right))
-      continue;
-    ++seen;
-    sum += 0.5 * (agreement(profile.strongestNear(columns->q_left, pair.left.contrast), pair.left.contrast) +
-                  agreement(profile.strongestNear(columns->q_right, pair.right.contrast), pair.right.contrast));
+  const auto score = [&](std::size_t i) {
+    const int seen = left.seen[i] + right.seen[i];
+    const bool is_seen = std::min(left.seen[i], right.seen[i]) >= options.views_min;
+    const double r = pair.s * ranges[i];
+    return is_seen && r >= options.radius_min && r <= options.radius_max ? (left.sum[i] + right.sum[i]) / seen : -1.0;
+  };
+  constexpr std::size_t kMost = 2;
+  std::vector<SweepResult> maxima;
+  double before = -1, here = score(0);
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    const double after = i + 1 < ranges.size() ? score(i + 1) : -1;
+    if (here >= options.agreement_min && here >= before && here > after)
+      maxima.push_back({ranges[i], here});
+    before = here;
+    here = after;
   }
-  return seen ? sum / seen : 0;
-}
-
-/// The range, uniform in inverse depth, where the window agrees best: coarse over a third of the views, then fine.
-SweepResult sweepRange(const std::vector<PlaneView> &views, const PairHypothesis &pair, const DetectorOptions &options)
-{
-  const double near = std::max(options.range_min, options.radius_min / pair.s);
-  const double far = std::min(1.2 * options.range_max, options.radius_max / pair.s);
-  if (!(near < far))
-    return {};
-  constexpr int kCoarse = 12, kFine = 4;
-  const double step = (1 / near - 1 / far) / kCoarse;
-  const std::size_t stride = std::max<std::size_t>(1, views.size() / 8);
-  double best_inverse = 0, best_coarse = 0.8 * options.agreement_min;
-  int seen = 0;
-  for (int i = 0; i <= kCoarse; ++i) {
-    const double score = windowAgreement(views, pair, 1 / (1 / far + i * step), stride, seen);
-    if (seen >= 2 && score > best_coarse) {
-      best_coarse = score;
-      best_inverse = 1 / far + i * step;
-    }
-  }
-  SweepResult best;
-  for (int i = -kFine; best_inverse > 0 && i <= kFine; ++i) {
-    const double range = 1 / std::max(best_inverse + i * step / kFine, 1e-3);
-    const double score = windowAgreement(views, pair, range, 1, seen);
-    if (seen >= options.views_min && score > best.agreement)
-      best = {range, score, seen};
-  }
-  return best;
-}
-
-/// The peak of the polarity of \p contrast nearest to q, within \p gate; nothing where there is none.
-std::optional<double> nearestPeak(const LevelProfile &profile, double q, double contrast, double gate)
-{
-  const auto &peaks = profile.peaks;
-  auto it = std::lower_bound(peaks.begin(), peaks.end(), q - gate,
-                             [](const ProfilePeak &peak, double value) { return peak.q < value; });
-  std::optional<double> best;
-  for (; it != peaks.end() && it->q <= q + gate; ++it)
-    if (it->contrast * contrast > 0 && (!best || std::abs(it->q - q) < std::abs(*best - q)))
-      best = it->q;
-  return best;
+  std::sort(maxima.begin(), maxima.end(),
+            [](const SweepResult &a, const SweepResult &b) { return a.agreement > b.agreement; });
+  if (maxima.size() > kMost)
+    maxima.resize(kMost);
+  return maxima;
 }
 
 struct Fit
@@ -191,27 +197,31 @@ Fit refine(const std::vector<PlaneView> &views, const PairHypothesis &pair, doub
       if (!columns || !view.profile->covers(columns->q_left) || !view.profile->covers(columns->q_right))
         continue;
       ++fit.views;
-      const auto left = nearestPeak(*view.profile, columns->q_left, pair.left.contrast, gate_px / px_per_q);
-      const auto right = nearestPeak(*view.profile, columns->q_right, pair.right.contrast, gate_px / px_per_q);
-      if (left)
-        accumulate(view, fit.p, columns->q_left, *left, 1, px_per_q, H, g, 1);
-      if (right)
-        accumulate(view, fit.p, columns->q_right, *right, -1, px_per_q, H, g, 1);
-      if (left && right) {
+      const double left = view.profile->nearestPeak(columns->q_left, pair.left.contrast);
+      const double right = view.profile->nearestPeak(columns->q_right, pair.right.contrast);
+      const double left_px = (columns->q_left - left) * px_per_q, right_px = (columns->q_right - right) * px_per_q;
+      const bool has_left = std::abs(left_px) < gate_px, has_right = std::abs(right_px) < gate_px; // false for NaN
+      if (has_left)
+        accumulate(view, fit.p, columns->q_left, left, 1, px_per_q, H, g, 1);
+      if (has_right)
+        accumulate(view, fit.p, columns->q_right, right, -1, px_per_q, H, g, 1);
+      if (has_left && has_right) {
         ++fit.inliers;
-        squares += 0.5 * (std::pow((columns->q_left - *left) * px_per_q, 2) +
-                          std::pow((columns->q_right - *right) * px_per_q, 2));
+        squares += 0.5 * (left_px * left_px + right_px * right_px);
       }
     }
     fit.rms_px = fit.inliers ? std::sqrt(squares / fit.inliers) : 1e9;
     fit.information = H;
-    if (iteration == kIterations)
+    const bool is_hopeless = fit.inliers < options.views_min || fit.inliers < 0.8 * options.inliers_min * fit.views;
+    if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
     const Vector3d step = H.ldlt().solve(-g);
     if (!step.allFinite())
       break;
     fit.p += step.cwiseMax(-0.5).cwiseMin(0.5);
+    if (iteration >= 2 && iteration + 1 < kIterations && step.squaredNorm() < 1e-6)
+      iteration = kIterations - 1; // settled: once more for the figures
   }
   return fit;
 }
@@ -255,12 +265,9 @@ std::vector<Detection> suppress(std::vector<Detection> found)
   return kept;
 }
 
-std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairHypothesis &pair, double px_per_q,
-                                const DetectorOptions &options)
+std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairHypothesis &pair,
+                                const SweepResult &sweep, double px_per_q, const DetectorOptions &options)
 {
-  const SweepResult sweep = sweepRange(views, pair, options);
-  if (sweep.agreement < options.agreement_min)
-    return std::nullopt;
   const Fit fit = refine(views, pair, sweep.range, px_per_q, options);
   if (fit.inliers < options.views_min || fit.inliers < options.inliers_min * fit.views ||
       fit.rms_px > options.rms_max_px)
@@ -293,10 +300,16 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairH
   return detection;
 }
 
+/// A pair that overlaps a known trunk is another reading of it, unless it holds all of it: then the known one may be an
+/// edge on the bark of this.
 bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double q_left)
 {
-  return std::any_of(known.begin(), known.end(),
-                     [&](const InhibitedRange &range) { return q_left > range.q_right && q_right < range.q_left; });
+  return std::any_of(known.begin(), known.end(), [&](const InhibitedRange &range) {
+    const bool overlaps = q_left > range.q_right && q_right < range.q_left;
+    const bool holds_it = q_left > range.q_left && q_right < range.q_right &&
+                          q_left - q_right > 1.2 * (range.q_left - range.q_right);
+    return overlaps && !holds_it;
+  });
 }
 } // namespace
 
@@ -328,6 +341,10 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
   }
 
   const auto &peaks = views.back().profile->peaks; // by rising q: from right to left
+  const std::vector<double> ranges = sweptRanges(options);
+  std::vector<RangeCurve> curves;
+  for (const ProfilePeak &peak : peaks)
+    curves.push_back(sweep(plane, peak, ranges));
   for (std::size_t i = 0; i < peaks.size(); ++i)
     for (std::size_t j = i + 1; j < peaks.size(); ++j) {
       const PairHypothesis pair = makePair(plane.back(), peaks[j], peaks[i]);
@@ -335,17 +352,19 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         break;
       if (pair.s * options.range_max < options.radius_min || inhibited(known, peaks[i].q, peaks[j].q))
         continue;
-      auto detection = verify(plane, pair, camera.fx, options);
-      if (!detection)
-        continue;
-      if (p_background)
-        detection->foreground =
-            foregroundBetween(*p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk),
-                              options.profile.range);
-      if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
-          detection->foreground < options.foreground_min)
-        continue;
-      found.push_back(*detection);
+      for (const SweepResult &at : focus(pair, curves[j], curves[i], ranges, options)) {
+        auto detection = verify(plane, pair, at, camera.fx, options);
+        if (!detection)
+          continue;
+        if (p_background)
+          detection->foreground =
+              foregroundBetween(*p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk),
+                                options.profile.range);
+        if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
+            detection->foreground < options.foreground_min)
+          continue;
+        found.push_back(*detection);
+      }
     }
   return suppress(std::move(found));
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -16,6 +17,15 @@ double LevelProfile::strongestNear(double q, double contrast) const
     return 0;
   const auto i = static_cast<std::size_t>(x);
   return contrast > 0 ? rising[i] : falling[i];
+}
+
+double LevelProfile::nearestPeak(double q, double contrast) const
+{
+  const double x = (q - q_first) / step + 0.5;
+  if (!(x >= 0) || x >= static_cast<double>(mean.size()))
+    return std::numeric_limits<double>::quiet_NaN();
+  const auto i = static_cast<std::size_t>(x);
+  return static_cast<double>(contrast > 0 ? rising_peak[i] : falling_peak[i]);
 }
 
 namespace
@@ -46,6 +56,29 @@ void findPeaks(LevelProfile &profile, double contrast_min)
                              std::copysign(b - 0.25 * (a - c) * shift, p[i])});
   }
 }
+/// For each sample the peak of one polarity that is nearest: between two peaks it changes half-way.
+std::vector<float> nearestPeaks(const LevelProfile &profile, double sign)
+{
+  std::vector<float> nearest(profile.mean.size(), std::numeric_limits<float>::quiet_NaN());
+  std::size_t begin = 0;
+  double before = 0;
+  bool is_first = true;
+  const auto fill = [&](std::size_t end, double q) {
+    for (; begin < std::min(end, nearest.size()); ++begin)
+      nearest[begin] = static_cast<float>(q);
+  };
+  for (const ProfilePeak &peak : profile.peaks) {
+    if (peak.contrast * sign <= 0)
+      continue;
+    if (!is_first)
+      fill(static_cast<std::size_t>(std::ceil((0.5 * (before + peak.q) - profile.q_first) / profile.step)), before);
+    before = peak.q;
+    is_first = false;
+  }
+  if (!is_first)
+    fill(nearest.size(), before);
+  return nearest;
+}
 } // namespace
 
 LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
@@ -72,6 +105,8 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
   }
   findExtremes(profile);
   findPeaks(profile, options.contrast_min);
+  profile.rising_peak = nearestPeaks(profile, 1);
+  profile.falling_peak = nearestPeaks(profile, -1);
   return profile;
 }
 } // namespace bole

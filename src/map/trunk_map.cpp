@@ -15,15 +15,14 @@ void MapOptions::validate() const
   };
   require("map.confirm_observations", confirm_observations, 2, 1000);
   require("map.confirm_parallax", confirm_parallax, 0, 1);
-  require("map.confirm_range_sigma", confirm_range_sigma, 0.01, 1);
   require("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
-  require("map.confirm_hit_ratio", confirm_hit_ratio, 0, 1);
-  require("map.confirm_innovation_px", confirm_innovation_px, 0.1, 20);
-  require("map.near_range", near_range, 0, 100);
+  require("map.confirm_evidence", confirm_evidence, -20, 20);
   require("map.doubt_observations", doubt_observations, 3, 1000);
-  require("map.confirm_foreground", confirm_foreground, 0, 1);
-  require("map.doubt_slack", doubt_slack, 1, 10);
-  require("map.merge_distance", merge_distance, 0, 5);
+  require("map.doubt_candidate", doubt_candidate, -50, 0);
+  require("map.doubt_confirmed", doubt_confirmed, -50, 0);
+  require("map.doubt_rival", doubt_rival, 0, 50);
+  require("map.near_range", near_range, 0, 100);
+  require("map.usual_radius", usual_radius, 0.001, 10);
   require("map.lost_misses", lost_misses, 1, 1000);
   require("map.radius_min", radius_min, 0.001, 10);
   require("map.radius_max", radius_max, radius_min, 10);
@@ -68,13 +67,17 @@ void TrunkMap::recordView(MapTrunk &trunk, const TrunkView &view) const
     if (now != 0)
       mean = mean ? 0.7 * *mean + 0.3 * now : now;
   };
+  const double weaker = std::min(std::abs(view.left_contrast), std::abs(view.right_contrast));
+  if (weaker > 0)
+    trunk.contrast = trunk.contrast > 0 ? 0.9 * trunk.contrast + 0.1 * weaker : weaker;
   blend(trunk.left_contrast, view.left_contrast);
   blend(trunk.right_contrast, view.right_contrast);
 }
 
 void TrunkMap::recordMiss(MapTrunk &trunk) const
 {
-  ++trunk.misses;
+  if (trunk.status != TrunkStatus::lost) // what hides a lost trunk says nothing more against it
+    ++trunk.misses;
   ++trunk.misses_in_a_row;
 }
 
@@ -85,47 +88,103 @@ void TrunkMap::recordForeground(MapTrunk &trunk, double range, double foreground
   trunk.foreground += (foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
-/// Predictions of a trunk come true; those of a chance pair of lines miss by what the scan allows.
-bool TrunkMap::fits(const MapTrunk &trunk, double slack) const
-{
-  return std::sqrt(trunk.innovation2) <= slack * m_options.confirm_innovation_px;
-}
-
-/// A trunk that came near must have moved like something near.
-bool TrunkMap::isForeground(const MapTrunk &trunk) const
-{
-  return trunk.foreground_count < 3 || trunk.foreground >= m_options.confirm_foreground;
-}
-
-bool TrunkMap::isHit(const MapTrunk &trunk, double ratio) const
-{
-  return trunk.hits >= ratio * (trunk.hits + trunk.misses);
-}
-
-/// Of a candidate, what keeps it from ever being confirmed; of a confirmed trunk, clear signs that it is none.
 bool TrunkMap::isDisproved(const MapTrunk &trunk) const
 {
   if (trunk.observations < m_options.doubt_observations)
     return false;
-  if (trunk.status == TrunkStatus::candidate)
-    return !fits(trunk, m_options.doubt_slack) || !isForeground(trunk);
-  return !fits(trunk, 2 * m_options.doubt_slack) || !isForeground(trunk) || !isHit(trunk, 0.8 * m_options.confirm_hit_ratio);
+  if (trunk.status == TrunkStatus::confirmed)
+    return evidence(trunk) < m_options.doubt_confirmed;
+  return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
 }
 
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
 {
   const double r = trunk.trunk.radius();
-  const double position_sigma = std::sqrt(trunk.covariance.topLeftCorner<2, 2>().trace());
   return trunk.observations >= m_options.confirm_observations && trunk.parallax() >= m_options.confirm_parallax &&
-         isHit(trunk, m_options.confirm_hit_ratio) && r >= m_options.radius_min && r <= m_options.radius_max &&
-         position_sigma <= m_options.confirm_position_sigma && fits(trunk) && isForeground(trunk) &&
-         std::sqrt(trunk.covariance(2, 2)) <= 2 * m_options.confirm_range_sigma;
+         r >= m_options.radius_min && r <= m_options.radius_max &&
+         trunk.positionSigma() <= m_options.confirm_position_sigma && evidence(trunk) >= m_options.confirm_evidence;
 }
 
-bool TrunkMap::isDuplicate(const MapTrunk &a, const MapTrunk &b) const
+namespace
 {
-  const double distance = (a.trunk.axisAt(1.3) - b.trunk.axisAt(1.3)).head<2>().norm();
-  return distance < a.trunk.radius() + b.trunk.radius() + m_options.merge_distance;
+double distanceBetween(const Trunk &a, const Trunk &b)
+{
+  return (a.axisAt(kBreastHeight) - b.axisAt(kBreastHeight)).head<2>().norm();
+}
+
+/// Two trunks of one place and one radius: the same reading of the same lines.
+bool isSameReading(const Trunk &a, const Trunk &b)
+{
+  return distanceBetween(a, b) < 0.15 && std::abs(a.log_radius - b.log_radius) < 0.25;
+}
+/// A narrower reading within a wider one: if both are sound, the wider is the silhouette and the narrower the edge of
+/// a shadow on its bark.
+bool isInside(const Trunk &narrow, const Trunk &wide)
+{
+  return narrow.radius() < 0.8 * wide.radius() &&
+         distanceBetween(narrow, wide) + narrow.radius() < wide.radius() + 0.05;
+}
+} // namespace
+
+bool TrunkMap::holds(const Trunk &trunk)
+{
+  bool is_known = false;
+  for (MapTrunk &known : m_trunks) {
+    if (known.removed || known.status == TrunkStatus::lost)
+      continue;
+    if (isSameReading(known.trunk, trunk)) {
+      ++known.found_again;
+      is_known = true;
+    }
+    else if (known.status == TrunkStatus::confirmed && !isInside(known.trunk, trunk))
+      is_known = is_known || areTooNear(known.trunk, trunk);
+  }
+  return is_known;
+}
+
+/// Two trunks cannot stand in one place.
+bool TrunkMap::areTooNear(const Trunk &a, const Trunk &b) const
+{
+  return distanceBetween(a, b) < a.radius() + b.radius() + m_options.merge_distance;
+}
+
+/// By how much the odds speak for \p trunk against another reading of the same place.
+double TrunkMap::advantage(const MapTrunk &trunk, const MapTrunk &rival) const
+{
+  constexpr double kSilhouette = 1; // log odds that go to the wider of two sound readings
+  double gain = evidence(trunk) - evidence(rival);
+  if (isInside(rival.trunk, trunk.trunk))
+    gain += kSilhouette;
+  else if (isInside(trunk.trunk, rival.trunk))
+    gain -= kSilhouette;
+  return gain;
+}
+
+/// Another candidate for the same place has log odds better by more than \p margin.
+bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
+{
+  return std::any_of(m_trunks.begin(), m_trunks.end(), [&](const MapTrunk &rival) {
+    return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
+           rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
+           advantage(rival, trunk) > margin;
+  });
+}
+
+/// Which of two trunks in one place is to go; nullptr while readings compete.
+MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
+{
+  if (!areTooNear(a.trunk, b.trunk))
+    return nullptr;
+  const bool is_a_candidate = a.status == TrunkStatus::candidate, is_b_candidate = b.status == TrunkStatus::candidate;
+  if (is_a_candidate != is_b_candidate) {
+    MapTrunk &candidate = is_a_candidate ? a : b, &known = is_a_candidate ? b : a;
+    if (!isInside(known.trunk, candidate.trunk))
+      return &candidate;
+    return mayBeConfirmed(candidate) && advantage(candidate, known) > 0 ? &known : nullptr;
+  }
+  if (!is_a_candidate || isSameReading(a.trunk, b.trunk))
+    return evidence(a) >= evidence(b) ? &b : &a;
+  return nullptr;
 }
 
 std::vector<MapChange> TrunkMap::review()
@@ -138,13 +197,13 @@ std::vector<MapChange> TrunkMap::review()
   for (MapTrunk &trunk : m_trunks) {
     if (trunk.removed)
       continue;
-    if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk))
+    if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk) && !hasBetterRival(trunk, 0))
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status != TrunkStatus::lost && isDisproved(trunk)) {
       trunk.removed = true;
       change(trunk, TrunkStatus::lost);
     }
-    else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0 && mayBeConfirmed(trunk))
+    else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0)
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status != TrunkStatus::lost && trunk.misses_in_a_row >= m_options.lost_misses) {
       trunk.removed = trunk.status == TrunkStatus::candidate;
@@ -153,15 +212,12 @@ std::vector<MapChange> TrunkMap::review()
   }
   for (MapTrunk &a : m_trunks)
     for (MapTrunk &b : m_trunks) {
-      if (a.id >= b.id || a.removed || b.removed || !isDuplicate(a, b))
+      if (a.id >= b.id || a.removed || b.removed)
         continue;
-      MapTrunk &wide = a.trunk.log_radius >= b.trunk.log_radius ? a : b;
-      MapTrunk &narrow = &wide == &a ? b : a;
-      // the narrower of two is an edge on the bark, unless the wider has little behind it
-      const bool is_wide_kept = wide.observations >= 0.6 * narrow.observations && wide.innovation2 <= 2 * narrow.innovation2;
-      MapTrunk &keep = is_wide_kept ? wide : narrow, &gone = is_wide_kept ? narrow : wide;
-      gone.removed = true;
-      change(gone, TrunkStatus::merged, keep.id);
+      if (MapTrunk *gone = chooseRedundant(a, b)) {
+        gone->removed = true;
+        change(*gone, TrunkStatus::merged, gone == &a ? b.id : a.id);
+      }
     }
   return changes;
 }

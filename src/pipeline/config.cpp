@@ -101,6 +101,7 @@ void addMotion(std::vector<OptionEntry> &entries, MotionModelOptions &o)
 {
   entries.insert(entries.end(), {{"motion.step_sigma", &o.step_sigma},
                                  {"motion.step_scale_sigma", &o.step_scale_sigma},
+                                 {"motion.scale_sigma", &o.scale_sigma},
                                  {"motion.step_sigma_vertical", &o.step_sigma_vertical},
                                  {"motion.height_sigma", &o.height_sigma},
                                  {"motion.tilt_sigma", &o.tilt_sigma},
@@ -248,16 +249,16 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
 {
   entries.insert(entries.end(), {{"map.confirm_observations", &o.confirm_observations},
                                  {"map.confirm_parallax", &o.confirm_parallax},
-                                 {"map.confirm_range_sigma", &o.confirm_range_sigma},
                                  {"map.confirm_position_sigma", &o.confirm_position_sigma},
-                                 {"map.confirm_hit_ratio", &o.confirm_hit_ratio},
-                                 {"map.confirm_innovation_px", &o.confirm_innovation_px},
-                                 {"map.near_range", &o.near_range},
+                                 {"map.confirm_evidence", &o.confirm_evidence},
                                  {"map.doubt_observations", &o.doubt_observations},
-                                 {"map.confirm_foreground", &o.confirm_foreground},
+                                 {"map.doubt_candidate", &o.doubt_candidate},
+                                 {"map.doubt_confirmed", &o.doubt_confirmed},
+                                 {"map.doubt_rival", &o.doubt_rival},
+                                 {"map.near_range", &o.near_range},
+                                 {"map.usual_radius", &o.usual_radius},
                                  {"map.lost_misses", &o.lost_misses},
                                  {"map.merge_distance", &o.merge_distance},
-                                 {"map.doubt_slack", &o.doubt_slack},
                                  {"map.radius_min", &o.radius_min},
                                  {"map.radius_max", &o.radius_max}});
 }

@@ -20,6 +20,7 @@ void MotionModelOptions::validate() const
   };
   require("motion.step_sigma", step_sigma, 1e-4, 1);
   require("motion.step_scale_sigma", step_scale_sigma, 0, 1);
+  require("motion.scale_sigma", scale_sigma, 0, 1);
   require("motion.step_sigma_vertical", step_sigma_vertical, 1e-4, 1);
   require("motion.height_sigma", height_sigma, 1e-3, 10);
   require("motion.tilt_sigma", tilt_sigma, 1e-4, 1);

@@ -302,10 +302,8 @@ std::vector<InhibitedRange> Pipeline::inhibited() const
   for (const MapTrunk &trunk : m_map.trunks()) {
     const Eigen::Vector2d w = trunk.trunk.xy - wMc.t.head<2>();
     const double r = trunk.trunk.radius(), d2 = w.squaredNorm();
-    // a candidate in doubt must not keep a better reading of the same lines away
-    const bool is_doubtful = trunk.status == TrunkStatus::candidate &&
-                             std::sqrt(trunk.innovation2) > m_options.map.confirm_innovation_px;
-    if (trunk.removed || is_doubtful || trunk.status == TrunkStatus::lost || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
+    // a candidate must not keep a better reading of the same lines away
+    if (trunk.removed || trunk.status != TrunkStatus::confirmed || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
       continue;
     const double q = w.dot(left) / w.dot(forward), half = r / std::sqrt(d2 - r * r);
     ranges.push_back({q - half - 1 / m_camera.fx, q + half + 1 / m_camera.fx});
@@ -327,7 +325,8 @@ void Pipeline::detectNew(FrameResult &result)
   result.detections = detectTrunks(views, m_camera, inhibited(),
                                    result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
   for (const Detection &detection : result.detections)
-    adopt(detection);
+    if (!m_map.holds(detection.trunk))
+      adopt(detection);
 }
 
 void Pipeline::detectSingle(FrameResult &result)
@@ -377,7 +376,11 @@ void Pipeline::adopt(const Detection &detection)
     if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) &&
         tracked.left_used && tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
       seen.emplace_back(view.pose, tracked);
+    else if (tracked.status != TrackingStatus::not_visible && tracked.status != TrackingStatus::occluded)
+      ++trunk.window_misses;
   }
+  trunk.window_hits = trunk.hits;
+  trunk.hits = 0;
   m_smoother.update();
   const Trunk fitted = m_smoother.trunk(smoother_id);
   double sum = 0;
@@ -404,6 +407,21 @@ void Pipeline::refreshMap()
     trunk.trunk = m_smoother.trunk(trunk.smoother_id);
     trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
   }
+}
+
+std::vector<TrunkRecord> Pipeline::map() const
+{
+  std::vector<TrunkRecord> records = m_map.records();
+  if (m_smoother.poseCount() == 0)
+    return records;
+  const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>();
+  const double variance = m_options.motion.scale_sigma * m_options.motion.scale_sigma;
+  for (TrunkRecord &record : records) {
+    const Eigen::Vector2d by_log_scale = record.xy - origin;
+    record.covariance_xy += variance * by_log_scale * by_log_scale.transpose();
+    record.variance_radius += variance * record.radius * record.radius;
+  }
+  return records;
 }
 
 void Pipeline::finish()

@@ -23,10 +23,10 @@ struct DetectorOptions
   ProfileOptions profile;
   int window = 18;             ///< frames looked at together, 4 to 100
   double range_min = 1.5;      ///< nearest trunk [m], 0.3 to 5
-  double range_max = 9.0;      ///< farthest trunk that matters for planning [m], 2 to 50
+  double range_max = 10.5;     ///< farthest trunk that matters for planning [m], 2 to 50
   double radius_min = 0.06;    ///< [m]
   double radius_max = 0.38;    ///< [m]
-  double agreement_min = 0.5;  ///< mean agreement of the borders with the window, 0 to 1
+  double agreement_min = 0.65; ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;    ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;      ///< [px]
   double rms_max_px = 0.7;     ///< of the inliers, [px]
@@ -34,7 +34,7 @@ struct DetectorOptions
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   int views_min = 5;           ///< views within the window that see both borders
   double near_range = 5.5;     ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
-  double foreground_min = 0.3; ///< mean of 1 - p(background) between its borders then, 0 to 1
+  double foreground_min = 0.15;///< mean of 1 - p(background) between its borders then, 0 to 1
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };

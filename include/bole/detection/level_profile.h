@@ -30,11 +30,15 @@ struct LevelProfile
   std::vector<float> rising;    ///< largest mean within a pixel: the best dark-bright border, >= 0
   std::vector<float> falling;   ///< smallest mean within a pixel: the best bright-dark border, <= 0
   std::vector<ProfilePeak> peaks; ///< by rising q
+  std::vector<float> rising_peak;  ///< q of the dark-bright peak nearest to each sample; NaN where there is none
+  std::vector<float> falling_peak; ///< q of the bright-dark one
 
   double qLast() const { return q_first + step * static_cast<double>(mean.size() - 1); }
   bool covers(double q) const { return q >= q_first && q <= qLast(); }
   /// The strongest value within a pixel of \p q with the sign of \p contrast; 0 outside.
   double strongestNear(double q, double contrast) const;
+  /// q of the peak nearest to \p q with the sign of \p contrast; NaN where there is none or outside.
+  double nearestPeak(double q, double contrast) const;
 };
 
 struct ProfileOptions

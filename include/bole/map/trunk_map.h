@@ -3,14 +3,17 @@
 /// \file
 /// The map of trunks and the life cycle of each: candidate, confirmed, lost, merged.
 ///
-/// Idea: a trunk enters as a candidate and must earn its place: enough views, enough parallax, few frames in which it
-/// should have been seen and was not. A trunk that is predicted in view and not found for long is lost, and comes
-/// back under its id when it is found again under its prediction. Two trunks cannot stand in the same place: the one
-/// with less behind it is merged into the other (paper, Section 7, which leaves duplicates in the map).
+/// Idea: a trunk enters as a candidate and must earn its place: enough views, enough parallax, and the odds that it is
+/// one, learnt from flights with known trunks. Several readings of the same lines may compete as candidates (the
+/// silhouette, the edge of a shadow on the bark, a gap between two trunks); the one with the best odds is confirmed,
+/// and the others merge into it, since two trunks cannot stand in the same place (paper, Section 7, which leaves
+/// duplicates in the map). A trunk that is predicted in view and not found for long is lost, and comes back under its
+/// id when it is found again under its prediction.
 
 #include <bole/geometry/relative_trunk.h>
 #include <bole/map/trunk_record.h>
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -20,15 +23,16 @@ struct MapOptions
 {
   int confirm_observations = 10;      ///< views before a candidate may be confirmed, 2 to 1000
   double confirm_parallax = 0.05;     ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
-  double confirm_range_sigma = 0.10;  ///< relative standard deviation of the range at which it may be, 0.01 to 1
-  double confirm_position_sigma = 0.30; ///< standard deviation of the place at which it may be [m], 0.01 to 10
-  double confirm_hit_ratio = 0.75;    ///< found / should have been found, 0 to 1
-  double confirm_innovation_px = 0.9; ///< rms of prediction against what was found, for a trunk that is narrow in the
-                                      ///< image [px], 0.1 to 20; chance gives 1.4
-  double near_range = 5.5;            ///< a trunk that came nearer must have been foreground [m], 0 to 100
-  double confirm_foreground = 0.3;    ///< mean of 1 - p(background) inside it, where known, 0 to 1
-  int doubt_observations = 8;         ///< views after which a candidate that does not fit is given up, 3 to 1000
-  double doubt_slack = 1.3;           ///< a candidate stays while it is within this times confirm_innovation_px, 1 to 10
+  double confirm_position_sigma = 0.40; ///< standard deviation of the place at which it may be [m], 0.01 to 10
+  double confirm_evidence = 0;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
+                                      ///< trunks, and fewer that are none
+  int doubt_observations = 8;         ///< views before a trunk may be given up for its evidence, 3 to 1000
+  double doubt_candidate = -4;        ///< log odds below which a candidate is given up, -50 to 0
+  double doubt_confirmed = -1.5;      ///< log odds below which a confirmed trunk is, -50 to 0
+  double doubt_rival = 2;             ///< log odds by which another candidate for the same place must be better for one
+                                      ///< to be given up, 0 to 50
+  double near_range = 5.5;            ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
+  double usual_radius = 0.15;         ///< median radius of the trunks to be found [m], 0.001 to 10
   int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
   double merge_distance = 0.30;       ///< two trunks with less than this between their bark are one [m], 0 to 5
   double radius_min = 0.05;           ///< thinner is no trunk [m]
@@ -46,7 +50,10 @@ struct MapTrunk
   Trunk trunk;                               ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
   int observations = 0;                      ///< summary factors
-  int hits = 0, misses = 0, misses_in_a_row = 0;
+  int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
+  int window_hits = 0, window_misses = 0;        ///< in the frames before that one
+  int found_again = 0;                           ///< times the detector came to the same reading later
+  double contrast = 0;                           ///< running mean of the weaker border's
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   double bearing_first = 0;                  ///< world bearing of the first view [rad]
@@ -58,6 +65,7 @@ struct MapTrunk
   bool removed = false;                      ///< out of the smoother (merged, or a candidate given up)
 
   double parallax() const { return bearing_high - bearing_low; }
+  double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
 };
 
 /// What one view of a trunk adds to its history.
@@ -89,6 +97,9 @@ public:
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
   int count(TrunkStatus status) const;
 
+  /// True where a candidate or a confirmed trunk stands that is \p trunk in place and radius: it was found again.
+  bool holds(const Trunk &trunk);
+
   void recordView(MapTrunk &trunk, const TrunkView &view) const;
   void recordMiss(MapTrunk &trunk) const;
   /// Saliency inside a trunk \p range away; said nothing of it beyond near_range.
@@ -97,15 +108,20 @@ public:
   /// Promotes, loses and merges by what is known now. The caller carries the changes to the smoother.
   std::vector<MapChange> review();
 
+  /// Log odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
+  /// often it was missed, how it moved against the background, its contrast, its radius and how well its place is
+  /// known. A logistic regression on simulated flights: see trunk_evidence.cpp for its weights and what they rest on.
+  double evidence(const MapTrunk &trunk) const;
+
   std::vector<TrunkRecord> records() const;
 
 private:
-  bool fits(const MapTrunk &trunk, double slack = 1) const;
-  bool isForeground(const MapTrunk &trunk) const;
-  bool isHit(const MapTrunk &trunk, double ratio) const;
   bool isDisproved(const MapTrunk &trunk) const;
   bool mayBeConfirmed(const MapTrunk &trunk) const;
-  bool isDuplicate(const MapTrunk &a, const MapTrunk &b) const;
+  bool areTooNear(const Trunk &a, const Trunk &b) const;
+  double advantage(const MapTrunk &trunk, const MapTrunk &rival) const;
+  bool hasBetterRival(const MapTrunk &trunk, double margin) const;
+  MapTrunk *chooseRedundant(MapTrunk &a, MapTrunk &b) const;
 
   MapOptions m_options;
   std::vector<MapTrunk> m_trunks;

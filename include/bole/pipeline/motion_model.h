@@ -23,6 +23,7 @@ struct MotionModelOptions
 {
   double step_sigma = 0.012;           ///< horizontal noise of a step of the pose filter [m], 1e-4 to 1
   double step_scale_sigma = 0.03;      ///< error of a step in proportion to its length, 0 to 1
+  double scale_sigma = 0.03;           ///< of the one scale by which all steps of the filter are off, 0 to 1
   double step_sigma_vertical = 0.03;   ///< [m], 1e-4 to 1
   double height_sigma = 0.02;          ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
   double tilt_sigma = 0.005;           ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1

@@ -67,7 +67,9 @@ public:
   void finish();
 
   const std::vector<MapTrunk> &mapTrunks() const { return m_map.trunks(); }
-  std::vector<TrunkRecord> map() const { return m_map.records(); }
+  /// The trunks, with covariances that carry the common error of the odometry's scale: it moves every trunk along its
+  /// line from the first pose and changes every radius in proportion, and no camera sees it.
+  std::vector<TrunkRecord> map() const;
   struct StampedPose
   {
     std::int64_t stamp_ns = 0;
