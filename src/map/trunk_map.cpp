@@ -178,12 +178,10 @@ MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
   const bool is_a_candidate = a.status == TrunkStatus::candidate, is_b_candidate = b.status == TrunkStatus::candidate;
   if (is_a_candidate != is_b_candidate) {
     MapTrunk &candidate = is_a_candidate ? a : b, &known = is_a_candidate ? b : a;
-    if (!isInside(known.trunk, candidate.trunk))
-      return &candidate;
-    return mayBeConfirmed(candidate) && advantage(candidate, known) > 0 ? &known : nullptr;
+    return isInside(known.trunk, candidate.trunk) ? nullptr : &candidate; // what holds it may still turn out to be it
   }
   if (!is_a_candidate || isSameReading(a.trunk, b.trunk))
-    return evidence(a) >= evidence(b) ? &b : &a;
+    return advantage(a, b) >= 0 ? &b : &a;
   return nullptr;
 }
 

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <functional>
 #include <random>
 #include <visp3/core/vpException.h>
 
@@ -88,11 +89,10 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
   const std::vector<Case> cases = {
       {"parallax", [](MapTrunk &t) { t.bearing_low = t.bearing_high = 0; }},
       {"place", [&](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e4; }},
-      {"radius known", [&](MapTrunk &t) { t.covariance(2, 2) = 1; }},
       {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
-      {"misses", [&](MapTrunk &t) { t.misses = t.hits; }},
-      {"innovation", [&](MapTrunk &t) { t.innovation2 = 1.1 * m_options.confirm_innovation_px * m_options.confirm_innovation_px; }},
+      {"misses", [&](MapTrunk &t) { t.misses = 4 * t.hits; }},
+      {"innovation", [&](MapTrunk &t) { t.innovation2 = 4; }},
   };
   for (const Case &c : cases) {
     TrunkMap map(m_options);
@@ -110,35 +110,75 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
   }
 }
 
-TEST_F(Life, WhatCameNearMustHaveBeenForeground)
+TEST_F(Life, WhatDidNotMoveLikeSomethingNearLosesOdds)
+{
+  MapTrunk &still = add(trunkAt(3, 1)), &moved = add(trunkAt(3, -4)), &far = add(trunkAt(3, -8));
+  for (MapTrunk *trunk : {&still, &moved, &far})
+    see(*trunk, 20);
+  const double unknown = m_map.evidence(far);
+  for (int i = 0; i < 5; ++i) {
+    m_map.recordForeground(still, m_options.near_range - 0.1, 0.05);
+    m_map.recordForeground(moved, m_options.near_range - 0.1, 0.9);
+    m_map.recordForeground(far, m_options.near_range + 0.1, 0.05); // says nothing that far away
+  }
+  EXPECT_LT(m_map.evidence(still), unknown - 0.5);
+  EXPECT_GT(m_map.evidence(moved), unknown + 0.5);
+  EXPECT_EQ(m_map.evidence(far), unknown);
+}
+
+TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
 {
   MapTrunk &trunk = add(trunkAt(3, 1));
   see(trunk, 20);
-  for (int i = 0; i < 5; ++i)
-    m_map.recordForeground(trunk, m_options.near_range - 0.1, 0.05);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::lost);
-  EXPECT_TRUE(trunk.removed);
-
-  MapTrunk &far = add(trunkAt(3, -4));
-  see(far, 20);
-  for (int i = 0; i < 5; ++i)
-    m_map.recordForeground(far, m_options.near_range + 0.1, 0.05); // says nothing that far away
-  m_map.review();
-  EXPECT_EQ(far.status, TrunkStatus::confirmed);
+  const double odds = m_map.evidence(trunk);
+  const auto after = [&](const std::function<void(MapTrunk &)> &change) {
+    MapTrunk changed = trunk;
+    change(changed);
+    return m_map.evidence(changed);
+  };
+  EXPECT_GT(after([](MapTrunk &t) { t.found_again = 3; }), odds);
+  EXPECT_GT(after([](MapTrunk &t) { t.bearing_high += 0.2; }), odds);
+  EXPECT_GT(after([](MapTrunk &t) { t.contrast *= 2; }), odds);
+  EXPECT_GT(after([](MapTrunk &t) { t.innovation2 /= 2; }), odds);
+  EXPECT_LT(after([](MapTrunk &t) { t.misses += 5; }), odds);
+  EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius += 1; }), odds);
+  EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius -= 1; }), odds);
+  EXPECT_LT(after([](MapTrunk &t) { t.covariance *= 9; }), odds);
 }
 
-TEST_F(Life, ACandidateWhosePredictionsFailIsGivenUp)
+TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)
 {
   MapTrunk &trunk = add(trunkAt(3, 1));
-  const double bad = 1.1 * m_options.doubt_slack * m_options.confirm_innovation_px;
-  see(trunk, m_options.doubt_observations - 1, 0.2, bad * bad);
+  see(trunk, m_options.doubt_observations - 1, 0.2, 9);
   m_map.review();
   EXPECT_EQ(trunk.status, TrunkStatus::candidate); // too early to say
-  see(trunk, 1, 0, bad * bad);
+  see(trunk, 1, 0, 9);
+  miss(trunk, m_options.lost_misses - 1);
+  ASSERT_LT(m_map.evidence(trunk), m_options.doubt_candidate);
   m_map.review();
   EXPECT_EQ(trunk.status, TrunkStatus::lost);
   EXPECT_TRUE(trunk.removed);
+}
+
+TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
+{
+  MapTrunk &trunk = confirmed(trunkAt(3, 1));
+  trunk.innovation2 = 9;
+  ASSERT_LT(m_map.evidence(trunk), m_options.doubt_confirmed);
+  m_map.review();
+  EXPECT_EQ(trunk.status, TrunkStatus::lost);
+  EXPECT_TRUE(trunk.removed);
+}
+
+TEST_F(Life, WhatHidesALostTrunkSaysNothingMoreAgainstIt)
+{
+  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
+  miss(trunk, m_options.lost_misses);
+  m_map.review();
+  ASSERT_EQ(trunk.status, TrunkStatus::lost);
+  const double odds = m_map.evidence(trunk);
+  miss(trunk, 500);
+  EXPECT_EQ(m_map.evidence(trunk), odds);
 }
 
 TEST_F(Life, ACandidateThatIsMissedForLongLeavesTheMap)
@@ -200,21 +240,44 @@ TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
   EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 2);
 }
 
-TEST_F(Life, OfTwoReadingsOfOnePlaceTheSilhouetteStaysNotTheEdgeOnTheBark)
+TEST_F(Life, ReadingsOfOnePlaceCompeteUntilOneIsConfirmed)
 {
-  MapTrunk &narrow = add(trunkAt(3, 1, 0.08)), &wide = add(trunkAt(3.05, 1, 0.2));
-  see(narrow, 9);
-  see(wide, 9);
-  m_map.review();
+  MapTrunk &narrow = add(trunkAt(3, 1, 0.1)), &wide = add(trunkAt(3.05, 1, 0.2));
+  see(narrow, m_options.confirm_observations - 1);
+  see(wide, m_options.confirm_observations - 1);
+  EXPECT_TRUE(m_map.review().empty());
+  EXPECT_EQ(m_map.count(TrunkStatus::candidate), 2);
+  see(narrow, 1);
+  see(wide, 1);
+  m_map.review(); // equally sound: the wider is the silhouette
+  EXPECT_EQ(wide.status, TrunkStatus::confirmed);
   EXPECT_EQ(narrow.status, TrunkStatus::merged);
-  EXPECT_NE(wide.status, TrunkStatus::merged);
+}
 
-  MapTrunk &followed = add(trunkAt(-3, 1, 0.08)), &chance = add(trunkAt(-3.05, 1, 0.2));
-  see(followed, 9);
-  see(chance, 2); // little behind it
+TEST_F(Life, AWiderReadingThatIsSoundReplacesAConfirmedEdgeOnItsBark)
+{
+  MapTrunk &edge = confirmed(trunkAt(3, 1, 0.1));
+  MapTrunk &silhouette = add(trunkAt(3.05, 1, 0.18)), &beside = add(trunkAt(3.3, 1, 0.12));
+  see(silhouette, 5);
+  see(beside, 5);
   m_map.review();
-  EXPECT_EQ(chance.status, TrunkStatus::merged);
-  EXPECT_NE(followed.status, TrunkStatus::merged);
+  EXPECT_EQ(silhouette.status, TrunkStatus::candidate); // may still turn out to be it
+  EXPECT_EQ(beside.status, TrunkStatus::merged);        // cannot stand there
+  see(silhouette, 15);
+  m_map.review();
+  EXPECT_EQ(edge.status, TrunkStatus::merged);
+  m_map.review();
+  EXPECT_EQ(silhouette.status, TrunkStatus::confirmed);
+}
+
+TEST_F(Life, TheSameReadingIsNotTakenInTwice)
+{
+  MapTrunk &candidate = add(trunkAt(3, 1));
+  EXPECT_TRUE(m_map.holds(trunkAt(3.05, 1)));
+  EXPECT_EQ(candidate.found_again, 1);
+  EXPECT_FALSE(m_map.holds(trunkAt(3.05, 1, 0.3))); // another reading
+  EXPECT_FALSE(m_map.holds(trunkAt(4, 1)));
+  EXPECT_EQ(candidate.found_again, 1);
 }
 
 TEST_F(Life, ParallaxIsTheSpreadOfTheBearingsAlsoAcrossHalfATurn)
