@@ -22,6 +22,7 @@ void MapOptions::validate() const
   require("map.doubt_confirmed", doubt_confirmed, -50, 0);
   require("map.doubt_rival", doubt_rival, 0, 50);
   require("map.near_range", near_range, 0, 100);
+  require("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
   require("map.usual_radius", usual_radius, 0.001, 10);
   require("map.lost_misses", lost_misses, 1, 1000);
   require("map.radius_min", radius_min, 0.001, 10);

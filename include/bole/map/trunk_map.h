@@ -32,6 +32,8 @@ struct MapOptions
   double doubt_rival = 2;             ///< log odds by which another candidate for the same place must be better for one
                                       ///< to be given up, 0 to 50
   double near_range = 5.5;            ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
+  double innovation_unit_px = 1;      ///< rms of prediction against what was found that counts as one pixel of a camera
+                                      ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
   double usual_radius = 0.15;         ///< median radius of the trunks to be found [m], 0.001 to 10
   int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
   double merge_distance = 0.30;       ///< two trunks with less than this between their bark are one [m], 0 to 5
