@@ -234,29 +234,45 @@ void Smoother::State::eliminate(int id)
     position[other] = -1;
 }
 
-/// delta_v = L_vv^-T (y_v - L_sv^T delta_s)
-void Smoother::State::solve(Variable &v)
+/// Fills \p rhs with y_v - L_sv^T delta_s, and returns how far delta_v is from the solution of
+/// L_vv^T delta_v = rhs, in standard deviations of v given its separator. Half its square is what
+/// the cost of the linearised graph would fall by if v alone were solved again.
+double Smoother::State::staleness(const Variable &v, double *rhs) const
 {
   const int rows = v.dim + v.separator_dim;
-  double x[6];
-  std::copy_n(v.y.data(), v.dim, x);
+  std::copy_n(v.y.data(), v.dim, rhs);
   int row = v.dim;
   for (const int id : v.separator) {
     const Variable &other = variables[id];
     for (int c = 0; c < v.dim; ++c) {
       const double *column = v.columns.data() + c * rows + row;
       for (int i = 0; i < other.dim; ++i)
-        x[c] -= column[i] * other.delta(i);
+        rhs[c] -= column[i] * other.delta(i);
     }
     row += other.dim;
   }
+  double squares = 0;
+  for (int c = 0; c < v.dim; ++c) {
+    const double *column = v.columns.data() + c * rows;
+    double off = rhs[c];
+    for (int i = c; i < v.dim; ++i)
+      off -= column[i] * v.delta(i);
+    squares += off * off;
+  }
+  return std::sqrt(squares);
+}
+
+/// delta_v = L_vv^-T rhs; \p rhs is overwritten.
+void Smoother::State::solve(Variable &v, double *rhs)
+{
+  const int rows = v.dim + v.separator_dim;
   for (int c = v.dim - 1; c >= 0; --c) {
     const double *column = v.columns.data() + c * rows;
     for (int i = c + 1; i < v.dim; ++i)
-      x[c] -= column[i] * x[i];
-    x[c] /= column[c];
+      rhs[c] -= column[i] * rhs[i];
+    rhs[c] /= column[c];
   }
   for (int c = 0; c < v.dim; ++c)
-    v.delta(c) = x[c];
+    v.delta(c) = rhs[c];
 }
 } // namespace bole

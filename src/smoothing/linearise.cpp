@@ -8,6 +8,7 @@ namespace bole
 {
 namespace
 {
+constexpr double kWeightShare = 0.2;
 constexpr double kLargestShift = 8; ///< times the relinearisation thresholds
 constexpr std::size_t kFactorsProbed =
     6; ///< of a trunk, newest to oldest, for their linearisation error
@@ -207,8 +208,35 @@ Vector6d Smoother::State::linearPrediction(const Factor &factor) const
   return r;
 }
 
-/// How far, in standard deviations, the true residual at the estimates is from its linear model;
-/// the loss' weight is part of the model.
+namespace
+{
+/// Weight of a loss where it is \p rho.
+double weightAt(const Loss &loss, double rho)
+{
+  switch (loss.kind) {
+  case LossKind::quadratic:
+    return 1;
+  case LossKind::huber:
+    return loss.width / std::max(loss.width, 0.5 * (rho / loss.width + loss.width));
+  case LossKind::cauchy:
+    return std::exp(-rho / (loss.width * loss.width));
+  }
+  return 1;
+}
+
+/// Of a weighted residual: what the geometry's curvature makes, and a share of what the weight does
+/// that no longer fits. A wrong weight only makes the loss a little softer or harder.
+template <int N>
+double modelError(const Loss &loss, double cost, const Eigen::Matrix<double, N, 1> &r,
+                  const Eigen::Matrix<double, N, 1> &predicted)
+{
+  const double root = std::sqrt(weightAt(loss, 2 * cost));
+  const double now = std::sqrt(loss.weight(r.squaredNorm()));
+  return std::max((root * r - predicted).norm(), kWeightShare * std::abs(now - root) * r.norm());
+}
+} // namespace
+
+/// How far, in standard deviations, the true residual at the estimates is from its linear model.
 double Smoother::State::linearisationError(const Factor &factor) const
 {
   if (factor.stale)
@@ -217,8 +245,7 @@ double Smoother::State::linearisationError(const Factor &factor) const
     const Vector4d r = residual(observations[factor.data].root, options.bMc,
                                 estimate(poses[variables[factor.a].number]),
                                 estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
-    const double root = std::sqrt(options.summary_loss.weight(r.squaredNorm()));
-    return (root * r - linearPrediction(factor).head<4>()).norm();
+    return modelError<4>(options.summary_loss, factor.cost, r, linearPrediction(factor).head<4>());
   }
   if (factor.kind == FactorKind::odometry) {
     const OdometryData &data = odometry[factor.data];
@@ -231,31 +258,32 @@ double Smoother::State::linearisationError(const Factor &factor) const
     const Vector5d r =
         residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
                  estimate(poses[variables[factor.b].number]), nullptr, nullptr);
-    const double root = std::sqrt(options.direction_loss.weight(r.squaredNorm()));
-    return (root * r - linearPrediction(factor).head<5>()).norm();
+    return modelError<5>(options.direction_loss, factor.cost, r,
+                         linearPrediction(factor).head<5>());
   }
   return 0;
 }
 
-/// Pose priors are linear enough never to ask for more than their pose's own factors do.
-bool Smoother::State::movedTooFar(const Variable &variable) const
+/// The largest part of \p step, in thresholds of relinearisation.
+double Smoother::State::inThresholds(const Variable &variable, const Vector6d &step) const
 {
-  const Vector6d &d = variable.delta;
-  const bool moved_little =
-      variable.is_pose ? d.head<3>().cwiseAbs().maxCoeff() <= options.relinearise_position &&
-                             d.tail<3>().cwiseAbs().maxCoeff() <= options.relinearise_rotation
-                       : d.head<2>().cwiseAbs().maxCoeff() <= options.relinearise_position &&
-                             std::abs(d(2)) <= options.relinearise_log_radius &&
-                             d.segment<2>(3).cwiseAbs().maxCoeff() <= options.relinearise_lean;
-  if (moved_little)
+  const double position = step.head(variable.is_pose ? 3 : 2).cwiseAbs().maxCoeff();
+  const double rest =
+      variable.is_pose
+          ? step.tail<3>().cwiseAbs().maxCoeff() / options.relinearise_rotation
+          : std::max(std::abs(step(2)) / options.relinearise_log_radius,
+                     step.segment<2>(3).cwiseAbs().maxCoeff() / options.relinearise_lean);
+  return std::max(position / options.relinearise_position, rest);
+}
+
+/// Probes the factors only where the estimate has moved on since they were last found good. Pose
+/// priors are linear enough never to ask for more than their pose's own factors do.
+bool Smoother::State::movedTooFar(Variable &variable) const
+{
+  if (inThresholds(variable, variable.delta - variable.probed) <= 1)
     return false;
-  // Neighbours must be linearised at points that fit together: a common shift may not grow without
-  // bound.
-  const double farthest =
-      variable.is_pose ? d.head<3>().cwiseAbs().maxCoeff() : d.head<2>().cwiseAbs().maxCoeff();
-  if (farthest > kLargestShift * options.relinearise_position ||
-      (variable.is_pose &&
-       d.tail<3>().cwiseAbs().maxCoeff() > kLargestShift * options.relinearise_rotation))
+  // A common shift changes no view, but may not grow without bound: small errors of many add up.
+  if (variable.is_pose && inThresholds(variable, variable.delta) > kLargestShift)
     return true;
   const std::size_t count = variable.factors.size();
   const std::size_t every = variable.is_pose ? 1 : std::max<std::size_t>(1, count / kFactorsProbed);
@@ -263,18 +291,18 @@ bool Smoother::State::movedTooFar(const Variable &variable) const
     if (linearisationError(factors[variable.factors[count - 1 - i]]) >
         options.linearisation_tolerance)
       return true;
+  variable.probed = variable.delta;
   return false;
 }
 
-/// Has the estimate changed since those eliminated before last saw it?
-bool Smoother::State::worthPassing(const Variable &variable) const
+/// Are all neighbours by factors to be eliminated again anyway?
+bool Smoother::State::isInside(const Variable &variable) const
 {
-  const int metres = variable.is_pose ? 3 : 2;
-  for (int i = 0; i < variable.dim; ++i)
-    if (std::abs(variable.delta(i) - variable.passed(i)) >
-        (i < metres ? 1 : 0.2) * options.propagation_threshold)
-      return true;
-  return false;
+  return std::all_of(variable.factors.begin(), variable.factors.end(), [this](int id) {
+    const Factor &factor = factors[id];
+    return factor.kind != FactorKind::marginal && variables[factor.a].affected == stamp &&
+           (factor.b < 0 || variables[factor.b].affected == stamp);
+  });
 }
 
 void Smoother::State::relinearise(int v)
@@ -289,7 +317,7 @@ void Smoother::State::relinearise(int v)
     trunk.point = trunk.point.plus(limitedTrunkStep(trunk, variable.delta.head<5>()));
   }
   variable.delta.setZero();
-  variable.passed.setZero();
+  variable.probed.setZero();
   touch(v);
   for (const int id : variable.factors) {
     Factor &factor = factors[id];

@@ -78,10 +78,8 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   solveAll(result, true);
   const double after = costAtEstimate();
   if (!(after <= before))
-    for (Variable &v : variables) {
+    for (Variable &v : variables)
       v.delta.setZero();
-      v.passed.setZero();
-    }
   result.relinearised = variables.size();
   result.cost = std::min(before, std::isfinite(after) ? after : before);
   result.status = held_directions > 0 ? UpdateStatus::degenerate

@@ -45,9 +45,8 @@ struct Variable
   int dim = 6;
   std::vector<int> factors;
   Vector6d delta = Vector6d::Zero(); ///< estimate = linearisation point (+) delta
-  Vector6d passed =
-      Vector6d::Zero();          ///< the delta that those eliminated before were last solved with
-  int affected = 0, changed = 0; ///< stamps
+  Vector6d probed = Vector6d::Zero(); ///< the delta at which the linearisation was last found good
+  int affected = 0;                   ///< stamp
 
   // node of the elimination tree
   bool eliminated = false;
@@ -172,9 +171,10 @@ public:
   double costAtEstimate(const Factor &factor) const;
   double costAtEstimate() const;
   void relinearise(int variable);
-  bool movedTooFar(const Variable &variable) const;
+  bool movedTooFar(Variable &variable) const;
+  double inThresholds(const Variable &variable, const Vector6d &step) const;
+  bool isInside(const Variable &variable) const;
   double linearisationError(const Factor &factor) const;
-  bool worthPassing(const Variable &variable) const;
   Vector6d linearPrediction(const Factor &factor) const;
   Pose estimate(const PoseState &pose) const;
   Trunk estimate(const TrunkState &trunk) const;
@@ -184,7 +184,8 @@ public:
   void eliminate(int variable);
   void assemble(const Factor &factor);
   void assembleChild(const Variable &child);
-  void solve(Variable &variable);
+  double staleness(const Variable &variable, double *rhs) const;
+  void solve(Variable &variable, double *rhs);
 
   // update.cpp
   UpdateResult update();
@@ -193,6 +194,8 @@ public:
   void addMissingContributions();
   void reeliminate(UpdateResult &result);
   void backSubstitute(UpdateResult &result);
+  int reach();
+  void moveLinearisation(UpdateResult &result);
   void dropOldContributions();
 
   // lag.cpp
@@ -224,14 +227,20 @@ public:
   double damping = 0; ///< Levenberg's, added to the diagonal scaled by damping_scale
   std::vector<Vector6d> damping_scale;
   double constant_cost = 0;
-  std::vector<int> touched, affected, moved, stale_factors, pool, orphans, stack;
+  struct Descent
+  {
+    int variable, depth, quiet;
+  };
+  std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
+  std::vector<Descent> stack;
   std::vector<double> front;
   std::vector<int> position, child_map; ///< of a variable in the front
   std::vector<std::array<double, 36>> path_rows;
   std::vector<int> path;
   std::vector<int> open_trunks; ///< variables, for the lag
   int front_rows = 0;           ///< columns of the front plus the row of the right-hand side
-  int stamp = 0, change_stamp = 0;
+  int stamp = 0;
+  unsigned passes = 0; ///< back-substitutions so far
   int held_directions = 0;
   std::int64_t next_order = 0;
   int oldest_open_pose = 0;

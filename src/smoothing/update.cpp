@@ -4,6 +4,7 @@
 #include "state.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace bole
 {
@@ -11,7 +12,14 @@ namespace
 {
 constexpr int kRecentPoses = 64; ///< behind the newest, all of them keep their contribution
 constexpr int kContributionEvery =
-    8; ///< older poses that keep it; the rest is eliminated again if needed
+    8;                      ///< older poses that keep it; the rest is eliminated again if needed
+constexpr int kReach = 256; ///< variables below the eliminated ones that a pass visits
+constexpr unsigned kPassesBetween = 4; ///< until one goes twice as deep
+constexpr unsigned kDeepEvery = 512;   ///< passes until one may move points of any age
+constexpr int kDeepAge = 400;          ///< poses behind the newest: older points are left meanwhile
+constexpr int kQuietPoints = 4; ///< variables in a row near their point: the rest keeps its points
+constexpr double kWorthAligning = 0.1; ///< thresholds of relinearisation
+constexpr int kQuiet = 16; ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
 void Smoother::State::touch(int variable) { touched.push_back(variable); }
@@ -27,7 +35,6 @@ void Smoother::State::closeUpwards()
       if (isOpen(v))
         affected.push_back(v);
     }
-  touched.clear();
 }
 
 /// A child that is not affected enters through its contribution; where that was dropped to save
@@ -50,6 +57,7 @@ void Smoother::State::reeliminate(UpdateResult &result)
       linearise(factor);
   }
   closeUpwards();
+  touched.clear();
   addMissingContributions();
   orderAffected();
 
@@ -100,21 +108,30 @@ void Smoother::State::reeliminate(UpdateResult &result)
   result.eliminated += affected.size();
 }
 
-/// From the roots down: all that was eliminated again, then whoever depends on a change worth
-/// passing on.
+/// How deep below what was eliminated again this pass goes: now and then twice as far as the passes
+/// between, and so on, so that what lies far back is brought up to date, less often the farther.
+int Smoother::State::reach()
+{
+  if (options.propagation_threshold == 0)
+    return std::numeric_limits<int>::max();
+  int depth = kReach;
+  for (unsigned pass = ++passes; pass % kPassesBetween == 0 && depth < 1 << 28;
+       pass /= kPassesBetween)
+    depth *= 2;
+  return depth;
+}
+
+/// From the roots down: all that was eliminated again, then whatever stands too far from its
+/// solution given those above it.
 void Smoother::State::backSubstitute(UpdateResult &result)
 {
-  ++change_stamp;
+  double rhs[6];
   const auto settle = [&](int id) {
     Variable &v = variables[id];
-    solve(v);
+    solve(v, rhs);
     if (!v.delta.allFinite()) {
       v.delta.setZero();
       ++held_directions;
-    }
-    if (worthPassing(v)) {
-      v.changed = change_stamp;
-      v.passed = v.delta;
     }
     if (!v.in_moved && movedTooFar(v)) {
       v.in_moved = true;
@@ -123,23 +140,26 @@ void Smoother::State::backSubstitute(UpdateResult &result)
     ++result.resolved;
   };
   stack.clear();
-  for (auto id = affected.rbegin(); id != affected.rend(); ++id) {
-    settle(*id);
-    for (const int c : variables[*id].children)
+  const auto descend = [&](int id, int depth, int quiet) {
+    for (const int c : variables[id].children)
       if (variables[c].affected != stamp)
-        stack.push_back(c);
+        stack.push_back({c, depth, quiet});
+  };
+  for (auto id = affected.rbegin(); id != affected.rend(); ++id) {
+    staleness(variables[*id], rhs);
+    settle(*id);
+    descend(*id, 1, 0);
   }
+  const int deepest = reach();
   while (!stack.empty()) {
-    const int id = stack.back();
+    const auto [id, depth, quiet] = stack.back();
     stack.pop_back();
-    const Variable &v = variables[id];
-    const bool depends = std::any_of(v.separator.begin(), v.separator.end(), [this](int s) {
-      return variables[s].changed == change_stamp;
-    });
-    if (!depends)
-      continue;
-    settle(id);
-    stack.insert(stack.end(), v.children.begin(), v.children.end());
+    const bool stale = staleness(variables[id], rhs) > options.propagation_threshold;
+    if (stale)
+      settle(id);
+    const int still = stale ? 0 : quiet + 1;
+    if (still < kQuiet && depth < deepest)
+      descend(id, depth + 1, still);
   }
 }
 
@@ -160,21 +180,72 @@ void Smoother::State::dropOldContributions()
       drop(variables[id].number);
 }
 
+/// Linearises anew what moved too far. Points must fit together: where a relinearised variable
+/// meets one whose estimate has left its point, by however common a shift, the lever arms between
+/// them are wrong, the next one down moves too far in its turn, and so on down the whole flight. So
+/// everything between, which is eliminated again anyway, is relinearised too, and all below that
+/// has moved along.
+///
+/// Moving old points eliminates all since again: seldom, and what was found in between is found
+/// once more by the deep pass before.
+void Smoother::State::moveLinearisation(UpdateResult &result)
+{
+  const bool deep = options.propagation_threshold == 0 || passes % kDeepEvery == 0;
+  const int newest = static_cast<int>(poses.size()) - 1;
+  const auto mayMove = [&](const Variable &v) {
+    return deep || newest - (v.is_pose ? v.number : trunks[v.number].last_pose) <= kDeepAge;
+  };
+  bool any = false;
+  for (const int id : moved) {
+    Variable &v = variables[id];
+    v.in_moved = false;
+    if (v.life == Life::open && mayMove(v) && movedTooFar(v)) {
+      relinearise(id);
+      ++result.relinearised;
+      any = true;
+    }
+  }
+  moved.clear();
+  if (!any)
+    return;
+  closeUpwards();
+  stack.clear();
+  const auto descend = [&](int id, int quiet) {
+    for (const int c : variables[id].children)
+      if (variables[c].affected != stamp && isOpen(c))
+        stack.push_back({c, 0, quiet});
+  };
+  for (const int id : affected)
+    descend(id, 0);
+  while (!stack.empty()) {
+    const auto [id, depth, quiet] = stack.back();
+    stack.pop_back();
+    const bool along =
+        mayMove(variables[id]) && inThresholds(variables[id], variables[id].delta) > 1;
+    if (along) {
+      relinearise(id);
+      ++result.relinearised;
+    }
+    if (along || quiet + 1 < kQuietPoints)
+      descend(id, along ? 0 : quiet + 1);
+  }
+  closeUpwards();
+  for (const int id : affected) {
+    const Variable &v = variables[id];
+    if (inThresholds(v, v.delta) > kWorthAligning && isInside(v)) {
+      relinearise(id);
+      ++result.relinearised;
+    }
+  }
+}
+
 UpdateResult Smoother::State::update()
 {
   UpdateResult result;
   held_directions = 0;
   damping = 0;
   while (result.iterations < options.max_iterations) {
-    for (const int id : moved) {
-      Variable &v = variables[id];
-      v.in_moved = false;
-      if (v.life == Life::open && movedTooFar(v)) {
-        relinearise(id);
-        ++result.relinearised;
-      }
-    }
-    moved.clear();
+    moveLinearisation(result);
     if (touched.empty())
       break;
     reeliminate(result);

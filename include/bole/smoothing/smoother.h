@@ -8,7 +8,8 @@
 /// order of the flight, each trunk right after the last pose that saw it. What every elimination
 /// leaves to its later neighbours is kept, so a new frame eliminates again only the variables it
 /// touches and those after them; the change then runs back down the elimination tree until it is
-/// too small to matter. A variable whose estimate left the point of its linearisation takes its
+/// too small to matter; far back it waits for one of the passes that go deeper, each twice as deep
+/// as those before and four times as rare. A variable whose estimate left the point of its linearisation takes its
 /// factors, not the images, to the new point: nothing but the image is linearised for ever. A loop
 /// that comes back to old trunks eliminates the part of the flight between again, once a returning
 /// trunk.
@@ -61,13 +62,14 @@ struct SmootherOptions
   double relinearise_lean = 0.005;      ///< tan
   /// One that moved farther is linearised again when some factor's true residual is off its linear
   /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
-  /// stretch of the flight, and changes no view in it, costs nothing. Default: trunks stay
-  /// within a tenth of their standard deviation of the batch optimum.
-  double linearisation_tolerance = 0.05;
-  /// Changes of a variable below this are not passed on to the variables eliminated before it: [m]
-  /// for positions, a fifth of it [rad, relative] for rotations, log radius and lean. >= 0; 0
-  /// passes all. Default: well below the error of a well-seen trunk.
-  double propagation_threshold = 5e-3;
+  /// stretch of the flight, and changes no view in it, costs nothing. Default: views stay within a
+  /// tenth of their standard deviation of the batch optimum (rms).
+  double linearisation_tolerance = 0.1;
+  /// A variable is solved again when it stands farther than this from its solution given the
+  /// variables eliminated after it, in standard deviations of that solution: >= 0. Half the square
+  /// bounds what one variable adds to the cost of the linearised graph. 0 passes every change, to
+  /// the first pose. Default: no view notices.
+  double propagation_threshold = 0.1;
   /// Gauss-Newton iterations in one update(), >= 1. Default: the next frame goes on with
   /// what has not settled.
   int max_iterations = 2;
