@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/smoothing/g2o.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include <cerrno>
+#include <cmath>
 #include <fmt/core.h>
 #include <fstream>
 #include <functional>
@@ -36,6 +37,13 @@ public:
         readLine();
     }
     resolveEdges();
+    if (const std::optional<std::size_t> loose = untiedPose(m_graph)) {
+      const std::int64_t name = m_graph.poses[*loose].id;
+      m_line = m_line_of.at(name);
+      fail(fmt::format("pose {}, must be tied to the world by EDGE_SE3:QUAT and an "
+                       "EDGE_SE3_PRIOR:QUAT",
+                       name));
+    }
     try {
       validate(m_graph);
     }
@@ -70,9 +78,11 @@ private:
   {
     const std::string text = word();
     char *end = nullptr;
+    errno = 0;
     const long long value = std::strtoll(text.c_str(), &end, 10);
-    if (end != text.c_str() + text.size() || value < 0)
-      fail(fmt::format("{}: id = {}, must be a whole number of at least 0", m_fields[0], text));
+    if (end != text.c_str() + text.size() || value < 0 || errno == ERANGE)
+      fail(fmt::format("{}: id = {}, must be a whole number of at least 0 and below 2^63",
+                       m_fields[0], text));
     return value;
   }
   template <int N> Eigen::Matrix<double, N, 1> vector()
@@ -106,8 +116,12 @@ private:
   template <int N>
   Eigen::Matrix<double, N, N> positiveDefinite(const Eigen::Matrix<double, N, N> &m)
   {
-    if (Eigen::LLT<Eigen::Matrix<double, N, N>>(m).info() != Eigen::Success)
-      fail(m_fields[0] + ": matrix, must be positive definite");
+    try {
+      squareRootInformation<N>(m, "matrix");
+    }
+    catch (const vpException &) {
+      fail(m_fields[0] + ": matrix, must be positive definite, its inverse too");
+    }
     return m;
   }
   Matrix6d covariance()
@@ -122,6 +136,8 @@ private:
   Trunk trunk()
   {
     const Vector5d v = vector<5>();
+    if (!std::isnormal(std::exp(v(2))))
+      fail(fmt::format("{}: log_r = {}, must be the logarithm of a radius", m_fields[0], v(2)));
     return {v.head<2>(), v(2), v.tail<2>()};
   }
 

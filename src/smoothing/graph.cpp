@@ -75,18 +75,32 @@ void checkVertices(const Graph &graph)
     const Graph::TrunkVertex &vertex = graph.trunks[j];
     if (!vertex.trunk.minus(Trunk()).allFinite() || !vertex.prior.mean.minus(Trunk()).allFinite())
       fail("trunk", j, "must be finite");
+    if (!std::isnormal(vertex.trunk.radius()) || !std::isnormal(vertex.prior.mean.radius()))
+      fail("trunk", j, "radius must be above 0 and finite");
     if (!vertex.prior.sigma.allFinite() || !(vertex.prior.sigma.array() > 0).all())
       fail("trunk", j, "sigmas of its prior must be above 0");
   }
 }
 } // namespace
 
+std::optional<std::size_t> untiedPose(const Graph &graph)
+{
+  Components components(graph.poses.size());
+  for (const Graph::OdometryEdge &edge : graph.odometry)
+    components.join(edge.a, edge.b);
+  std::vector<bool> anchored(graph.poses.size(), false);
+  for (const Graph::PosePriorEdge &edge : graph.pose_priors)
+    anchored[components.root(edge.pose)] = true;
+  for (std::size_t i = 0; i < graph.poses.size(); ++i)
+    if (!anchored[components.root(i)])
+      return i;
+  return std::nullopt;
+}
+
 void validate(const Graph &graph)
 {
   checkVertices(graph);
   const std::size_t n = graph.poses.size();
-  Components components(n);
-  std::vector<bool> anchored(n, false);
   for (std::size_t i = 0; i < graph.pose_priors.size(); ++i) {
     const Graph::PosePriorEdge &edge = graph.pose_priors[i];
     if (edge.pose >= n)
@@ -94,7 +108,6 @@ void validate(const Graph &graph)
     if (!edge.prior.mean.isFinite())
       fail("pose prior", i, "must be finite");
     squareRootInformation<6>(edge.prior.covariance, "pose prior covariance");
-    anchored[edge.pose] = true;
   }
   for (std::size_t i = 0; i < graph.odometry.size(); ++i) {
     const Graph::OdometryEdge &edge = graph.odometry[i];
@@ -103,7 +116,6 @@ void validate(const Graph &graph)
     if (!edge.odometry.aMb.isFinite())
       fail("odometry", i, "must be finite");
     squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
-    components.join(edge.a, edge.b);
   }
   for (std::size_t i = 0; i < graph.relative_poses.size(); ++i) {
     const Graph::RelativePoseEdge &edge = graph.relative_poses[i];
@@ -132,11 +144,7 @@ void validate(const Graph &graph)
     if (status == SummaryStatus::not_finite)
       fail("observation", i, "must be finite");
   }
-  for (std::size_t i = 0; i < n; ++i)
-    if (anchored[i])
-      anchored[components.root(i)] = true;
-  for (std::size_t i = 0; i < n; ++i)
-    if (!anchored[components.root(i)])
-      fail("pose", i, "must be tied to the world by odometry and a pose prior");
+  if (const std::optional<std::size_t> pose = untiedPose(graph))
+    fail("pose", *pose, "must be tied to the world by odometry and a pose prior");
 }
 } // namespace bole

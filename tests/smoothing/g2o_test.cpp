@@ -113,10 +113,35 @@ TEST(G2o, NamesTheLineOfAnIndefiniteSummary)
   EXPECT_THAT(errorOf(kPose + trunk + edge), HasSubstr("file.g2o:3: EDGE_TRUNK_SUMMARY: F"));
 }
 
-TEST(G2o, RefusesAGraphThatIsNotTiedToTheWorld)
+TEST(G2o, NamesTheLineOfAPoseThatIsNotTiedToTheWorld)
 {
-  EXPECT_THAT(errorOf(kPose), HasSubstr("must be tied to the world"));
+  const std::string second = "VERTEX_SE3:QUAT 5 1 0 0 0 0 0 1\n";
+  EXPECT_THAT(errorOf(kPose), HasSubstr("file.g2o:1: pose 0, must be tied to the world"));
+  EXPECT_THAT(errorOf(std::string(kPose) + kPrior + second),
+              HasSubstr("file.g2o:3: pose 5, must be tied to the world"));
   EXPECT_EQ(errorOf(std::string(kPose) + kPrior), "none");
+}
+
+TEST(G2o, NamesTheLineOfAnInformationMatrixThatIsNone)
+{
+  const std::string indefinite =
+      "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 -1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  const std::string huge =
+      "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1e308 0 0 0 0 0 1e-308 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  EXPECT_THAT(errorOf(kPose + indefinite), HasSubstr("file.g2o:2: EDGE_SE3_PRIOR:QUAT: matrix"));
+  EXPECT_THAT(errorOf(kPose + huge), HasSubstr("file.g2o:2: EDGE_SE3_PRIOR:QUAT: matrix"));
+}
+
+TEST(G2o, NamesTheLineOfAnIdBeyondItsRange)
+{
+  EXPECT_THAT(errorOf("VERTEX_SE3:QUAT 99999999999999999999 0 0 0 0 0 0 1\n"),
+              HasSubstr("file.g2o:1: VERTEX_SE3:QUAT: id = 99999999999999999999"));
+}
+
+TEST(G2o, NamesTheLineOfARadiusThatIsNone)
+{
+  EXPECT_THAT(errorOf("VERTEX_TRUNK 1 3 0 999 0 0 3 0 -2 0 0 9 9 1 1 1\n"),
+              HasSubstr("file.g2o:1: VERTEX_TRUNK: log_r = 999"));
 }
 } // namespace
 } // namespace bole

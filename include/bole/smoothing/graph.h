@@ -7,6 +7,7 @@
 #include <bole/smoothing/factors.h>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace bole
@@ -67,6 +68,9 @@ struct Graph
 /// constant part of the summaries' energies is left out. Throws vpException(badValue) for a factor
 /// that is none (see validate()).
 double cost(const Graph &graph);
+
+/// The first pose that no chain of odometry ties to a pose with a prior, by its place.
+std::optional<std::size_t> untiedPose(const Graph &graph);
 
 /// Throws vpException(badValue) naming the edge for anything no solver may be given: an index out
 /// of range, an edge from a vertex to itself, NaN, a covariance or F that is clearly indefinite, a
