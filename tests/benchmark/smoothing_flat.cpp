@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Time a frame over a long flight: must not grow with its length.
-// benchmark_smoothing_flat [poses] [figure.svg]
-// <bytes> lines for the figure.
+// Time a frame over a long flight: must not grow with its length; and how far the estimate is from
+// the batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg]
 #include "support/flight.h"
 #include "support/line_chart.h"
 
@@ -24,6 +23,35 @@ double quantile(std::vector<double> values, double q)
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
+
+/// The whole graph solved from the present estimate, and how far the estimate was from it.
+double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flight &flight)
+{
+  bole::Smoother again(replay.smoother.graph(), replay.smoother.options());
+  const double start = threadMs();
+  again.optimize(1e-6);
+  const double ms = threadMs() - start;
+  again.optimize(1e-10);
+  const auto relative = [&](const bole::Smoother &smoother, std::size_t pose, int trunk) {
+    return bole::relativeTrunk(smoother.pose(pose), smoother.options().bMc, smoother.trunk(trunk));
+  };
+  double worst = 0, squares = 0, count = 0; // of the views, in their standard deviations
+  for (std::size_t i = 0; i < static_cast<std::size_t>(replay.next); i += 5)
+    for (const auto &[j, summary] : flight.views[i]) {
+      const int trunk = replay.trunk_id[j];
+      const bole::Vector4d apart =
+          relative(replay.smoother, i, trunk).minus(relative(again, i, trunk));
+      const double sigmas = std::sqrt(apart.dot(summary.F * apart));
+      worst = std::max(worst, sigmas);
+      squares += sigmas * sigmas;
+      ++count;
+    }
+  const double cost = replay.smoother.cost(), optimum = again.cost();
+  fmt::print("{:6d} poses: full re-solve {:.1f} ms; cost of the updates {:.2f}, optimum {:.2f} "
+             "(relative {:+.1e}); views off by {:.3f} (rms), {:.2f} (worst) standard deviations\n",
+             replay.next, ms, cost, optimum, cost / optimum - 1, std::sqrt(squares / count), worst);
+  return ms;
+}
 } // namespace
 
 int main(int argc, char **argv)
@@ -45,13 +73,9 @@ int main(int argc, char **argv)
     limit += result.status != bole::UpdateStatus::ok;
     views += flight.views[i].size();
     const int n = i + 1;
-    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000) {
-      bole::Smoother again(replay.smoother.graph(), replay.smoother.options());
-      const double from = threadMs();
-      again.optimize(1e-6);
-      naive.emplace_back(n, threadMs() - from);
-      fmt::print("{:6d} poses: full re-solve {:.1f} ms\n", n, naive.back().second);
-    }
+    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000 || n == 8000 ||
+        n == 16000 || n == o.poses)
+      naive.emplace_back(n, compareWithBatch(replay, flight));
     if ((i + 1) % std::max(1, o.poses / 20) == 0) {
       const std::size_t window = std::min<std::size_t>(500, ms.size());
       const std::vector<double> last(ms.end() - static_cast<long>(window), ms.end());
