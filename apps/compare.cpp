@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
 #include "commands.h"
-#include "interrupt.h"
 
 #include <bole/baseline/comparison_report.h>
 #include <bole/output/atomic_file.h>
@@ -23,7 +22,7 @@ struct Arguments
 {
   std::string sequence, out, settings;
   bool has_basin = false, has_faults = false, is_quick = false;
-  double range_m = 25, far_m = 15;
+  double range_m = 25, far_m = 25;
 };
 
 constexpr TrackerKind kVisp[] = {TrackerKind::visp_edge, TrackerKind::visp_generic_edge, TrackerKind::visp_generic_edge_klt};
@@ -35,12 +34,7 @@ TestFlight readFlight(const std::string &path)
   return readAslFlight(path);
 }
 
-void say(const std::string &what)
-{
-  std::fprintf(stderr, "bole: %s\n", what.c_str());
-  if (interrupted())
-    throw vpException(vpException::fatalError, "interrupted: nothing was written");
-}
+void say(const std::string &what) { std::fprintf(stderr, "bole: %s\n", what.c_str()); }
 
 EdgeSettings bestOf(const std::vector<SweepResult> &sweeps, TrackerKind kind, Help help)
 {
@@ -125,7 +119,6 @@ void measureFaults(const Arguments &arguments, const TestFlight &flight, const s
 
 void run(const Arguments &arguments)
 {
-  endAtInterrupt();
   const TestFlight flight = readFlight(arguments.sequence);
   fs::create_directories(arguments.out);
   const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);

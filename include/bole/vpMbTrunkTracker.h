@@ -72,6 +72,9 @@ public:
     /// Standard deviation of a border's place [px]: bow and root flare of real trunks (0.1 .. 20).
     double border_sigma_px = 1.5;
     double lean_sigma_rad = 0.03; ///< how far a real trunk leans from its model (0.0001 .. 0.5)
+    /// How much the width of a real trunk differs from its model, as a share: taper, bark, shading edges
+    /// (0.001 .. 1). Bearings of trunks, which have no such bias, then say where the camera is.
+    double radius_sigma = 0.15;
     double scan_min_px = 4;   ///< least half-width of the scan (2 .. 20)
     double scan_max_px = 24;  ///< greatest (8 .. 100)
     double refine_px = 5;     ///< half-width of the second scan (2 .. 20)
@@ -182,6 +185,7 @@ private:
   void normalEquations(Matrix6d &H, Vector6d &b) const;
   double support() const;
   void keep(const Prediction &prediction);
+  void learn(const vpImage<unsigned char> &I);
   void finish(Status status, const std::string &message);
   void drawBorders(const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam, unsigned int width,
                    unsigned int height, bool all, std::vector<std::vector<double>> &lines) const;
@@ -201,7 +205,7 @@ private:
   Matrix6d m_posterior = Matrix6d::Zero();
   Eigen::MatrixXd m_unobserved;
   vpMatrix m_L;
-  vpColVector m_error, m_w, m_piece_weight;
+  vpColVector m_error, m_w, m_piece_weight, m_by_log_radius;
   vpRobust m_robust;
   Status m_status = Status::not_initialised;
   std::string m_message;

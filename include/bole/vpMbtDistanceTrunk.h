@@ -13,6 +13,7 @@
 /// the plane obeys n.a = 0 and n.p = -r; under a camera velocity (v, w) its normal moves by
 ///   dn = alpha a + beta b,  alpha = w.b,  beta = (n.v + w.(p x n) - alpha a.p) / (b.p),
 /// from which L = de/d(v, w): a row (1x6) in ViSP's convention, e + L * twist. Exact for every direction.
+/// A radius that grows by dr turns the normal by dn = -dr / (b.p) b.
 ///
 /// Laws (each a test): L agrees with central differences of the residual; the residual of a point of the
 /// border is zero; L of an upright trunk has no component along the axis, and none about it.
@@ -120,15 +121,17 @@ public:
   void initInteractionMatrixError();
   /// L (nbFeature x 6) and error (nbFeature, image plane at z = 1) of the found places at \p cMo.
   void computeInteractionMatrixError(const vpHomogeneousMatrix &cMo);
-  /// Row of L (in \p row, may be null) and residual of the image point \p m = (x, y, 1) and one border.
+  /// Row of L (in \p row, may be null) and residual of the image point \p m = (x, y, 1) and one border;
+  /// \p by_log_radius is its derivative by the logarithm of the radius.
   static double residual(const bole::Cylinder &c_cylinder, bole::Border side, const Eigen::Vector3d &m,
-                         Eigen::Matrix<double, 1, 6> *row = nullptr);
+                         Eigen::Matrix<double, 1, 6> *row = nullptr, double *by_log_radius = nullptr);
 
   BorderState &border(bole::Border side) { return m_border[side == bole::Border::left ? 0 : 1]; }
   const BorderState &border(bole::Border side) const { return m_border[side == bole::Border::left ? 0 : 1]; }
 
   vpMatrix L;                 ///< interaction matrix
   vpColVector error;          ///< residuals
+  vpColVector by_log_radius;  ///< derivative of each residual by the logarithm of the radius
   vpColVector weight;         ///< of each residual, 0 .. 1: the share of a border that the piece stands for
   unsigned int nbFeature = 0; ///< rows of L
 

@@ -141,6 +141,7 @@ const std::map<std::string, Setter> &trunkKeys()
       {"min_contrast", [](O &o, double v) { o.trunk.min_contrast = v; }},
       {"border_sigma_px", [](O &o, double v) { o.border_sigma_px = v; }},
       {"lean_sigma_rad", [](O &o, double v) { o.lean_sigma_rad = v; }},
+      {"radius_sigma", [](O &o, double v) { o.radius_sigma = v; }},
       {"scan_min_px", [](O &o, double v) { o.scan_min_px = v; }},
       {"scan_max_px", [](O &o, double v) { o.scan_max_px = v; }},
       {"refine_px", [](O &o, double v) { o.refine_px = v; }},

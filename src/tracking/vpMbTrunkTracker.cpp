@@ -52,6 +52,7 @@ void vpMbTrunkTracker::Options::validate() const
   health.validate();
   check("border_sigma_px", border_sigma_px, 0.1, 20);
   check("lean_sigma_rad", lean_sigma_rad, 1e-4, 0.5);
+  check("radius_sigma", radius_sigma, 1e-3, 1);
   check("scan_min_px", scan_min_px, 2, 20);
   check("scan_max_px", scan_max_px, 8, 100);
   check("refine_px", refine_px, 2, 20);
@@ -205,6 +206,7 @@ void vpMbTrunkTracker::init(const vpImage<unsigned char> &I)
   m_has_step = false;
   m_prior.reset();
   setPose(I, m_cMo);
+  learn(I);
 }
 
 void vpMbTrunkTracker::setPose(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cdMo)

@@ -20,6 +20,11 @@ namespace
 {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
+using Vector9d = Eigen::Matrix<double, 9, 1>;
+
+/// Inverse of a covariance or an information.
+Matrix6d inverted(const Matrix6d &m) { return MatrixXd(m).llt().solve(MatrixXd::Identity(6, 6)); }
 
 const std::array<Border, 2> kBorders{Border::left, Border::right};
 
@@ -220,6 +225,7 @@ void vpMbTrunkTracker::computeVVSInit()
   m_w.resize(n, false);
   m_w = 1;
   m_piece_weight.resize(n, false);
+  m_by_log_radius.resize(n, false);
 }
 
 void vpMbTrunkTracker::computeVVSInteractionMatrixAndResidu()
@@ -233,6 +239,7 @@ void vpMbTrunkTracker::computeVVSInteractionMatrixAndResidu()
         m_L[at][c] = trunk.L[i][c];
       m_error[at] = trunk.error[i];
       m_piece_weight[at] = trunk.weight[i];
+      m_by_log_radius[at] = trunk.by_log_radius[i];
     }
   }
 }
@@ -245,28 +252,30 @@ void vpMbTrunkTracker::normalEquations(Matrix6d &H, Vector6d &b) const
   unsigned int at = 0;
   for (std::size_t k : m_in_view) {
     const vpMbtDistanceTrunk &trunk = m_trunks[k];
-    const int n = int(trunk.nbFeature);
-    if (n == 0)
+    if (trunk.nbFeature == 0)
       continue;
-    using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
-    const Eigen::Map<const Rows> L(m_L[at], n, 6);
-    const Eigen::Map<const Eigen::VectorXd> e(m_error.data + at, n), w(m_w.data + at, n), share(m_piece_weight.data + at, n);
-    at += unsigned(n);
-    const Eigen::VectorXd W = scale * w.cwiseProduct(share);
-    // the lean of the real trunk about its foot is not in the model: two unknowns with a prior, eliminated
+    // the lean of the real trunk about its foot and its width are not those of the model: three unknowns beside the
+    // six of the camera, with a prior, eliminated
     const bole::Cylinder c = Pose::fromVisp(m_cMo) * trunk.object();
     const Matrix3d cRt = bole::relativeTrunk(c).cRt;
-    Eigen::Matrix<double, 6, 2> turn;
+    Eigen::Matrix<double, 6, 2> lean;
     for (int i = 0; i < 2; ++i)
-      turn.col(i) << cRt.col(i).cross(c.foot), -cRt.col(i);
-    const Eigen::Matrix<double, Eigen::Dynamic, 2> J = L * turn;
-    Eigen::Matrix2d S = J.transpose() * W.asDiagonal() * J;
-    S.diagonal().array() += 1 / (m_options.lean_sigma_rad * m_options.lean_sigma_rad);
-    const Eigen::Matrix<double, 6, 2> LWJ = L.transpose() * W.asDiagonal() * J;
-    const Eigen::Vector2d JWe = J.transpose() * W.cwiseProduct(e);
-    const Eigen::Matrix2d S_inverse = S.inverse();
-    H += L.transpose() * W.asDiagonal() * L - LWJ * S_inverse * LWJ.transpose();
-    b -= L.transpose() * W.cwiseProduct(e) - LWJ * S_inverse * JWe;
+      lean.col(i) << cRt.col(i).cross(c.foot), -cRt.col(i);
+    Matrix9d A = Matrix9d::Zero();
+    Vector9d g = Vector9d::Zero(), row;
+    for (unsigned int i = 0; i < trunk.nbFeature; ++i, ++at) {
+      const Eigen::Map<const Vector6d> l(m_L[at]);
+      row << l, lean.transpose() * l, m_by_log_radius[at];
+      const double weight = scale * m_w[at] * m_piece_weight[at];
+      A.noalias() += weight * row * row.transpose();
+      g -= weight * m_error[at] * row;
+    }
+    A(6, 6) += 1 / (m_options.lean_sigma_rad * m_options.lean_sigma_rad);
+    A(7, 7) += 1 / (m_options.lean_sigma_rad * m_options.lean_sigma_rad);
+    A(8, 8) += 1 / (m_options.radius_sigma * m_options.radius_sigma);
+    const Eigen::Matrix<double, 6, 3> gain = A.topRightCorner<6, 3>() * A.bottomRightCorner<3, 3>().inverse();
+    H += A.topLeftCorner<6, 6>() - gain * A.bottomLeftCorner<3, 6>();
+    b += g.head<6>() - gain * g.tail<3>();
   }
 }
 
@@ -274,7 +283,7 @@ void vpMbTrunkTracker::servo(const Prediction &prediction)
 {
   computeVVSInit();
   m_robust.setMinMedianAbsoluteDeviation(m_options.border_sigma_px / 1.48 / focal());
-  const Matrix6d prior_information = prediction.covariance.inverse();
+  const Matrix6d prior_information = inverted(prediction.covariance);
   for (unsigned int iteration = 0; iteration < m_maxIter; ++iteration) {
     computeVVSInteractionMatrixAndResidu();
     if (m_error.size() > 0)
@@ -286,7 +295,7 @@ void vpMbTrunkTracker::servo(const Prediction &prediction)
     b += prior_information * twistBetween(m_cMo, prediction.cMo);
     Vector6d xi;
     if (isoJoIdentity)
-      xi = H.ldlt().solve(b);
+      xi = inverted(H) * b;
     else { // only the estimated degrees of freedom, given in the object frame
       const Matrix6d V = twistMatrix(m_cMo);
       Matrix6d J;
@@ -294,7 +303,7 @@ void vpMbTrunkTracker::servo(const Prediction &prediction)
         for (unsigned j = 0; j < 6; ++j)
           J(int(i), int(j)) = oJo[i][j];
       const Matrix6d VJ = V * J;
-      const Matrix6d HJ = VJ.transpose() * H * VJ;
+      const MatrixXd HJ = VJ.transpose() * H * VJ;
       xi = VJ * HJ.completeOrthogonalDecomposition().solve(VJ.transpose() * b);
     }
     if (!xi.allFinite())
@@ -341,7 +350,7 @@ Status vpMbTrunkTracker::estimate(const vpImage<unsigned char> &I, const Predict
     Vector6d b;
     normalEquations(H, b);
     predictTrunks(I);
-    const Matrix6d narrowed = (prediction.covariance.inverse() + H).inverse();
+    const Matrix6d narrowed = inverted(inverted(prediction.covariance) + H);
     scanTrunks(I, narrowed, m_options.refine_px);
     choosePeaks(Vector6d::Zero(), m_options.border_sigma_px, 3);
     servo(prediction);
@@ -349,16 +358,39 @@ Status vpMbTrunkTracker::estimate(const vpImage<unsigned char> &I, const Predict
   return support() < m_options.min_support ? Status::lost : Status::tracked;
 }
 
+/// The signed contrast of each border at a pose that the caller vouches for: what the first frame is expected to show.
+void vpMbTrunkTracker::learn(const vpImage<unsigned char> &I)
+{
+  predictTrunks(I);
+  for (const std::size_t k : m_in_view) {
+    m_trunks[k].scan(I, int(m_options.scan_min_px));
+    for (const Border side : kBorders) {
+      const auto &peaks = m_trunks[k].border(side).peaks;
+      int best = -1;
+      double strongest = 0;
+      for (int p = 0; p < int(peaks.size()); ++p) {
+        const double strength = std::abs(peaks[std::size_t(p)].contrast) * (1 - 0.15 * std::abs(peaks[std::size_t(p)].offset_px));
+        if (strength > strongest)
+          strongest = strength, best = p;
+      }
+      m_trunks[k].choose(side, best, 3);
+    }
+    m_trunks[k].remember(m_options.memory_rate);
+    m_trunks[k].remember(m_options.memory_rate); // known for good: signs are believed from two frames on
+  }
+  m_in_view.clear();
+}
+
 void vpMbTrunkTracker::keep(const Prediction &prediction)
 {
   Matrix6d H;
   Vector6d b;
   normalEquations(H, b);
-  m_posterior = (prediction.covariance.inverse() + H).inverse();
+  m_posterior = inverted(inverted(prediction.covariance) + H);
   m_posterior = 0.5 * (m_posterior + m_posterior.transpose()).eval();
   Matrix6d S = Matrix6d::Identity();
   S.diagonal().tail<3>().setConstant(1 / m_options.lever_m);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(S * H * S);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(S * H * S);
   int unobserved = 0;
   while (unobserved < 6 && eigen.eigenvalues()(unobserved) * m_options.unobserved_m * m_options.unobserved_m < 1)
     ++unobserved;

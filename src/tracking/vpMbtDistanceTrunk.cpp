@@ -201,6 +201,7 @@ void vpMbtDistanceTrunk::initInteractionMatrixError()
         nbFeature += piece.used ? 1 : 0;
   L.resize(nbFeature, 6);
   error.resize(nbFeature);
+  by_log_radius.resize(nbFeature);
   weight.resize(nbFeature);
 }
 
@@ -216,7 +217,7 @@ void vpMbtDistanceTrunk::computeInteractionMatrixError(const vpHomogeneousMatrix
     for (const Piece &piece : state.pieces) {
       if (!piece.used)
         continue;
-      error[k] = residual(in_camera, side, m_pinhole.ray(piece.found_px), &row);
+      error[k] = residual(in_camera, side, m_pinhole.ray(piece.found_px), &row, &by_log_radius[k]);
       for (unsigned int c = 0; c < 6; ++c)
         L[k][c] = row(int(c));
       weight[k] = piece.share / m_options.pieces;
@@ -226,12 +227,12 @@ void vpMbtDistanceTrunk::computeInteractionMatrixError(const vpHomogeneousMatrix
 }
 
 double vpMbtDistanceTrunk::residual(const bole::Cylinder &c, Border side, const Vector3d &m,
-                                    Eigen::Matrix<double, 1, 6> *row)
+                                    Eigen::Matrix<double, 1, 6> *row, double *by_log_radius)
 {
   const bole::RelativeTrunk relative = bole::relativeTrunk(c);
   const Vector3d n = relative.borderNormal(side);
   const double h = n.head<2>().norm(), distance = n.dot(m) / h;
-  if (!row)
+  if (!row && !by_log_radius)
     return distance;
   const Vector3d a = relative.cRt.col(2), b = a.cross(n), p = c.foot;
   const double bp = b.dot(p), ap = a.dot(p);
@@ -240,6 +241,10 @@ double vpMbtDistanceTrunk::residual(const bole::Cylinder &c, Border side, const 
   const Vector3d beta_v = n / bp, beta_w = (p.cross(n) - ap * b) / bp;
   // de = (m - distance * (n_x, n_y, 0) / h) . dn / h
   const Vector3d by_n = (m - distance / h * Vector3d(n.x(), n.y(), 0)) / h;
+  if (by_log_radius)
+    *by_log_radius = -by_n.dot(b) * c.radius / bp;
+  if (!row)
+    return distance;
   row->head<3>() = (by_n.dot(b) * beta_v).transpose();
   row->tail<3>() = (by_n.dot(a) * alpha_w + by_n.dot(b) * beta_w).transpose();
   return distance;
