@@ -14,6 +14,7 @@ void MapOptions::validate() const
       throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
   };
   require("map.confirm_observations", confirm_observations, 2, 1000);
+  require("map.confirm_predicted", confirm_predicted, 0, 1000);
   require("map.confirm_parallax", confirm_parallax, 0, 1);
   require("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
   require("map.confirm_evidence", confirm_evidence, -20, 20);
@@ -101,7 +102,8 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk) const
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
 {
   const double r = trunk.trunk.radius();
-  return trunk.observations >= m_options.confirm_observations && trunk.parallax() >= m_options.confirm_parallax &&
+  return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
+         trunk.parallax() >= m_options.confirm_parallax &&
          r >= m_options.radius_min && r <= m_options.radius_max &&
          trunk.positionSigma() <= m_options.confirm_position_sigma && evidence(trunk) >= m_options.confirm_evidence;
 }

@@ -88,6 +88,7 @@ void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
                                  {"flow.detect_lines", &o.detect_lines},
                                  {"flow.detect_window", &o.detect_window},
                                  {"flow.detect_every", &o.detect_every},
+                                 {"flow.adopt_most", &o.adopt_most},
                                  {"flow.view_spacing", &o.view_spacing},
                                  {"flow.trunk_low", &o.trunk_low},
                                  {"flow.trunk_high", &o.trunk_high},
@@ -248,6 +249,7 @@ void addSmoothing(std::vector<OptionEntry> &entries, SmootherOptions &o)
 void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
 {
   entries.insert(entries.end(), {{"map.confirm_observations", &o.confirm_observations},
+                                 {"map.confirm_predicted", &o.confirm_predicted},
                                  {"map.confirm_parallax", &o.confirm_parallax},
                                  {"map.confirm_position_sigma", &o.confirm_position_sigma},
                                  {"map.confirm_evidence", &o.confirm_evidence},

@@ -11,6 +11,7 @@ void FlowOptions::validate() const
     if (!(value >= low && value <= high))
       throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
   };
+  require("flow.adopt_most", adopt_most, 1, 100);
   require("flow.detect_every", detect_every, 1, 100);
   require("flow.view_spacing", view_spacing, 0, 1);
   require("flow.trunk_low", trunk_low, 0, 5);

@@ -324,9 +324,12 @@ void Pipeline::detectNew(FrameResult &result)
     views.push_back({&view.profile, cameraAt(view.pose)});
   result.detections = detectTrunks(views, m_camera, inhibited(),
                                    result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
-  for (const Detection &detection : result.detections)
-    if (!m_map.holds(detection.trunk))
+  int adopted = 0;
+  for (const Detection &detection : result.detections) // best first
+    if (!m_map.holds(detection.trunk) && adopted < m_options.flow.adopt_most) {
       adopt(detection);
+      ++adopted;
+    }
 }
 
 void Pipeline::detectSingle(FrameResult &result)

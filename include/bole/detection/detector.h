@@ -29,8 +29,8 @@ struct DetectorOptions
   double agreement_min = 0.65; ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;    ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;      ///< [px]
-  double rms_max_px = 0.7;     ///< of the inliers, [px]
-  double parallax_min = 0.04;  ///< angle between the first and the last line of sight, [rad]
+  double rms_max_px = 0.85;    ///< of the inliers, [px]
+  double parallax_min = 0.03;  ///< angle between the first and the last line of sight, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   int views_min = 5;           ///< views within the window that see both borders
   double near_range = 5.5;     ///< nearer than this a trunk must be foreground [m], 0 (off) to 100

@@ -22,14 +22,15 @@ namespace bole
 struct MapOptions
 {
   int confirm_observations = 10;      ///< views before a candidate may be confirmed, 2 to 1000
+  int confirm_predicted = 3;          ///< of them after it was found, where its place was predicted, 0 to 1000
   double confirm_parallax = 0.05;     ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
   double confirm_position_sigma = 0.40; ///< standard deviation of the place at which it may be [m], 0.01 to 10
-  double confirm_evidence = 0;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
+  double confirm_evidence = 0.5;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
                                       ///< trunks, and fewer that are none
   int doubt_observations = 8;         ///< views before a trunk may be given up for its evidence, 3 to 1000
-  double doubt_candidate = -4;        ///< log odds below which a candidate is given up, -50 to 0
+  double doubt_candidate = -3;        ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;      ///< log odds below which a confirmed trunk is, -50 to 0
-  double doubt_rival = 2;             ///< log odds by which another candidate for the same place must be better for one
+  double doubt_rival = 1.5;             ///< log odds by which another candidate for the same place must be better for one
                                       ///< to be given up, 0 to 50
   double near_range = 5.5;            ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
   double innovation_unit_px = 1;      ///< rms of prediction against what was found that counts as one pixel of a camera

@@ -30,6 +30,8 @@ struct FlowOptions
   bool detect_lines = false;     ///< the one-frame detector too; always on where no odometry gives a range
   bool detect_window = true;     ///< the detector that asks a window of frames
   int detect_every = 1;          ///< frames between two runs of the detector, 1 to 100
+  int adopt_most = 3;            ///< detections that become candidates in one frame, the best, 1 to 100: each costs
+                                 ///< time and, while it is wrong, pulls on the trajectory
   double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
   double trunk_low = 0.25;       ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
   double trunk_high = 2.6;       ///< ... to [m]; its middle is near breast height, where radii are told
