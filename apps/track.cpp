@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <deque>
 #include <fmt/format.h>
 #include <memory>
@@ -138,6 +139,8 @@ void report(const Arguments &arguments, const TrackOutput &output, std::size_t c
 
 void track(const Arguments &arguments)
 {
+  if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
+    throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
   const PipelineOptions options = readOptions(arguments);
   const auto source = openInput(arguments);
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());

@@ -21,10 +21,10 @@ struct Outcome
   std::string text;
 };
 
-Outcome run(const std::string &arguments)
+Outcome run(const std::string &arguments, const std::string &launcher = "")
 {
   Outcome outcome;
-  FILE *pipe = popen((std::string(BOLE_EXECUTABLE) + " " + arguments + " 2>&1").c_str(), "r");
+  FILE *pipe = popen((launcher + BOLE_EXECUTABLE + " " + arguments + " 2>&1").c_str(), "r");
   std::array<char, 4096> buffer;
   while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
     outcome.text.append(buffer.data(), n);
@@ -112,5 +112,23 @@ TEST(Track, PassesOverATruncatedImage)
   ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video --frames 12").status, 0);
   const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
   EXPECT_THAT(summary.at("frames").dump(), HasSubstr("corrupt"));
+}
+
+TEST(Track, ShowsItsOverlayInAWindow)
+{
+  if (std::system("command -v xvfb-run >/dev/null") != 0)
+    GTEST_SKIP() << "xvfb-run is not installed";
+  const std::string folder = freshFolder("show");
+  const Outcome outcome = run("track " + kFlight + " -o " + folder + " --frames 5 --no-video --show", "xvfb-run -a ");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_TRUE(fs::exists(folder + "/trunks.csv"));
+}
+
+TEST(Track, SaysThatThereIsNoDisplayToShowItOn)
+{
+  const Outcome outcome =
+      run("track " + kFlight + " -o " + freshFolder("no_display") + " --frames 5 --no-video --show", "env -u DISPLAY ");
+  EXPECT_NE(outcome.status, 0);
+  EXPECT_THAT(outcome.text, HasSubstr("--show: DISPLAY is not set"));
 }
 } // namespace
