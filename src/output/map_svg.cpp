@@ -93,9 +93,17 @@ std::string trunk(const Sheet &sheet, const TrunkRecord &record)
                      x, y, r, x + r + 3, y - r - 1, record.id);
 }
 
+std::string escaped(const std::string &text)
+{
+  std::string xml;
+  for (const char c : text)
+    xml += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return xml;
+}
+
 std::string legend(const MapPicture &picture)
 {
-  std::string text = fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", picture.title);
+  std::string text = fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", escaped(picture.title));
   double y = 40;
   const auto entry = [&](bool shown, const char *colour, const char *name) {
     if (!shown)
