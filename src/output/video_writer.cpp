@@ -69,6 +69,7 @@ struct VideoWriter::Libav
   std::unique_ptr<SwsContext, Release<SwsContext, releaseScaler>> scaler;
   unsigned width = 0, height = 0;
   std::int64_t first_ns = 0, last_pts = -1;
+  std::int64_t step = kTimeBase.den / 25; ///< between the last two pictures, how long the last one is shown
   std::size_t pictures = 0;
 };
 
@@ -127,6 +128,7 @@ void VideoWriter::Libav::encode(const AVFrame *picture)
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF)
       return;
     check(code, "a picture cannot be encoded");
+    packet->duration = step; // of no duration, the last picture would end before it begins and never be shown
     av_packet_rescale_ts(packet.get(), kTimeBase, format->streams[0]->time_base);
     check(av_interleaved_write_frame(format.get(), packet.get()), "cannot be written");
   }
@@ -159,6 +161,8 @@ void VideoWriter::write(const vpImage<vpRGBa> &picture, std::int64_t stamp_ns)
   const auto *pixels = reinterpret_cast<const std::uint8_t *>(picture.bitmap);
   const int stride = static_cast<int>(4 * picture.getWidth());
   sws_scale(libav.scaler.get(), &pixels, &stride, 0, libav.frame->height, libav.frame->data, libav.frame->linesize);
+  if (libav.last_pts >= 0)
+    libav.step = pts - libav.last_pts;
   libav.frame->pts = pts;
   libav.last_pts = pts;
   libav.encode(libav.frame.get());

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What people look at: the overlay, the videos, the map, the progress line.
+#include <bole/input/video_source.h>
+#include <bole/output/map_svg.h>
+#include <bole/output/overlay.h>
+#include <bole/output/progress.h>
+#include <bole/output/video_writer.h>
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <functional>
+#include <regex>
+#include <visp3/core/vpException.h>
+
+namespace
+{
+using namespace bole;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+const PinholeCamera kCamera;
+
+OverlayTrunk trunkAhead(TrunkStatus status = TrunkStatus::confirmed)
+{
+  Trunk trunk;
+  trunk.xy = {3, 0};
+  trunk.log_radius = std::log(0.3);
+  OverlayTrunk ahead;
+  ahead.id = 4;
+  ahead.status = status;
+  ahead.relative =
+      relativeTrunk(Pose((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0, 0, 1.2}), Pose(), trunk);
+  return ahead;
+}
+
+double distanceOf(const vpRGBa &a, const vpRGBa &b)
+{
+  return std::hypot(std::hypot(double(a.R) - b.R, double(a.G) - b.G), double(a.B) - b.B);
+}
+
+/// Pixels that are near the colour of the trunk's id, over the image without the bar of text.
+int coloured(const vpImage<vpRGBa> &picture, int id, double within = 60)
+{
+  int count = 0;
+  for (unsigned v = 0; v < 480; ++v)
+    for (unsigned u = 0; u < picture.getWidth(); ++u)
+      count += distanceOf(picture[v][u], colourOf(id)) < within;
+  return count;
+}
+
+vpImage<vpRGBa> drawnWith(const Overlay &overlay)
+{
+  return drawOverlay(vpImage<unsigned char>(240, 320, 20), kCamera, overlay);
+}
+
+TEST(Overlay, DrawsTheBordersWhereTheCameraSeesThem)
+{
+  Overlay overlay;
+  overlay.trunks = {trunkAhead()};
+  const vpImage<vpRGBa> picture = drawnWith(overlay);
+  ASSERT_EQ(picture.getWidth(), 640u); // twice as large, and the bar below
+  ASSERT_GT(picture.getHeight(), 480u);
+  for (const Border border : {Border::left, Border::right}) {
+    const Eigen::Vector2d u = kCamera.project(overlay.trunks[0].relative.borderDirection(border, 0.1));
+    const auto column = static_cast<unsigned>(std::lround(2 * u.x() + 0.5)), row = static_cast<unsigned>(std::lround(2 * u.y() + 0.5));
+    EXPECT_LT(distanceOf(picture[row][column], colourOf(4)), 60);
+    const unsigned outside = border == Border::left ? column - 20 : column + 20;
+    EXPECT_LT(distanceOf(picture[row][outside], vpRGBa(20, 20, 20, 255)), 10);
+  }
+}
+
+TEST(Overlay, TellsCandidatesFromConfirmedAndPredictedFromObserved)
+{
+  const auto count = [](TrunkStatus status, bool is_observed) {
+    Overlay overlay;
+    overlay.trunks = {trunkAhead(status)};
+    overlay.trunks[0].is_observed = is_observed;
+    return coloured(drawnWith(overlay), 4);
+  };
+  const int confirmed = count(TrunkStatus::confirmed, true), candidate = count(TrunkStatus::candidate, true);
+  EXPECT_LT(candidate, 0.8 * confirmed);                             // thin
+  EXPECT_LT(count(TrunkStatus::candidate, false), 0.8 * candidate); // dashed
+  EXPECT_GT(count(TrunkStatus::candidate, false), 0);
+}
+
+TEST(Overlay, ShowsTheForegroundAsAnInsetOnlyWhenThereIsOne)
+{
+  Overlay overlay;
+  const vpImage<vpRGBa> without = drawnWith(overlay);
+  overlay.foreground.resize(24, 32);
+  for (unsigned i = 0; i < overlay.foreground.getSize(); ++i)
+    overlay.foreground.bitmap[i] = i % 32 < 16 ? 0.f : 1.f;
+  const vpImage<vpRGBa> with = drawnWith(overlay);
+  EXPECT_LT(distanceOf(without[60][600], vpRGBa(20, 20, 20, 255)), 5);
+  EXPECT_GT(with[60][610].R, with[60][610].B); // near on the right: orange
+  EXPECT_LT(with[60][490].R, with[60][490].B); // far on the left: blue
+  EXPECT_LT(distanceOf(with[300][600], vpRGBa(20, 20, 20, 255)), 5);
+}
+
+TEST(Overlay, DrawsAFrameWithoutImageGreyAndOfTheSameSize)
+{
+  Overlay overlay;
+  overlay.text = "missing";
+  const vpImage<vpRGBa> picture = drawOverlay(vpImage<unsigned char>(), kCamera, overlay);
+  EXPECT_EQ(picture.getWidth(), 640u);
+  EXPECT_EQ(picture.getHeight(), drawnWith(overlay).getHeight());
+  EXPECT_LT(distanceOf(picture[100][100], vpRGBa(96, 96, 96, 255)), 5);
+}
+
+TEST(Overlay, SurvivesATrunkThatIsNoNumberOrBehindTheCamera)
+{
+  Overlay overlay;
+  overlay.trunks = {trunkAhead(), trunkAhead()};
+  overlay.trunks[0].relative.log_ratio = std::nan("");
+  overlay.trunks[1].relative.cRt.col(0) *= -1;
+  overlay.trunks[1].relative.cRt.col(1) *= -1;
+  EXPECT_EQ(coloured(drawnWith(overlay), 4), 0);
+}
+
+TEST(Overlay, NeighbouringIdsHaveColoursThatDiffer)
+{
+  for (int id = 0; id < 30; ++id)
+    EXPECT_GT(distanceOf(colourOf(id), colourOf(id + 1)), 80) << id;
+}
+
+TEST(Overlay, PutsTheSaliencyBesideTheImage)
+{
+  const vpImage<float> foreground(24, 32, 1.f);
+  const vpImage<vpRGBa> both = drawSaliency(vpImage<unsigned char>(240, 320, 20), kCamera, foreground, "text");
+  ASSERT_EQ(both.getWidth(), 1280u);
+  EXPECT_LT(distanceOf(both[100][100], vpRGBa(20, 20, 20, 255)), 5);
+  EXPECT_GT(both[100][1000].R, 200);
+}
+
+vpImage<vpRGBa> card(int i)
+{
+  vpImage<vpRGBa> picture(65, 97); // odd: the last row and column are lost
+  for (unsigned v = 0; v < 65; ++v)
+    for (unsigned u = 0; u < 97; ++u) {
+      const auto grey = static_cast<unsigned char>(40 + 12 * i + (u > 48 ? 60 : 0));
+      picture[v][u] = vpRGBa(grey, grey, grey, 255);
+    }
+  return picture;
+}
+
+std::string freshVideo(const std::string &name)
+{
+  const std::string path = testing::TempDir() + "bole_" + name + ".mp4";
+  fs::remove(path);
+  return path;
+}
+
+TEST(VideoWriter, GivesBackEveryPictureWithItsTime)
+{
+  const std::string path = freshVideo("round_trip");
+  const std::vector<std::int64_t> stamps_ms = {5000, 5100, 5200, 5350, 5400, 6400, 6500, 6533};
+  {
+    VideoWriter video(path);
+    for (std::size_t i = 0; i < stamps_ms.size(); ++i)
+      video.write(card(static_cast<int>(i)), stamps_ms[i] * 1000000);
+    EXPECT_EQ(video.pictures(), stamps_ms.size());
+    EXPECT_FALSE(fs::exists(path)); // not before it is whole
+    video.finish();
+  }
+  VideoSource read(path);
+  EXPECT_EQ(read.size(), stamps_ms.size());
+  for (std::size_t i = 0; i < stamps_ms.size(); ++i) {
+    Frame frame;
+    ASSERT_TRUE(read.next(frame)) << i;
+    EXPECT_EQ(frame.status, FrameStatus::ok) << i;
+    EXPECT_EQ(frame.image.getWidth(), 96u);
+    EXPECT_EQ(frame.image.getHeight(), 64u);
+    EXPECT_NEAR(static_cast<double>(frame.stamp_ns) * 1e-6, static_cast<double>(stamps_ms[i] - 5000), 0.1);
+    EXPECT_NEAR(frame.image[32][20], 40 + 12 * static_cast<int>(i), 4);
+    EXPECT_NEAR(frame.image[32][80], 100 + 12 * static_cast<int>(i), 4);
+  }
+  Frame end;
+  EXPECT_FALSE(read.next(end));
+}
+
+TEST(VideoWriter, LeavesNothingWithoutFinish)
+{
+  const std::string path = freshVideo("unfinished");
+  const auto files = [&] {
+    int count = 0;
+    for (const auto &entry : fs::directory_iterator(fs::path(path).parent_path()))
+      count += entry.path().filename().string().find("bole_unfinished") != std::string::npos;
+    return count;
+  };
+  {
+    VideoWriter video(path);
+    video.write(card(0), 0);
+    video.write(card(1), 40000000);
+  }
+  EXPECT_EQ(files(), 0);
+}
+
+TEST(VideoWriter, DropsAPictureWhoseTimeDoesNotRiseAndRefusesAnotherSize)
+{
+  VideoWriter video(freshVideo("rules"));
+  video.write(card(0), 1000000000);
+  video.write(card(1), 1000000000);
+  EXPECT_EQ(video.pictures(), 1u);
+  EXPECT_THROW(video.write(vpImage<vpRGBa>(64, 64), 2000000000), vpException);
+}
+
+MapPicture smallMap()
+{
+  MapPicture picture;
+  picture.title = "a walk";
+  for (int i = 0; i < 5; ++i)
+    picture.smoothed.push_back({i, Pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0, 1})});
+  TrunkRecord trunk;
+  trunk.xy = {2, 1};
+  trunk.radius = 0.2;
+  trunk.covariance_xy = Eigen::Vector2d(0.04, 0.01).asDiagonal();
+  trunk.status = TrunkStatus::confirmed;
+  picture.trunks.push_back(trunk);
+  return picture;
+}
+
+/// The number that follows \p name in the first tag that matches.
+double numberIn(const std::string &svg, const std::string &tag, const std::string &name)
+{
+  std::smatch match;
+  const std::regex pattern("<" + tag + "[^>]*\\b" + name + "=\"([-0-9.]+)\"");
+  return std::regex_search(svg, match, pattern) ? std::stod(match[1]) : NAN;
+}
+
+int circlesIn(const std::string &svg)
+{
+  const std::regex circle("<circle");
+  return static_cast<int>(std::distance(std::sregex_iterator(svg.begin(), svg.end(), circle), std::sregex_iterator()));
+}
+
+TEST(MapSvg, DrawsTrunksToScaleWithTheirTwoSigmaEllipse)
+{
+  const std::string svg = toSvg(smallMap());
+  EXPECT_NEAR(numberIn(svg, "circle", "r"), 40 * 0.2, 0.06);
+  EXPECT_NEAR(numberIn(svg, "ellipse", "rx"), 40 * 2 * 0.2, 0.06);
+  EXPECT_NEAR(numberIn(svg, "ellipse", "ry"), 40 * 2 * 0.1, 0.06);
+  // the sheet begins 1.5 m left of the path and ends 1.5 m above the trunk
+  EXPECT_NEAR(numberIn(svg, "circle", "cx"), 40 * 3.5, 0.06);
+  EXPECT_NEAR(numberIn(svg, "circle", "cy"), 40 * 1.5, 0.06);
+}
+
+TEST(MapSvg, LeavesOutWhatIsLostOrMergedAndOutlinesCandidates)
+{
+  MapPicture picture = smallMap();
+  const auto circles = [&](TrunkStatus status) {
+    picture.trunks[0].status = status;
+    return circlesIn(toSvg(picture));
+  };
+  EXPECT_EQ(circles(TrunkStatus::confirmed), 1);
+  EXPECT_EQ(circles(TrunkStatus::candidate), 1);
+  EXPECT_THAT(toSvg(smallMap()), HasSubstr("<ellipse"));
+  EXPECT_EQ(circles(TrunkStatus::lost), 0);
+  EXPECT_EQ(circles(TrunkStatus::merged), 0);
+}
+
+TEST(MapSvg, DrawsTheTruthOnlyWhereItIsKnown)
+{
+  MapPicture picture = smallMap();
+  EXPECT_THAT(toSvg(picture), testing::Not(HasSubstr("truth")));
+  picture.truth = picture.smoothed;
+  picture.truth_trunks = {{7, {2.1, 1.1}, 0.2, 0}, {8, {50, 50}, 0.2, 0}}; // the second is outside the sheet
+  const std::string svg = toSvg(picture);
+  EXPECT_THAT(svg, HasSubstr("trajectory, truth"));
+  EXPECT_EQ(circlesIn(svg), 2);
+}
+
+TEST(MapSvg, IsXmlWhateverTheTitle)
+{
+  MapPicture picture = smallMap();
+  picture.title = "frames <1> & \"2\"";
+  EXPECT_THAT(toSvg(picture), HasSubstr("frames &lt;1&gt; &amp; &quot;2&quot;"));
+}
+
+TEST(MapSvg, OfNothingIsAPictureToo)
+{
+  EXPECT_THAT(toSvg(MapPicture()), testing::AllOf(testing::StartsWith("<svg"), testing::EndsWith("</svg>\n")));
+}
+
+std::string printed(const std::function<void(Progress &)> &run, std::size_t frames, double interval_s)
+{
+  std::FILE *file = std::tmpfile();
+  {
+    Progress progress(frames, file, interval_s);
+    run(progress);
+  }
+  std::rewind(file);
+  std::string text(4096, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), file));
+  std::fclose(file);
+  return text;
+}
+
+TEST(Progress, SaysWhereItIs)
+{
+  EXPECT_EQ(Progress::text(50, 200, 12.34, 3, "", false), "frame 50 of 200  12.3 frames/s  3 trunks");
+  EXPECT_EQ(Progress::text(50, 0, 12.34, 1, "stale", false), "frame 50  12.3 frames/s  1 trunk  stale");
+  EXPECT_THAT(Progress::text(50, 200, 1, 0, "", true), testing::StartsWith("[#######.....................] "));
+  EXPECT_THAT(Progress::text(300, 200, 1, 0, "", true), testing::StartsWith("[############################] "));
+}
+
+TEST(Progress, PrintsALineEverySoOftenWhereThereIsNoTerminal)
+{
+  const auto frames = [](Progress &progress) {
+    for (std::size_t i = 1; i <= 20; ++i)
+      progress.update(i, 2, "ok");
+  };
+  const std::string all = printed(frames, 20, 0), last = printed(frames, 20, 1e6);
+  EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 20);
+  EXPECT_EQ(std::count(last.begin(), last.end(), '\n'), 1); // finish() tells the end
+  EXPECT_THAT(last, testing::StartsWith("frame 20 of 20"));
+  EXPECT_THAT(all, testing::Not(HasSubstr("\r")));
+  EXPECT_EQ(printed([](Progress &) {}, 20, 0), "");
+}
+} // namespace
