@@ -30,14 +30,14 @@ void addEvaluate(CLI::App &app)
       ->required();
   command->add_flag("-v,--verbose", arguments->is_verbose,
                     "List every match, miss and false positive");
-  command->add_flag("--align-start", arguments->options.align_start,
-                    "Lay the run's first frame on the sequence's: for live runs, whose stamps are "
+  command->add_flag("--align-time", arguments->options.align_time,
+                    "Shift the run's stamps so that its motion fits: for live runs, whose stamps are "
                     "the drone's");
   command->footer("Prints a table and writes RUN/evaluation.json.\n"
                   "Examples:\n"
                   "  bole evaluate run/park data/park-forward --verbose\n"
-                  "  bole evaluate run/live data/park-forward --align-start\n"
-                  "  bole evaluate run/live run/park --align-start");
+                  "  bole evaluate run/live data/park-forward --align-time\n"
+                  "  bole evaluate run/live run/park --align-time");
   command->callback([arguments] {
     const Evaluation evaluation = 
         evaluate(arguments->run, arguments->sequence, arguments->options);

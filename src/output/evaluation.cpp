@@ -97,17 +97,19 @@ std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns,
     throw vpException(
         vpException::badValue,
         fmt::format("{}: none of its stamps lies in the ground truth's; if the run was live, "
-                    "--align-start lays its first frame on the sequence's",
+                    "--align-time finds the shift of its clock",
                     path));
   return pairs;
 }
 
-std::int64_t startOf(const std::string &path)
+/// First frame on first frame, less the frames that a live run may have lost.
+std::int64_t shiftOf(const std::string &path, const Reference &reference)
 {
   const Trajectory estimate = readTumTrajectory(path);
   if (estimate.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no poses", path));
-  return estimate.front().stamp_ns;
+  return motionShift(estimate, reference.trajectory,
+                     reference.first_stamp_ns - estimate.front().stamp_ns);
 }
 } // namespace
 
@@ -128,8 +130,8 @@ Evaluation evaluate(const std::string &run, const std::string &sequence,
       evaluation.is_against_run ? readRun(sequence) : readSequence(sequence);
   evaluation.frames = reference.frames;
   std::int64_t shift_ns = 0;
-  if (options.align_start) {
-    shift_ns = reference.first_stamp_ns - startOf(in_run("trajectory.tum"));
+  if (options.align_time) {
+    shift_ns = shiftOf(in_run("trajectory.tum"), reference);
     evaluation.time_shift_s = static_cast<double>(shift_ns) * 1e-9;
   }
 

@@ -186,7 +186,7 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
   add(text, "{} against {}: {} of {} frames\n\n", evaluation.run, evaluation.sequence,
       evaluation.smoothed.absolute[0].poses, evaluation.frames);
   if (evaluation.time_shift_s)
-    add(text, "  The run's stamps were shifted by {:+.3f} s: first frame on first frame.\n\n",
+    add(text, "  The run's stamps were shifted by {:+.3f} s, for its motion to fit.\n\n",
         *evaluation.time_shift_s);
   add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]",
       "x, y, yaw", "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");

@@ -3,6 +3,7 @@
 #include <bole/output/trajectory_metrics.h>
 
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -63,6 +64,36 @@ std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &tr
     if (const auto wMb_truth = interpolate(truth, pose.stamp_ns))
       pairs.push_back({pose.stamp_ns, pose.wMb, *wMb_truth});
   return pairs;
+}
+
+std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
+                         std::int64_t start_ns, double range_s)
+{
+  const auto error = [&](std::int64_t shift_ns) {
+    Trajectory shifted = estimate;
+    for (StampedPose &pose : shifted)
+      pose.stamp_ns += shift_ns;
+    const auto pairs = pairPoses(shifted, truth);
+    const RelativeErrors relative = relativeErrors(pairs, 0.3);
+    if (2 * pairs.size() < estimate.size() || relative.intervals == 0)
+      return std::numeric_limits<double>::infinity();
+    return relative.translation + relative.rotation_deg * kDegree;
+  };
+  std::int64_t best_ns = start_ns;
+  double least = error(start_ns);
+  const auto search = [&](std::int64_t range_ns, std::int64_t step_ns) {
+    const std::int64_t middle_ns = best_ns;
+    for (std::int64_t shift_ns = middle_ns - range_ns; shift_ns <= middle_ns + range_ns;
+         shift_ns += step_ns)
+      if (const double value = error(shift_ns); value < least) {
+        least = value;
+        best_ns = shift_ns;
+      }
+  };
+  constexpr std::int64_t kMillisecond_ns = 1'000'000;
+  search(std::llround(range_s * 1e9), 20 * kMillisecond_ns);
+  search(20 * kMillisecond_ns, kMillisecond_ns);
+  return best_ns;
 }
 
 PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment)

@@ -22,9 +22,8 @@ struct TrajectoryReport
 
 struct EvaluationOptions
 {
-  /// The run's first pose is at the stamp of the sequence's first frame: for live flights, whose
-  /// stamps are the drone's.
-  bool align_start = false;
+  /// For live flights, whose stamps are the drone's: shift the run's stamps by motionShift().
+  bool align_time = false;
 };
 
 struct Evaluation

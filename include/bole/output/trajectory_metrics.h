@@ -44,6 +44,13 @@ struct PosePair
 /// Pairs at the stamps of \p estimate that lie within the range of \p truth.
 std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &truth);
 
+/// What must be added to the stamps of \p estimate [ns] for its motion to be that of \p truth: of
+/// the shifts within \p range_s of \p start_ns, the one with the least relative error (translation
+/// in m plus rotation in rad, over 0.3 s), to a millisecond. Where the two lie in the world does not
+/// matter; a flight that changes neither speed nor attitude says nothing of its time.
+std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
+                         std::int64_t start_ns, double range_s = 2);
+
 /// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products
 /// of the centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory
 /// that does not move keeps scale 1.
