@@ -13,6 +13,7 @@ namespace bole
 namespace
 {
 constexpr double kShapeTolerance = 0.01;
+constexpr std::int64_t kMotionWait_ns = 1'500'000'000; // longer than clocks and navdata take to settle
 
 /// \p camera for images of \p width x \p height: its own size, or the same shape larger or smaller.
 CameraModel fitted(CameraModel camera, int width, int height, const std::string &where)
@@ -62,7 +63,7 @@ struct ArDroneSource::State
   MountedCamera mounted;
   std::unique_ptr<Rectifier> rectifier;
   std::atomic<bool> running{true};
-  bool first_is_waiting = true; // the frame that the constructor waited for
+  bool first_is_waiting = false; // the frame that the constructor waited for
   std::size_t index = 0;
   std::int64_t last_stamp_ns = 0, last_new_ns = 0;
 
@@ -78,6 +79,19 @@ struct ArDroneSource::State
       mounted.model = fitted(mounted.model, width, height, address.camera_path);
     }
     rectifier = std::make_unique<Rectifier>(mounted.model, options.max_width_px);
+  }
+
+  /// The first frames have no odometry worth the name: the delays of the link are not known yet.
+  void awaitMotion(vpImage<unsigned char> &image)
+  {
+    const std::int64_t end_ns = steadyNowNs() + kMotionWait_ns;
+    const auto is_good = [this] {
+      const LiveFrame &live = grabber.getFrame();
+      return live.status == FrameStatus::ok && live.body;
+    };
+    while (!is_good() && steadyNowNs() < end_ns)
+      grabber.acquire(image);
+    first_is_waiting = grabber.getStatus() == FrameStatus::ok;
   }
 
   /// What came off the air as a frame of the pipeline.
@@ -131,6 +145,7 @@ ArDroneSource::ArDroneSource(const ArDroneAddress &address, const Options &optio
   vpImage<unsigned char> first;
   m_state->grabber.open(first);
   m_state->chooseCamera(first);
+  m_state->awaitMotion(first);
   m_state->last_new_ns = steadyNowNs();
 }
 

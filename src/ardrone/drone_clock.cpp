@@ -42,6 +42,8 @@ void ClockFit::Options::validate() const
     throw vpException(vpException::badValue, "drift = %g, must be in (1e-6, 1e-2) s/s", drift);
   if (!(jump_s > 0.1 && jump_s < 100))
     throw vpException(vpException::badValue, "jump_s = %g, must be in (0.1, 100) s", jump_s);
+  if (!(settle_s >= 0 && settle_s <= 60))
+    throw vpException(vpException::badValue, "settle_s = %g, must be in [0, 60] s", settle_s);
 }
 
 ClockFit::ClockFit() : ClockFit(Options{}) {}
@@ -55,6 +57,7 @@ bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
       !first && std::abs(static_cast<double>(offset - *m_offset_ns)) > m_options.jump_s * 1e9;
   if (first || jump) {
     m_offset_ns = offset;
+    m_first_host_ns = host_ns;
   }
   else {
     const double elapsed_ns =
@@ -64,5 +67,11 @@ bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
   }
   m_last_host_ns = host_ns;
   return !jump;
+}
+
+bool ClockFit::isReady() const
+{
+  return m_offset_ns &&
+         static_cast<double>(m_last_host_ns - m_first_host_ns) * 1e-9 >= m_options.settle_s;
 }
 } // namespace bole

@@ -56,3 +56,15 @@ TEST(ClockFit, StartsAnewAfterAReboot)
   EXPECT_EQ(fit.toHost(1'000'000), 6'001'000'000);
   EXPECT_EQ(fit.toDrone(6'001'000'000), 1'000'000);
 }
+
+TEST(ClockFit, IsNotReadyBeforeAFastPacketMayHaveCome)
+{
+  ClockFit fit; // 0.3 s
+  fit.add(0, 1'000'000'000 + 90'000'000); // the first packet was slow
+  EXPECT_FALSE(fit.isReady());
+  fit.add(100'000'000, 1'100'000'000 + 1'000'000);
+  EXPECT_FALSE(fit.isReady());
+  fit.add(400'000'000, 1'400'000'000 + 30'000'000);
+  EXPECT_TRUE(fit.isReady());
+  EXPECT_NEAR(static_cast<double>(fit.toHost(400'000'000)), 1.401e9, 1e5);
+}

@@ -42,7 +42,8 @@ public:
     void validate() const;
   };
 
-  /// Connects and waits for the first whole frame; throws vpException when none comes, for a wrong
+  /// Connects and waits for the first whole frame whose motion is known (see ClockFit::isReady(); the
+  /// first whole one where no navdata come); throws vpException when none comes, for a wrong
   /// address or camera file, and for a camera of another shape.
   explicit ArDroneSource(const std::string &address);
   ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap = {});

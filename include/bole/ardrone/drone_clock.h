@@ -48,6 +48,7 @@ public:
   {
     double drift = 200e-6; ///< [s/s] largest drift of two cheap quartz clocks, (1e-6, 1e-2)
     double jump_s = 5;     ///< [s] beyond any delay of a link that still works, (0.1, 100)
+    double settle_s = 0.3; ///< [s], [0, 60]: until some packet will have come without delay
     void validate() const;
   };
   ClockFit();
@@ -55,7 +56,8 @@ public:
 
   /// \return false when the drone's clock jumped and the fit began anew.
   bool add(std::int64_t drone_ns, std::int64_t host_ns);
-  bool isReady() const { return m_offset_ns.has_value(); }
+  /// Whether it has seen settle_s of packets: before, the offset may hold the delay of the first.
+  bool isReady() const;
   std::int64_t toHost(std::int64_t drone_ns) const { return drone_ns + m_offset_ns.value_or(0); }
   std::int64_t toDrone(std::int64_t host_ns) const { return host_ns - m_offset_ns.value_or(0); }
   void reset() { m_offset_ns.reset(); }
@@ -63,6 +65,6 @@ public:
 private:
   Options m_options;
   std::optional<std::int64_t> m_offset_ns;
-  std::int64_t m_last_host_ns = 0;
+  std::int64_t m_first_host_ns = 0, m_last_host_ns = 0;
 };
 } // namespace bole
