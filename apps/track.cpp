@@ -6,6 +6,7 @@
 
 #include <bole/ardrone/ardrone_source.h>
 #include <bole/input/open_source.h>
+#include <bole/input/video_source.h>
 #include <bole/output/progress.h>
 #include <bole/pipeline/config.h>
 
@@ -42,9 +43,14 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments)
   return std::make_unique<ArDroneSource>(ArDroneAddress::parse(arguments.input), options);
 }
 
-PipelineOptions readOptions(const Arguments &arguments)
+bool isCompressed(const FrameSource &source)
 {
-  PipelineOptions options;
+  return dynamic_cast<const ArDroneSource *>(&source) != nullptr || dynamic_cast<const VideoSource *>(&source) != nullptr;
+}
+
+PipelineOptions readOptions(const Arguments &arguments, bool is_compressed)
+{
+  PipelineOptions options = is_compressed ? forCompressedVideo() : PipelineOptions();
   if (!arguments.config.empty())
     readConfig(arguments.config, options);
   for (const std::string &setting : arguments.settings)
@@ -141,14 +147,16 @@ void track(const Arguments &arguments)
 {
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
     throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
-  const PipelineOptions options = readOptions(arguments);
+  readOptions(arguments, false); // a mistake in them is said before the input is waited for
   const auto source = openInput(arguments);
+  const PipelineOptions options = readOptions(arguments, isCompressed(*source));
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   if (!source->note().empty())
     std::fprintf(stderr, "bole: %s\n", source->note().c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
-  TrackOutput output(arguments.run, arguments.input, arguments.config, *source, arguments.has_video);
+  const std::string preset = arguments.config.empty() && isCompressed(*source) ? "compressed" : arguments.config;
+  TrackOutput output(arguments.run, arguments.input, preset, *source, arguments.has_video);
   Window window(arguments.is_shown);
   Flight flight(pipeline, output, window);
   Progress progress(source->size(), stderr);
@@ -188,7 +196,8 @@ void addTrack(CLI::App &app)
                       "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
       ->required();
   command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
-  command->add_option("--config", arguments->config, "YAML file of options (config/paper.yaml: the paper's method)");
+  command->add_option("--config", arguments->config, "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
+                      "config/compressed.yaml)");
   command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path,

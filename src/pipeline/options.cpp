@@ -35,4 +35,11 @@ void PipelineOptions::validate() const
   smoothing.validate();
   map.validate();
 }
+
+PipelineOptions forCompressedVideo()
+{
+  PipelineOptions options;
+  options.points.relative_pose.min_sigma_px = 0.2;
+  return options;
+}
 } // namespace bole

@@ -64,6 +64,14 @@ TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
   EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone2.yaml").model.pinhole.width, 640);
 }
 
+TEST(Config, CompressedPresetIsWhatTheCodeHas)
+{
+  PipelineOptions options;
+  readConfig(BOLE_SOURCE_DIR "/config/compressed.yaml", options);
+  EXPECT_EQ(toYaml(options), toYaml(forCompressedVideo()));
+  EXPECT_NE(toYaml(options), toYaml(PipelineOptions()));
+}
+
 TEST(Config, ReadingWhatWasWrittenChangesNothing)
 {
   PipelineOptions options;
