@@ -152,6 +152,7 @@ void addSaliency(std::vector<OptionEntry> &entries, SaliencyOptions &o)
   entries.insert(entries.end(), {{"saliency.sigma_intensity", &o.sigma_intensity},
                                  {"saliency.sigma_background_px", &o.sigma_background_px},
                                  {"saliency.sigma_foreground_px", &o.sigma_foreground_px},
+                                 {"saliency.label_window_px", &o.label_window_px},
                                  {"saliency.background_prior", &o.background_prior},
                                  {"saliency.foreground_mean_zero", &o.foreground_mean_zero},
                                  {"saliency.linear_flow", &o.linear_flow},
@@ -162,6 +163,8 @@ void addSaliency(std::vector<OptionEntry> &entries, SaliencyOptions &o)
                                  {"saliency.sigma_rotation_pull", &o.sigma_rotation_pull},
                                  {"saliency.sample_correlation", &o.sample_correlation},
                                  {"saliency.use_translation", &o.use_translation},
+                                 {"saliency.sigma_residual", &o.sigma_residual},
+                                 {"saliency.translation_noise_scale", &o.translation_noise_scale},
                                  {"saliency.near_range", &o.near_range},
                                  {"saliency.min_range", &o.min_range},
                                  {"saliency.inverse_depths", &o.inverse_depths},
@@ -171,6 +174,7 @@ void addSaliency(std::vector<OptionEntry> &entries, SaliencyOptions &o)
                                  {"saliency.max_frames_apart", &o.max_frames_apart},
                                  {"saliency.evidence_decay", &o.evidence_decay},
                                  {"saliency.near_prior", &o.near_prior},
+                                 {"saliency.relative_evidence", &o.relative_evidence},
                                  {"saliency.evidence_scale", &o.evidence_scale},
                                  {"saliency.unknown_below", &o.unknown_below}});
 }

@@ -228,6 +228,10 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
     const float unrelated = intensity + g2[p] * kUnrelated;
     for (int k = 0; k < m_count; ++k) {
       const float variance = intensity + g2[p] * flow_variance[k];
+      if (!m_options.relative_evidence) {
+        out[k] += weight * fastLog(std::sqrt(variance) / (variance + r2[k]));
+        continue;
+      }
       // Without texture both variances are the same, and even a perfect match says nothing.
       const float gain = std::max(2 - variance / unrelated, 0.5f);
       const float ratio = gain * std::sqrt(unrelated * variance) / (variance + r2[k]);

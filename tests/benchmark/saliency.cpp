@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Cost of a frame, and area under the ROC curve of "nearer than 6 m" on the rendered flights (as counters).
+// Cost of a frame, and area under the ROC curve of "nearer than 6 m" on the rendered flights (as counters): flySaliency
+// for what may be known of the motion, ablateSaliency for the parts of the default, one taken away at a time.
 #include "support/forest_flight.h"
 
 #include <bole/saliency/roc.h>
 #include <bole/saliency/saliency.h>
 
 #include <benchmark/benchmark.h>
+#include <iterator>
+#include <string>
 
 namespace
 {
@@ -15,10 +18,8 @@ const char *const kFlights[] = {"park-forward", "winter-weave", "pine-arc"};
 enum Mode { odometry_and_gyro, gyro_alone, images_alone, paper };
 
 /// One whole pass over frames 0 to 110 an iteration; figures are of frames 10 to 110.
-void flySaliency(benchmark::State &state)
+void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOptions &options, const std::string &label)
 {
-  const char *name = kFlights[state.range(0)];
-  const auto mode = static_cast<Mode>(state.range(1));
   if (!support::hasFlight(name)) {
     state.SkipWithError("the rendered flights are not here");
     return;
@@ -27,7 +28,7 @@ void flySaliency(benchmark::State &state)
   RocCurve roc, known_roc;
   double turn_error = 0, frames = 0;
   for (auto _ : state) {
-    SaliencyEstimator estimator(flight.camera, mode == paper ? SaliencyOptions::paper() : SaliencyOptions());
+    SaliencyEstimator estimator(flight.camera, options);
     for (std::size_t i = 0; i < flight.size(); ++i) {
       std::optional<RotationPrior> gyro;
       std::optional<TranslationPrior> translation;
@@ -55,8 +56,7 @@ void flySaliency(benchmark::State &state)
       state.ResumeTiming();
     }
   }
-  const char *const modes[] = {"odometry and gyro", "gyro alone", "images alone", "paper preset"};
-  state.SetLabel(std::string(name) + ", " + modes[mode]);
+  state.SetLabel(std::string(name) + ", " + label);
   state.counters["auc"] = roc.area();
   state.counters["auc_known"] = known_roc.area();
   state.counters["unknown"] = 1 - static_cast<double>(known_roc.count()) / static_cast<double>(roc.count());
@@ -64,7 +64,44 @@ void flySaliency(benchmark::State &state)
   state.counters["frames/s"] = benchmark::Counter(
       static_cast<double>(state.iterations()) * static_cast<double>(flight.size()), benchmark::Counter::kIsRate);
 }
+
+void flySaliency(benchmark::State &state)
+{
+  const char *const modes[] = {"odometry and gyro", "gyro alone", "images alone", "paper preset"};
+  const auto mode = static_cast<Mode>(state.range(1));
+  fly(state, kFlights[state.range(0)], mode, mode == paper ? SaliencyOptions::paper() : SaliencyOptions(), modes[mode]);
+}
 BENCHMARK(flySaliency)->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone, paper}})
+    ->Unit(benchmark::kMillisecond)->Iterations(1);
+
+struct Step
+{
+  const char *name;
+  void (*undo)(SaliencyOptions &);
+};
+const Step kSteps[] = {
+    {"default", [](SaliencyOptions &) {}},
+    {"evidence of one pair of frames alone", [](SaliencyOptions &o) { o.evidence_decay = 0; }},
+    {"consecutive frames", [](SaliencyOptions &o) { o.max_frames_apart = 1; }},
+    {"plain likelihood", [](SaliencyOptions &o) { o.relative_evidence = false; }},
+    {"sweep from 0.5 m", [](SaliencyOptions &o) { o.min_range = 0.5; }},
+    {"residual noise 2 %", [](SaliencyOptions &o) { o.sigma_residual = 0.02; }},
+    {"windows of 9x9", [](SaliencyOptions &o) { o.window_width_px = 9; }},
+    {"the last four at once", [](SaliencyOptions &o) {
+       o.relative_evidence = false;
+       o.min_range = 0.5;
+       o.sigma_residual = 0.02;
+       o.window_width_px = 9;
+     }}};
+
+void ablateSaliency(benchmark::State &state)
+{
+  const Step &step = kSteps[state.range(1)];
+  SaliencyOptions options;
+  step.undo(options);
+  fly(state, kFlights[state.range(0)], odometry_and_gyro, options, step.name);
+}
+BENCHMARK(ablateSaliency)->ArgsProduct({{0, 1, 2}, benchmark::CreateDenseRange(0, std::size(kSteps) - 1, 1)})
     ->Unit(benchmark::kMillisecond)->Iterations(1);
 } // namespace
 

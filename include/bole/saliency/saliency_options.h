@@ -37,6 +37,7 @@ struct SaliencyOptions
   int max_frames_apart = 5;        ///< oldest frame that is tried; [1, 20]
   double evidence_decay = 0.8;     ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
   double near_prior = 0.3;         ///< p(nearer than near_range) before looking; (0, 1)
+  bool relative_evidence = true;   ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
   double evidence_scale = 1;       ///< weight of a window's residuals as log-likelihood; (0, 100]. 1 = the noise model is right
   double unknown_below = 0.7;      ///< |change of the log odds| under which a pixel is unknown; [0, 20]
 
