@@ -186,6 +186,7 @@ TEST(Uvlc, LosesOneGroupToADamagedBlockAndSaysSo)
   EXPECT_FALSE(result.whole);
   EXPECT_EQ(result.gobs, 14);
   EXPECT_NE(result.message.find("quantiser"), std::string::npos);
+  EXPECT_NE(result.message.find("P264"), std::string::npos);
 }
 
 TEST(Uvlc, ACutDatagramIsNotWhole)

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The fuzz targets of tests/fuzz over damaged good inputs: seconds of what the fuzzers do for minutes. A target that
+// finds something aborts.
+#include "files.h"
+
+#include <bole/ardrone/at_command.h>
+#include <bole/ardrone/h264.h>
+#include <bole/ardrone/navdata.h>
+#include <bole/ardrone/pave.h>
+#include <bole/ardrone/recording.h>
+#include <bole/ardrone/uvlc.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+extern "C" {
+int fuzz_navdata(const std::uint8_t *data, std::size_t size);
+int fuzz_pave(const std::uint8_t *data, std::size_t size);
+int fuzz_recording(const std::uint8_t *data, std::size_t size);
+int fuzz_uvlc(const std::uint8_t *data, std::size_t size);
+}
+
+namespace
+{
+using namespace bole;
+using Bytes = std::vector<std::uint8_t>;
+
+std::size_t below(std::mt19937 &random, std::size_t end)
+{
+  return std::uniform_int_distribution<std::size_t>(0, end - 1)(random);
+}
+
+/// \p bytes with one to eight faults: changed, cut out, doubled, lengths of extreme size.
+Bytes damaged(Bytes bytes, std::mt19937 &random)
+{
+  for (std::size_t faults = 1 + below(random, 8); faults > 0 && !bytes.empty(); --faults) {
+    const std::size_t at = below(random, bytes.size());
+    const std::size_t length = std::min(bytes.size() - at, 1 + below(random, 64));
+    const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto to = from + static_cast<std::ptrdiff_t>(length);
+    switch (below(random, 4)) {
+    case 0:
+      *from ^= static_cast<std::uint8_t>(1 + below(random, 255));
+      break;
+    case 1:
+      bytes.erase(from, to);
+      break;
+    case 2: {
+      const Bytes piece(from, to);
+      bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(below(random, bytes.size() + 1)), piece.begin(),
+                   piece.end());
+      break;
+    }
+    default:
+      std::fill(from, std::min(to, from + 4), static_cast<std::uint8_t>(below(random, 2) ? 0xff : 0));
+    }
+  }
+  return bytes;
+}
+
+void expectSurvives(int (*target)(const std::uint8_t *, std::size_t), const std::vector<Bytes> &good, int runs)
+{
+  std::mt19937 random(1);
+  for (const Bytes &bytes : good)
+    EXPECT_EQ(target(bytes.data(), bytes.size()), 0);
+  for (int i = 0; i < runs; ++i) {
+    const Bytes bytes = damaged(good[below(random, good.size())], random);
+    EXPECT_EQ(target(bytes.data(), bytes.size()), 0);
+  }
+}
+
+/// Adds a file from a real drone, where it is on this machine.
+void addCaptured(std::vector<Bytes> &good, const std::string &name, std::size_t most)
+{
+  Bytes bytes = test::captured(name);
+  bytes.resize(std::min(bytes.size(), most));
+  if (!bytes.empty())
+    good.push_back(std::move(bytes));
+}
+
+vpImage<unsigned char> scene(unsigned width, unsigned height, int shift)
+{
+  vpImage<unsigned char> image(height, width);
+  for (unsigned v = 0; v < height; ++v)
+    for (unsigned u = 0; u < width; ++u)
+      image[v][u] = static_cast<unsigned char>((u * 7 + v * 3 + static_cast<unsigned>(shift) * 5) % 251);
+  return image;
+}
+
+Bytes paveStream()
+{
+  H264Encoder encoder(160, 128, 20, 4e5, 4);
+  Bytes stream = {12}; // the target cuts the rest into pieces of 97 bytes
+  for (int i = 0; i < 6; ++i) {
+    const auto encoded = encoder.encode(scene(160, 128, i), i == 0);
+    PaveHeader header;
+    header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
+    header.coded_width = header.display_width = 160;
+    header.coded_height = header.display_height = 128;
+    header.frame_number = static_cast<std::uint32_t>(i + 1);
+    header.timestamp_ms = static_cast<std::uint32_t>(50 * i);
+    header.frame_type = encoded.is_key ? PaveFrameType::idr : PaveFrameType::p;
+    const auto bytes = encodePaveHeader(header);
+    stream.insert(stream.end(), bytes.begin(), bytes.end());
+    stream.insert(stream.end(), encoded.bytes.begin(), encoded.bytes.end());
+  }
+  return stream;
+}
+} // namespace
+
+TEST(FuzzTargets, DamagedNavdata)
+{
+  Navdata navdata;
+  navdata.sequence = 7;
+  navdata.time = 1234567;
+  navdata.demo = Navdata::Demo{};
+  navdata.physical = Navdata::Physical{};
+  std::vector<Bytes> good = {encodeNavdata(navdata)};
+  addCaptured(good, "navdata.bin", 1 << 16);
+  expectSurvives(fuzz_navdata, good, 2000);
+}
+
+TEST(FuzzTargets, DamagedPaveStreams)
+{
+  std::vector<Bytes> good = {paveStream()};
+  addCaptured(good, "pave.bin", 40'000);
+  expectSurvives(fuzz_pave, good, 60);
+}
+
+TEST(FuzzTargets, DamagedUvlcPictures)
+{
+  expectSurvives(fuzz_uvlc, {encodeUvlc(scene(88, 72, 0), 1), encodeUvlc(scene(160, 120, 3), 2)}, 300);
+}
+
+TEST(FuzzTargets, DamagedRecordingsAndCommands)
+{
+  const std::string folder = testing::TempDir() + "bole_fuzz_recording";
+  std::filesystem::remove_all(folder);
+  std::string path;
+  {
+    RecordingWriter writer(folder);
+    for (int i = 0; i < 20; ++i) {
+      const Bytes bytes(static_cast<std::size_t>(10 + 13 * i), static_cast<std::uint8_t>(i));
+      writer.write(i % 2 ? LinkChannel::video : LinkChannel::navdata, 1000 * i, bytes.data(), bytes.size());
+    }
+  }
+  std::ifstream file(folder + "/raw.bin", std::ios::binary);
+  const Bytes recording{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  ASSERT_GT(recording.size(), 1000u);
+  const std::string text = "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
+  expectSurvives(fuzz_recording, {recording, Bytes(text.begin(), text.end())}, 2000);
+}
