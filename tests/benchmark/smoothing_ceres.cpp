@@ -162,8 +162,12 @@ std::pair<double, double> solveByCeres(const Graph &graph, double tolerance)
     auto *c = new ViewCost;
     squareRoot(e.summary, c->root);
     c->bMc = graph.bMc;
-    problem.AddResidualBlock(c, new ceres::CauchyLoss(graph.summary_loss.width),
-                             poses[e.pose].data(), trunks[e.trunk].data());
+    ceres::LossFunction *loss = nullptr;
+    if (graph.summary_loss.kind == LossKind::huber)
+      loss = new ceres::HuberLoss(graph.summary_loss.width);
+    else if (graph.summary_loss.kind == LossKind::cauchy)
+      loss = new ceres::CauchyLoss(graph.summary_loss.width);
+    problem.AddResidualBlock(c, loss, poses[e.pose].data(), trunks[e.trunk].data());
   }
   for (std::size_t j = 0; j < trunks.size(); ++j) {
     auto *c = new TrunkCost;
