@@ -39,6 +39,7 @@ MapTrunk &TrunkMap::add(std::size_t smoother_id, const Trunk &trunk)
   added.smoother_id = smoother_id;
   added.trunk = trunk;
   m_trunks.push_back(added);
+  m_active.push_back(m_trunks.size() - 1);
   return m_trunks.back();
 }
 
@@ -132,8 +133,9 @@ bool isInside(const Trunk &narrow, const Trunk &wide)
 bool TrunkMap::holds(const Trunk &trunk)
 {
   bool is_known = false;
-  for (MapTrunk &known : m_trunks) {
-    if (known.removed || known.status == TrunkStatus::lost)
+  for (const std::size_t i : m_active) {
+    MapTrunk &known = m_trunks[i];
+    if (known.status == TrunkStatus::lost)
       continue;
     if (isSameReading(known.trunk, trunk)) {
       ++known.found_again;
@@ -166,7 +168,8 @@ double TrunkMap::advantage(const MapTrunk &trunk, const MapTrunk &rival) const
 /// Another candidate for the same place has log odds better by more than \p margin.
 bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
 {
-  return std::any_of(m_trunks.begin(), m_trunks.end(), [&](const MapTrunk &rival) {
+  return std::any_of(m_active.begin(), m_active.end(), [&](std::size_t i) {
+    const MapTrunk &rival = m_trunks[i];
     return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
            rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
            advantage(rival, trunk) > margin;
@@ -195,9 +198,8 @@ std::vector<MapChange> TrunkMap::review()
     changes.push_back({trunk.id, into, trunk.status, to});
     trunk.status = to;
   };
-  for (MapTrunk &trunk : m_trunks) {
-    if (trunk.removed)
-      continue;
+  for (const std::size_t i : m_active) {
+    MapTrunk &trunk = m_trunks[i];
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk) && !hasBetterRival(trunk, 0))
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status != TrunkStatus::lost && isDisproved(trunk)) {
@@ -211,8 +213,9 @@ std::vector<MapChange> TrunkMap::review()
       change(trunk, TrunkStatus::lost);
     }
   }
-  for (MapTrunk &a : m_trunks)
-    for (MapTrunk &b : m_trunks) {
+  for (const std::size_t i : m_active)
+    for (const std::size_t j : m_active) {
+      MapTrunk &a = m_trunks[i], &b = m_trunks[j];
       if (a.id >= b.id || a.removed || b.removed)
         continue;
       if (MapTrunk *gone = chooseRedundant(a, b)) {
@@ -220,6 +223,8 @@ std::vector<MapChange> TrunkMap::review()
         change(*gone, TrunkStatus::merged, gone == &a ? b.id : a.id);
       }
     }
+  m_active.erase(std::remove_if(m_active.begin(), m_active.end(), [this](std::size_t i) { return m_trunks[i].removed; }),
+                 m_active.end());
   return changes;
 }
 

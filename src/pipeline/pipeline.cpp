@@ -174,8 +174,9 @@ void Pipeline::hide(TrackingPrediction &prediction, const MapTrunk &trunk, const
 {
   const double range = (trunk.trunk.xy - wMc.t.head<2>()).norm();
   const double bearing = bearingOf(wMc, trunk.trunk), half = std::asin(std::min(0.99, trunk.trunk.radius() / range));
-  for (const MapTrunk &other : m_map.trunks()) {
-    if (other.id == trunk.id || other.removed || other.status != TrunkStatus::confirmed)
+  for (const std::size_t i : m_map.active()) {
+    const MapTrunk &other = m_map.trunks()[i];
+    if (other.id == trunk.id || other.status != TrunkStatus::confirmed)
       continue;
     const double other_range = (other.trunk.xy - wMc.t.head<2>()).norm();
     if (other_range > range - 0.2)
@@ -232,8 +233,9 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
 {
   const std::size_t pose = m_smoother.poseCount() - 1;
   const Pose wMc = cameraAt(pose);
-  for (MapTrunk &trunk : m_map.trunks()) {
-    if (trunk.removed || (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
+  for (const std::size_t i : m_map.active()) {
+    MapTrunk &trunk = m_map.trunks()[i];
+    if ((trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
       continue;
     const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
@@ -294,16 +296,20 @@ void Pipeline::keepView(const Frame &frame, Gradient gradient)
     m_views.pop_front();
 }
 
-std::vector<InhibitedRange> Pipeline::inhibited() const
+/// Places in the image where the detectors need not look: those of confirmed trunks and, for the detector that asks one
+/// frame (Eq. 21), of candidates. The one that asks a window may come to a better reading of a candidate's lines.
+std::vector<InhibitedRange> Pipeline::inhibited(bool by_candidates) const
 {
   std::vector<InhibitedRange> ranges;
   const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
   const Eigen::Vector2d forward = wMc.R.col(2).head<2>().normalized(), left(-forward.y(), forward.x());
-  for (const MapTrunk &trunk : m_map.trunks()) {
+  for (const std::size_t i : m_map.active()) {
+    const MapTrunk &trunk = m_map.trunks()[i];
     const Eigen::Vector2d w = trunk.trunk.xy - wMc.t.head<2>();
     const double r = trunk.trunk.radius(), d2 = w.squaredNorm();
-    // a candidate must not keep a better reading of the same lines away
-    if (trunk.removed || trunk.status != TrunkStatus::confirmed || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
+    const bool inhibits = trunk.status == TrunkStatus::confirmed ||
+                          (by_candidates && trunk.status == TrunkStatus::candidate);
+    if (!inhibits || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
       continue;
     const double q = w.dot(left) / w.dot(forward), half = r / std::sqrt(d2 - r * r);
     ranges.push_back({q - half - 1 / m_camera.fx, q + half + 1 / m_camera.fx});
@@ -322,7 +328,7 @@ void Pipeline::detectNew(FrameResult &result)
   std::vector<DetectorView> views;
   for (const View &view : m_views)
     views.push_back({&view.profile, cameraAt(view.pose)});
-  result.detections = detectTrunks(views, m_camera, inhibited(),
+  result.detections = detectTrunks(views, m_camera, inhibited(false),
                                    result.saliency ? &result.saliency->p_background : nullptr, m_options.detection);
   int adopted = 0;
   for (const Detection &detection : result.detections) // best first
@@ -335,7 +341,7 @@ void Pipeline::detectNew(FrameResult &result)
 void Pipeline::detectSingle(FrameResult &result)
 {
   const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
-  result.lines = detectLines(m_views.back().gradient, result.saliency->p_background, m_camera, wMc.R, inhibited(),
+  result.lines = detectLines(m_views.back().gradient, result.saliency->p_background, m_camera, wMc.R, inhibited(true),
                              m_options.detection.profile, m_options.lines);
   for (const LineDetection &line : result.lines)
     adopt(line);
@@ -404,9 +410,8 @@ void Pipeline::reviewMap()
 
 void Pipeline::refreshMap()
 {
-  for (MapTrunk &trunk : m_map.trunks()) {
-    if (trunk.removed)
-      continue;
+  for (const std::size_t i : m_map.active()) {
+    MapTrunk &trunk = m_map.trunks()[i];
     trunk.trunk = m_smoother.trunk(trunk.smoother_id);
     trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
   }

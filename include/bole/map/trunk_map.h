@@ -98,6 +98,8 @@ public:
   MapTrunk &add(std::size_t smoother_id, const Trunk &trunk);
   std::vector<MapTrunk> &trunks() { return m_trunks; }
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
+  /// Places in trunks() of those that are not removed: what a frame has to look at, however long the flight.
+  const std::vector<std::size_t> &active() const { return m_active; }
   int count(TrunkStatus status) const;
 
   /// True where a candidate or a confirmed trunk stands that is \p trunk in place and radius: it was found again.
@@ -128,5 +130,6 @@ private:
 
   MapOptions m_options;
   std::vector<MapTrunk> m_trunks;
+  std::vector<std::size_t> m_active;
 };
 } // namespace bole

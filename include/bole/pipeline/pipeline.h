@@ -110,7 +110,7 @@ private:
   void detectSingle(FrameResult &result);
   void adopt(const Detection &detection);
   void adopt(const LineDetection &detection);
-  std::vector<InhibitedRange> inhibited() const;
+  std::vector<InhibitedRange> inhibited(bool by_candidates) const;
   void reviewMap();
   Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }
 
