@@ -91,7 +91,7 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
       {"place", [&](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e4; }},
       {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
-      {"misses", [&](MapTrunk &t) { t.misses = 4 * t.hits; }},
+      {"misses", [&](MapTrunk &t) { t.misses = 20 * t.hits; }},
       {"predictions", [&](MapTrunk &t) { t.hits = m_options.confirm_predicted - 1; }},
       {"innovation", [&](MapTrunk &t) { t.innovation2 = 4; }},
   };
