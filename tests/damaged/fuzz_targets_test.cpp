@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The fuzz targets of tests/fuzz over damaged good inputs: seconds of what the fuzzers do for minutes. A target that
 // finds something aborts.
-#include "files.h"
+#include "ardrone/files.h"
 
 #include <bole/ardrone/at_command.h>
 #include <bole/ardrone/h264.h>
@@ -9,6 +9,9 @@
 #include <bole/ardrone/pave.h>
 #include <bole/ardrone/recording.h>
 #include <bole/ardrone/uvlc.h>
+#include <bole/smoothing/g2o.h>
+
+#include "support/flight.h"
 
 #include <gtest/gtest.h>
 
@@ -17,8 +20,10 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <sstream>
 
 extern "C" {
+int fuzz_g2o(const std::uint8_t *data, std::size_t size);
 int fuzz_navdata(const std::uint8_t *data, std::size_t size);
 int fuzz_pave(const std::uint8_t *data, std::size_t size);
 int fuzz_recording(const std::uint8_t *data, std::size_t size);
@@ -154,4 +159,18 @@ TEST(FuzzTargets, DamagedRecordingsAndCommands)
   ASSERT_GT(recording.size(), 1000u);
   const std::string text = "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
   expectSurvives(fuzz_recording, {recording, Bytes(text.begin(), text.end())}, 10000);
+}
+
+TEST(FuzzTargets, DamagedGraphs)
+{
+  test::FlightOptions options;
+  options.poses = 8;
+  const test::Flight flight = test::simulateFlight(options);
+  test::Replay replay(flight, test::smootherFor(options));
+  replay.run();
+  std::stringstream out;
+  writeG2o(out, replay.smoother.graph());
+  const std::string text = out.str();
+  ASSERT_GT(text.size(), 1000u);
+  expectSurvives(fuzz_g2o, {Bytes(text.begin(), text.end())}, 1500);
 }
