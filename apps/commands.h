@@ -12,6 +12,8 @@ void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
+void addServo(CLI::App &app); ///< tasks in the closed loop
+void addBenchmark(CLI::App &app); ///< many simulated flights, medians with intervals
 void addRecord(CLI::App &app);  ///< a live flight to disk
 void addReplay(CLI::App &app);  ///< a recorded flight, served again
 void addEmulate(CLI::App &app); ///< a sequence, served as an AR.Drone would

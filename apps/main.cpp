@@ -16,6 +16,8 @@ int main(int argc, char **argv)
   bole::apps::addCalibrateSaliency(app);
   bole::apps::addShowSaliency(app);
   bole::apps::addSimulate(app);
+  bole::apps::addServo(app);
+  bole::apps::addBenchmark(app);
   bole::apps::addRecord(app);
   bole::apps::addReplay(app);
   bole::apps::addEmulate(app);

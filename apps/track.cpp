@@ -2,6 +2,7 @@
 // bole track: from a flight through trees to a map of trunks and a trajectory.
 #include "commands.h"
 #include "interrupt.h"
+#include "overlay_window.h"
 #include "track_output.h"
 
 #include <bole/ardrone/ardrone_source.h>
@@ -17,8 +18,6 @@
 #include <fmt/format.h>
 #include <memory>
 
-#include <visp3/core/vpDisplay.h>
-#include <visp3/gui/vpDisplayX.h>
 
 namespace bole::apps
 {
@@ -58,33 +57,6 @@ PipelineOptions readOptions(const Arguments &arguments, bool is_compressed)
   return options;
 }
 
-/// The overlay in a ViSP window, where one was asked for.
-class Window
-{
-public:
-  explicit Window(bool is_shown) : m_is_shown(is_shown) {}
-  ~Window()
-  {
-    if (m_display)
-      vpDisplay::close(m_picture);
-  }
-  void show(const vpImage<vpRGBa> &picture)
-  {
-    if (!m_is_shown)
-      return;
-    m_picture = picture;
-    if (!m_display)
-      m_display = std::make_unique<vpDisplayX>(m_picture, 100, 100, "bole track");
-    vpDisplay::display(m_picture);
-    vpDisplay::flush(m_picture);
-  }
-
-private:
-  bool m_is_shown;
-  vpImage<vpRGBa> m_picture;
-  std::unique_ptr<vpDisplayX> m_display;
-};
-
 /// [ms] since the last byte of a live frame came.
 std::optional<double> ageOf(const Frame &frame)
 {
@@ -99,7 +71,7 @@ std::optional<double> ageOf(const Frame &frame)
 class Flight
 {
 public:
-  Flight(Pipeline &pipeline, TrackOutput &output, Window &window)
+  Flight(Pipeline &pipeline, TrackOutput &output, OverlayWindow &window)
     : m_pipeline(pipeline), m_output(output), m_window(window)
   {
   }
@@ -130,7 +102,7 @@ private:
 
   Pipeline &m_pipeline;
   TrackOutput &m_output;
-  Window &m_window;
+  OverlayWindow &m_window;
   std::deque<Frame> m_silent;
 };
 
@@ -157,7 +129,7 @@ void track(const Arguments &arguments)
   Pipeline pipeline(source->camera(), source->bMc(), options);
   const std::string preset = arguments.config.empty() && isCompressed(*source) ? "compressed" : arguments.config;
   TrackOutput output(arguments.run, arguments.input, preset, *source, arguments.has_video);
-  Window window(arguments.is_shown);
+  OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   Progress progress(source->size(), stderr);
   endAtInterrupt();

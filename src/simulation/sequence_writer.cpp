@@ -16,6 +16,8 @@ namespace bole
 {
 namespace
 {
+constexpr double kBreastHeight = 1.3; ///< above the foot [m]
+
 const char *kPoseHeader = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x "
                           "[],q_RS_y [],q_RS_z []\n";
 
@@ -143,11 +145,13 @@ void SequenceWriter::writeForest(const Forest &forest)
 {
   std::string near = "id,x [m],y [m],radius [m],lean [deg]\n", far = "id,x [m],y [m]\n";
   for (const SimulatedTrunk &trunk : forest.trunks) {
-    near += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.2f}\n", trunk.id, trunk.foot.x(),
-                        trunk.foot.y(), trunk.radius, std::atan(trunk.lean.norm()) * 180 / M_PI);
+    const Eigen::Vector3d breast = trunk.axisAt(kBreastHeight); // where TruthTrunk is told
+    near += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.2f}\n", trunk.id, breast.x(), breast.y(),
+                        trunk.radius, std::atan(trunk.lean.norm()) * 180 / M_PI);
   }
   for (const SimulatedTrunk &trunk : forest.far_trunks) {
-    far += fmt::format("{},{:.4f},{:.4f}\n", trunk.id, trunk.foot.x(), trunk.foot.y());
+    const Eigen::Vector3d breast = trunk.axisAt(kBreastHeight);
+    far += fmt::format("{},{:.4f},{:.4f}\n", trunk.id, breast.x(), breast.y());
   }
   writeText("trees.csv", near);
   writeText("trees_far.csv", far);

@@ -14,7 +14,7 @@ namespace
 using Stages = std::set<std::string>;
 const std::string kRoot = BOLE_SOURCE_DIR;
 
-/// What each stage may include beside itself: the five floors, no arrow runs back up.
+/// What each stage may include beside itself: the floors, no arrow runs back up.
 const std::map<std::string, Stages> kAllowed = {
     {"geometry", {}},
     {"input", {"geometry"}},
@@ -32,7 +32,9 @@ const std::map<std::string, Stages> kAllowed = {
     {"smoothing", {"geometry", "summary"}},
     {"output", {"geometry", "input", "map"}},
     {"pipeline", {"geometry", "input", "gradient", "motion", "saliency", "detection", "tracking", "summary", "smoothing",
-                  "map", "output"}}};
+                  "map", "output"}},
+    {"tasks", {"geometry", "input", "map", "tracking", "servo", "pipeline"}},
+    {"trials", {"geometry", "input", "map", "tracking", "servo", "output", "pipeline", "simulation", "tasks"}}};
 
 /// The stage of a header by its path below include/bole; a vp* header at the root belongs to its source's folder.
 std::string stageOf(const std::string &path)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/geometry/so3.h>
 #include <bole/input/camera_file.h>
+#include <bole/input/truth.h>
 #include <bole/simulation/simulated_flight.h>
 
 #include <filesystem>
@@ -88,6 +89,19 @@ TEST_F(SimulatedFlight, DoesNotReplaceAFolderUnasked)
   recordFlight(scene, {(m_folder / "a").string(), 1, false, true});
   EXPECT_FALSE(fs::exists(m_folder / "a.partial"));
   EXPECT_TRUE(fs::exists(m_folder / "a/trees.csv"));
+}
+
+TEST_F(SimulatedFlight, TreesAreToldAtBreastHeight)
+{
+  SceneOptions scene;
+  scene.trunks.resize(1);
+  scene.trunks[0].foot = {4, 3, 0};
+  scene.trunks[0].lean = {0.2, -0.1};
+  recordFlight(scene, {(m_folder / "a").string(), 1, false, false});
+  const std::vector<TruthTrunk> trees = readTruthTrunks((m_folder / "a").string());
+  ASSERT_FALSE(trees.empty());
+  EXPECT_NEAR(trees[0].xy.x(), 4 + 0.2 * 1.3, 1e-4);
+  EXPECT_NEAR(trees[0].xy.y(), 3 - 0.1 * 1.3, 1e-4);
 }
 
 TEST_F(SimulatedFlight, SceneFileGivesBackTheScene)

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A picture in a ViSP window, where one was asked for.
+
+#include <memory>
+#include <string>
+#include <visp3/core/vpDisplay.h>
+#include <visp3/gui/vpDisplayX.h>
+
+namespace bole::apps
+{
+class OverlayWindow
+{
+public:
+  OverlayWindow(bool is_shown, std::string title) : m_is_shown(is_shown), m_title(std::move(title)) {}
+  ~OverlayWindow()
+  {
+    if (m_display)
+      vpDisplay::close(m_picture);
+  }
+  void show(const vpImage<vpRGBa> &picture)
+  {
+    if (!m_is_shown)
+      return;
+    m_picture = picture;
+    if (!m_display)
+      m_display = std::make_unique<vpDisplayX>(m_picture, 100, 100, m_title);
+    vpDisplay::display(m_picture);
+    vpDisplay::flush(m_picture);
+  }
+
+private:
+  bool m_is_shown;
+  std::string m_title;
+  vpImage<vpRGBa> m_picture;
+  std::unique_ptr<vpDisplayX> m_display;
+};
+} // namespace bole::apps

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The map as something to keep away from.
+
+#include <bole/pipeline/pipeline.h>
+
+#include <vector>
+
+namespace bole
+{
+/// A trunk at the height of the drone, with how well its place *relative to the drone* is known: across the line of
+/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is seen well).
+/// The covariance in the world would count the drone's own drift, which moves drone and trunk alike.
+struct Obstacle
+{
+  int id = 0;
+  bool is_confirmed = false;
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero(); ///< [m], world
+  double radius = 0;                            ///< [m]
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< [m^2], world axes
+
+  /// Distance of \p p to the bark less \p sigmas standard deviations in that direction [m].
+  double clearance(const Eigen::Vector2d &p, double sigmas) const;
+};
+
+/// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
+/// \p observations views (something is there, though it may not be a trunk).
+std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
+} // namespace bole

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/tasks/obstacles.h>
+
+#include <cmath>
+
+namespace bole
+{
+double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
+{
+  const Eigen::Vector2d away = p - xy;
+  const double distance = away.norm();
+  if (distance < 1e-9)
+    return -radius;
+  const Eigen::Vector2d u = away / distance;
+  return distance - radius - sigmas * std::sqrt(std::max(0.0, u.dot(covariance * u)));
+}
+
+std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations)
+{
+  std::vector<Obstacle> near;
+  for (const MapTrunk &trunk : pipeline.mapTrunks()) {
+    const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
+    const bool counts = is_confirmed || (trunk.status == TrunkStatus::candidate && trunk.observations >= observations);
+    const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
+    const double d = w.norm();
+    if (trunk.removed || !counts || d > range || d < 1e-6)
+      continue;
+    const Matrix4d relative = pipeline.smoother().relativeCovariance(trunk.smoother_id);
+    const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
+    const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
+    near.push_back({trunk.id, is_confirmed, xy, trunk.trunk.radius(),
+                    across * n * n.transpose() + along * u * u.transpose()});
+  }
+  return near;
+}
+} // namespace bole

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/tasks/slalom_task.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr double kStep_s = 0.1;        ///< of the flight in thought
+constexpr double kOffsetStep = 0.25;   ///< [m]
+constexpr double kOffsetGain = 1.0;    ///< sideways velocity over offset [1/s]
+constexpr double kOffLine = 0.12;      ///< cost a metre off the line
+constexpr double kChange = 0.08;       ///< cost a metre of a change of mind
+constexpr double kSlow = 1.5;          ///< cost of standing still against full speed
+constexpr double kNear = 6;            ///< cost a square metre inside the margin
+constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
+constexpr double kLook = 0.6;          ///< share of the direction of flight that the heading takes
+constexpr double kRange = 9;           ///< trunks farther do not matter yet [m]
+
+double line(double x, const SlalomTaskOptions &options)
+{
+  return options.swing * std::sin(2 * M_PI * x / options.wave_length);
+}
+
+double sidewaysTo(double offset, double y, const SlalomTaskOptions &options)
+{
+  return std::clamp(kOffsetGain * (offset - y), -options.sideways, options.sideways);
+}
+
+/// Flies \p way in thought and fills its clearance and cost.
+void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState state, const SlalomTaskOptions &options)
+{
+  way.clearance = std::numeric_limits<double>::infinity();
+  double contact_s = options.horizon;
+  for (double t = 0; t < options.horizon; t += kStep_s) {
+    state.vy += kStep_s / options.lag * (sidewaysTo(way.offset, state.y, options) - state.vy);
+    state.y += kStep_s * state.vy;
+    state.x += kStep_s * way.speed;
+    for (const Obstacle &trunk : trunks) {
+      const double clearance = trunk.clearance({state.x, state.y}, options.sigmas) - options.body_radius;
+      if (clearance < 0)
+        contact_s = std::min(contact_s, t);
+      way.clearance = std::min(way.clearance, clearance);
+    }
+  }
+  const double inside = std::max(0.0, options.margin - way.clearance);
+  way.cost += kNear * inside * inside;
+  if (way.clearance < 0)
+    way.cost += kContact * (1 - way.clearance + (options.horizon - contact_s));
+}
+} // namespace
+
+void SlalomTaskOptions::validate() const
+{
+  const auto require = [](const char *name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
+  };
+  require("length", length, 1, 1000);
+  require("speed", speed, 0.1, 3);
+  require("sideways", sideways, 0.1, 3);
+  require("swing", swing, 0, 3);
+  require("wave_length", wave_length, 2, 50);
+  require("reach", reach, 0.5, 10);
+  require("body_radius", body_radius, 0.05, 2);
+  require("margin", margin, 0, 3);
+  require("sigmas", sigmas, 0, 5);
+  require("views", views, 1, 1000);
+  require("horizon", horizon, 1, 20);
+  require("lag", lag, 0.05, 3);
+  safety.validate();
+}
+
+SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &state, double last_offset,
+                    const SlalomTaskOptions &options)
+{
+  SlalomWay best;
+  best.cost = std::numeric_limits<double>::infinity();
+  const double wanted = line(state.x + options.speed, options); // a second ahead
+  for (const double share : {1.0, 0.6, 0.25, 0.0})
+    for (double offset = -options.reach; offset <= options.reach + 1e-9; offset += kOffsetStep) {
+      SlalomWay way{wanted + offset, share * options.speed, 0, 0};
+      if (std::abs(way.offset) > options.reach + options.swing)
+        continue;
+      way.cost = kOffLine * std::abs(offset) + kChange * std::abs(way.offset - last_offset) + kSlow * (1 - share);
+      if (way.cost >= best.cost)
+        continue;
+      tryOut(way, trunks, state, options);
+      if (way.cost < best.cost)
+        best = way;
+    }
+  return best;
+}
+
+SlalomTask::SlalomTask(const SlalomTaskOptions &options) : ServoTask(options.safety), m_options(options)
+{
+  m_options.validate();
+}
+
+ServoTask::Values SlalomTask::errors() const
+{
+  return {{"along [m]", m_state.x}, {"across [m]", m_state.y}, {"clearance by the map [m]", std::min(m_way.clearance, 9.0)}};
+}
+
+void SlalomTask::locate(const FrameResult &result)
+{
+  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
+  if (!m_started) {
+    m_start = {Eigen::AngleAxisd(yawOf(result.wMb), Eigen::Vector3d::UnitZ()).toRotationMatrix(), result.wMb.t};
+    m_started = true;
+    m_time_s = time_s;
+  }
+  const Eigen::Vector3d p = m_start.inverse() * result.wMb.t;
+  const double dt = time_s - m_time_s;
+  if (dt > 0)
+    m_state.vy += 0.4 * (std::clamp((p.y() - m_state.y) / dt, -2.0, 2.0) - m_state.vy);
+  m_state.x = p.x();
+  m_state.y = p.y();
+  m_time_s = time_s;
+}
+
+TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
+{
+  locate(result);
+  enter(m_state.x >= m_options.length ? TaskPhase::done : TaskPhase::servoing);
+  if (phase() == TaskPhase::done)
+    return {true, Eigen::Vector4d::Zero(), "arrived"};
+  std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, kRange, m_options.views);
+  const Eigen::Matrix2d axes = m_start.R.topLeftCorner<2, 2>().transpose();
+  for (Obstacle &trunk : trunks) {
+    trunk.xy = axes * (trunk.xy - m_start.t.head<2>());
+    trunk.covariance = axes * trunk.covariance * axes.transpose();
+  }
+  m_way = chooseWay(trunks, m_state, m_way.offset, m_options);
+  const Eigen::Vector2d velocity(m_way.speed, sidewaysTo(m_way.offset, m_state.y, m_options));
+  const double heading = yawOf(m_start) + kLook * std::atan2(velocity.y(), std::max(velocity.x(), 0.5 * m_options.speed));
+  return {false, towards(result.wMb, axes.transpose() * velocity, heading), m_way.speed < m_options.speed ? "slows" : "flies"};
+}
+} // namespace bole

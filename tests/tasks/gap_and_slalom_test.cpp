@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/tasks/gap_task.h>
+#include <bole/tasks/slalom_task.h>
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+Obstacle trunkAt(int id, double x, double y, double radius = 0.15)
+{
+  Obstacle trunk;
+  trunk.id = id;
+  trunk.is_confirmed = true;
+  trunk.xy = {x, y};
+  trunk.radius = radius;
+  return trunk;
+}
+
+TEST(Obstacle, CountsItsCovarianceInTheDirectionAsked)
+{
+  Obstacle trunk = trunkAt(0, 0, 0, 0.2);
+  trunk.covariance << 0.09, 0, 0, 0.01;
+  EXPECT_NEAR(trunk.clearance({2, 0}, 0), 1.8, 1e-12);
+  EXPECT_NEAR(trunk.clearance({2, 0}, 2), 1.8 - 0.6, 1e-12);
+  EXPECT_NEAR(trunk.clearance({0, 2}, 2), 1.8 - 0.2, 1e-12);
+}
+
+TEST(Gap, MiddleIsThatOfTheFreeWidth)
+{
+  const Gap gap = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {0, 0});
+  EXPECT_NEAR(gap.width, 1.6, 1e-12);
+  EXPECT_NEAR(gap.middle.y(), 0.1, 1e-12);
+  EXPECT_NEAR(gap.along.x(), 1, 1e-12);
+  EXPECT_EQ(gap.left, 7);
+  EXPECT_EQ(gap.right, 4);
+  const Gap from_behind = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {10, 0});
+  EXPECT_NEAR(from_behind.along.x(), -1, 1e-12);
+  EXPECT_EQ(from_behind.left, 4);
+}
+
+TEST(Gap, ChoosesTheOneNearestToStraightAhead)
+{
+  const std::vector<Obstacle> trunks{trunkAt(0, 5, 1), trunkAt(1, 5, -0.8), trunkAt(2, 5, -2.8)};
+  const auto gap = chooseGap(trunks, {0, 0}, 0, {});
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->left, 0);
+  EXPECT_EQ(gap->right, 1);
+  const auto to_the_right = chooseGap(trunks, {0, 0}, -0.35, {});
+  ASSERT_TRUE(to_the_right);
+  EXPECT_EQ(to_the_right->right, 2);
+}
+
+TEST(Gap, IsNotChosenWhereItIsNarrowUnconfirmedOrBlocked)
+{
+  const std::vector<Obstacle> open{trunkAt(0, 5, 0.8), trunkAt(1, 5, -0.8)};
+  ASSERT_TRUE(chooseGap(open, {0, 0}, 0, {}));
+  EXPECT_FALSE(chooseGap({trunkAt(0, 5, 0.6), trunkAt(1, 5, -0.6)}, {0, 0}, 0, {})); // 0.9 m
+  auto doubtful = open;
+  doubtful[0].is_confirmed = false;
+  EXPECT_FALSE(chooseGap(doubtful, {0, 0}, 0, {}));
+  auto blocked = open;
+  blocked.push_back(trunkAt(2, 6.2, 0.1));
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, {}));
+  blocked.back().is_confirmed = false; // a candidate is in the way as well
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, {}));
+}
+
+/// Least distance hull to bark of a drone that follows chooseWay() with its lag.
+double slalom(const std::vector<Obstacle> &trunks, double length, double *seconds = nullptr)
+{
+  const SlalomTaskOptions options;
+  SlalomState state;
+  double least = 1e9, last = 0, vx = 0, t = 0;
+  for (; state.x < length && t < 120; t += 0.1) {
+    const SlalomWay way = chooseWay(trunks, state, last, options);
+    last = way.offset;
+    for (int k = 0; k < 10; ++k) {
+      const double wanted = std::clamp(way.offset - state.y, -options.sideways, options.sideways);
+      state.vy += 0.01 / options.lag * (wanted - state.vy);
+      vx += 0.01 / options.lag * (way.speed - vx);
+      state.y += 0.01 * state.vy;
+      state.x += 0.01 * vx;
+      for (const Obstacle &trunk : trunks)
+        least = std::min(least, trunk.clearance({state.x, state.y}, 0) - options.body_radius);
+    }
+  }
+  if (seconds)
+    *seconds = t;
+  return least;
+}
+
+TEST(Slalom, PassesTrunksThatStandOnTheLine)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = 0; k < 8; ++k)
+    trunks.push_back(trunkAt(k, 5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
+  double seconds = 0;
+  EXPECT_GT(slalom(trunks, 38, &seconds), 0.2);
+  EXPECT_LT(seconds, 50); // at 1 m/s, not by creeping
+}
+
+TEST(Slalom, FindsTheOpeningInAWall)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -12; k <= 12; ++k)
+    if (k != 5 && k != 6 && k != 7)
+      trunks.push_back(trunkAt(k + 12, 6, 0.5 * k, 0.15));
+  EXPECT_GT(slalom(trunks, 9), 0.05);
+}
+
+TEST(Slalom, KeepsFartherFromWhatIsLessWellKnown)
+{
+  Obstacle sure = trunkAt(0, 4, 0.1), vague = sure;
+  vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
+  const SlalomState state;
+  EXPECT_GT(std::abs(chooseWay({vague}, state, 0, {}).offset), std::abs(chooseWay({sure}, state, 0, {}).offset));
+}
+
+TEST(Slalom, StopsBeforeAWallWithoutOpening)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -30; k <= 30; ++k)
+    trunks.push_back(trunkAt(k + 30, 4, 0.4 * k, 0.2));
+  EXPECT_GT(slalom(trunks, 9), 0);
+}
+} // namespace
+} // namespace bole
