@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/simulation/random.h>
+#include <bole/trials/closed_loop.h>
 #include <bole/trials/error_curves.h>
 #include <bole/trials/injected_fault.h>
 #include <bole/trials/median_interval.h>
@@ -127,34 +128,46 @@ TEST(Scenario, TrunksStandOnTheSlalomsLineToo)
   EXPECT_GT(on_the_line, 3); // 0.05 a m^2 on 5 x 30 m^2: eight are expected
 }
 
-/// A hold in a small picture, from take-off to the end.
-ServoTrialOptions quickHold(FaultKind fault)
+/// Flies slowly to the left from the first frame on.
+class Leftward : public ServoTask
 {
-  ServoTrialOptions options;
-  options.scenario.kind = ServoKind::hold;
-  options.scenario.seed = 3;
-  options.robot.renderer.samples_per_pixel = 1;
-  options.loop.duration_s = 4;
-  options.loop.fault.kind = fault;
-  options.loop.fault.start_s = 1;
-  options.loop.fault.duration_s = 1.5;
-  return options;
-}
+protected:
+  bool sees(const FrameResult &, const Pipeline &) const override { return true; }
+  TaskCommand act(const FrameResult &, const Pipeline &) override
+  {
+    enter(TaskPhase::servoing);
+    return {false, {0, 0.4, 0, 0}, "left"};
+  }
+};
 
-TEST(ServoTrial, HoversWithinAFrameOfEachFaultAndStaysWhereItIs)
+TEST(ClosedLoop, HoversInTheFrameOfEachFaultAndFliesOnAfterIt)
 {
-  for (const FaultKind fault : {FaultKind::black, FaultKind::noise}) {
-    const ServoTrialResult result = runServoTrial(quickHold(fault));
-    ASSERT_GE(result.servoing_from_s, 0) << result.outcome;
-    EXPECT_LE(result.hover_after_s, 0.1 + 1e-6) << toString(fault);
-    EXPECT_LT(result.drift, 1);
-    EXPECT_FALSE(result.record.is_contact);
-    int spoilt = 0;
-    for (const LoopSample &sample : result.record.samples) {
+  ForestOptions forest;
+  forest.density = 0.02;
+  const Forest clearing = Forest::plant(forest, {{0, 0, 1}, {0, 5, 1}}, {});
+  for (const FaultKind fault : {FaultKind::black, FaultKind::freeze, FaultKind::noise}) {
+    vpSimulatorArDrone::Options settings = ServoTrialOptions::defaultRobot();
+    settings.renderer.samples_per_pixel = 1;
+    vpSimulatorArDrone robot(clearing, settings);
+    Pipeline pipeline(robot.camera(), robot.bMc());
+    Leftward task;
+    LoopOptions options;
+    options.duration_s = 4;
+    options.fault = {fault, 1, 1.5};
+    const LoopRecord record = runClosedLoop(robot, pipeline, task, options);
+    int spoilt = 0, after = 0;
+    double speed_at_end_of_fault = 1;
+    for (const LoopSample &sample : record.samples) {
       spoilt += sample.is_spoilt;
-      EXPECT_TRUE(!sample.is_spoilt || sample.frame_status != FrameStatus::ok);
+      EXPECT_TRUE(!sample.is_spoilt || (sample.is_hovering && sample.frame_status != FrameStatus::ok)) << toString(fault);
+      if (sample.is_spoilt)
+        speed_at_end_of_fault = sample.speed;
+      after += spoilt == 15 && !sample.is_spoilt && !sample.is_hovering;
     }
-    EXPECT_NEAR(spoilt, 15, 1);
+    EXPECT_EQ(spoilt, 15);
+    EXPECT_LT(speed_at_end_of_fault, 0.15); // 0.35 m/s before
+    EXPECT_GE(after, 10);
+    EXPECT_FALSE(record.is_contact);
   }
 }
 
