@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole track: from a flight through trees to a map of trunks and a trajectory.
 #include "commands.h"
+#include "field_of_view.h"
 #include "interrupt.h"
 #include "overlay_window.h"
 #include "track_output.h"
@@ -11,6 +12,7 @@
 #include <bole/output/progress.h>
 #include <bole/pipeline/config.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -28,15 +30,35 @@ struct Arguments
   std::string input, run, config;
   std::vector<std::string> settings;
   SourceOptions source;
-  bool is_shown = false, has_video = true, is_without_odometry = false;
+  bool is_shown = false, has_video = true, is_without_odometry = false, is_without_gyro = false;
   std::size_t frames_most = 0;
   double give_up_s = ArDroneSource::Options().give_up_s;
+  double camera_height = 0;
+  bool is_field_of_view_given = false;
 };
 
-std::unique_ptr<FrameSource> openInput(const Arguments &arguments)
+/// A video without a camera file is looked through for a pan that tells its field of view.
+std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, std::string &note)
+{
+  auto source = openSource(arguments.input, arguments.source);
+  note = source->note();
+  if (source->isCameraKnown() || arguments.is_field_of_view_given)
+    return source;
+  const FieldOfView view = fieldOfView(arguments.input, arguments.source);
+  if (view.degrees == 0)
+    return source;
+  SourceOptions options = arguments.source;
+  options.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
+  source = openSource(arguments.input, options);
+  note = fmt::format("no camera file: the camera turns as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
+                     view.degrees, view.sigma_degrees, source->camera().fx);
+  return source;
+}
+
+std::unique_ptr<FrameSource> openInput(const Arguments &arguments, std::string &note)
 {
   if (!ArDroneSource::accepts(arguments.input))
-    return openSource(arguments.input, arguments.source);
+    return openVideo(arguments, note);
   ArDroneSource::Options options;
   options.give_up_s = arguments.give_up_s;
   return std::make_unique<ArDroneSource>(ArDroneAddress::parse(arguments.input), options);
@@ -54,6 +76,8 @@ PipelineOptions readOptions(const Arguments &arguments, bool is_compressed)
     readConfig(arguments.config, options);
   for (const std::string &setting : arguments.settings)
     setOption(setting, options);
+  if (arguments.camera_height > 0)
+    options.visual.camera_height = arguments.camera_height;
   return options;
 }
 
@@ -120,15 +144,17 @@ void track(const Arguments &arguments)
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
     throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
   readOptions(arguments, false); // a mistake in them is said before the input is waited for
-  const auto source = openInput(arguments);
-  const PipelineOptions options = readOptions(arguments, isCompressed(*source));
+  std::string note;
+  const auto source = openInput(arguments, note);
+  PipelineOptions options = readOptions(arguments, isCompressed(*source));
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
-  if (!source->note().empty())
-    std::fprintf(stderr, "bole: %s\n", source->note().c_str());
+  options.visual.focal_known = options.visual.focal_known && source->isCameraKnown();
+  if (!note.empty())
+    std::fprintf(stderr, "bole: %s\n", note.c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
   const std::string preset = arguments.config.empty() && isCompressed(*source) ? "compressed" : arguments.config;
-  TrackOutput output(arguments.run, arguments.input, preset, *source, arguments.has_video);
+  TrackOutput output(arguments.run, arguments.input, preset, *source, note, arguments.has_video);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   Progress progress(source->size(), stderr);
@@ -138,10 +164,10 @@ void track(const Arguments &arguments)
     Frame frame;
     if (!source->next(frame))
       break;
-    if (arguments.is_without_odometry) {
+    if (arguments.is_without_odometry)
       frame.wMb_odometry.reset();
+    if (arguments.is_without_gyro)
       frame.gyro.clear();
-    }
     const FrameStatus status = frame.status;
     flight.take(std::move(frame));
     progress.update(++count, output.trunksInView(), toString(status));
@@ -177,6 +203,15 @@ void addTrack(CLI::App &app)
   command->add_option("--odometry-offset", arguments->source.odometry_offset_s,
                       "Added to the stamps of --odometry so that they count as the video's do [s]")
       ->capture_default_str();
+  CLI::Option *view = command->add_option("--field-of-view", arguments->source.field_of_view_deg,
+                                          "Horizontal, where there is no camera file [degrees]; else a pan in the video "
+                                          "tells it, or 65 is assumed");
+  command->add_option("--camera-height", arguments->camera_height,
+                      "Height of the camera over the ground [m], which gives a plain video its metre")
+      ->check(CLI::Range(0.1, 100.0));
+  const auto without = std::make_shared<std::vector<std::string>>();
+  command->add_option("--without", *without, "Withhold one sensor: gyro or odometry (may be given twice)")
+      ->check(CLI::IsMember({"gyro", "odometry"}));
   command->add_option("--rate", arguments->source.frame_rate_hz, "Frames a second of numbered images")
       ->capture_default_str();
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
@@ -191,11 +226,15 @@ void addTrack(CLI::App &app)
                   "Examples:\n"
                   "  bole track data/park-forward -o run\n"
                   "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
+                  "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
                   "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
                   "  bole track ardrone://192.168.1.1 -o run --show");
-  command->callback([arguments] {
+  command->callback([arguments, view, without] {
+    for (const std::string &sensor : *without)
+      (sensor == "gyro" ? arguments->is_without_gyro : arguments->is_without_odometry) = true;
+    arguments->is_field_of_view_given = view->count() > 0;
     if (arguments->source.odometry_path == "none") {
-      arguments->is_without_odometry = true;
+      arguments->is_without_odometry = arguments->is_without_gyro = true;
       arguments->source.odometry_path.clear();
     }
     track(*arguments);

@@ -36,7 +36,7 @@ vpImage<float> foregroundOf(const Saliency &saliency)
 } // namespace
 
 TrackOutput::TrackOutput(const std::string &run, const std::string &input, const std::string &preset,
-                         const FrameSource &source, bool has_video)
+                         const FrameSource &source, const std::string &note, bool has_video)
   : m_run(run), m_camera(source.camera())
 {
   std::error_code error;
@@ -46,7 +46,7 @@ TrackOutput::TrackOutput(const std::string &run, const std::string &input, const
   m_summary.version = BOLE_VERSION;
   m_summary.input = input;
   m_summary.preset = preset.empty() ? "default" : preset;
-  m_summary.note = source.note();
+  m_summary.note = note;
   m_summary.camera = m_camera;
   m_summary.has_odometry = source.hasOdometry();
   m_summary.has_gyro = source.hasGyro();
@@ -62,8 +62,6 @@ TrackOutput::TrackOutput(const std::string &run, const std::string &input, const
 vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, std::optional<double> age_ms)
 {
   ++m_summary.frames[frame.status];
-  if (!result.step_from_odometry && m_summary.timing.frames.size() == 1)
-    m_summary.scale = ScaleSource::prior;
   FrameTiming timing;
   timing.index = frame.index;
   timing.stamp_ns = frame.stamp_ns;
@@ -129,6 +127,8 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
   m_picture.online = toTrajectory(pipeline.onlineTrajectory());
   m_picture.trunks = pipeline.map();
   m_summary.trunks = m_picture.trunks;
+  m_summary.reference = pipeline.reference();
+  m_picture.caption = describe(m_summary.reference);
   m_summary.is_complete = is_complete;
   m_confirmed = static_cast<int>(
       std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),

@@ -19,7 +19,7 @@ class TrackOutput
 public:
   /// Makes the folder. \throw vpException when that cannot be done.
   TrackOutput(const std::string &run, const std::string &input, const std::string &preset, const FrameSource &source,
-              bool has_video);
+              const std::string &note, bool has_video);
 
   /// Takes in a frame and returns its overlay (empty for a frame without an image). \p age_ms: of a live frame when
   /// \p result was there.

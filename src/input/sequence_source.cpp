@@ -150,6 +150,7 @@ std::size_t SequenceSource::size() const
 std::string SequenceSource::name() const { return m_state->pattern; }
 bool SequenceSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
 bool SequenceSource::hasGyro() const { return false; }
+bool SequenceSource::isCameraKnown() const { return m_state->note.empty(); } // the note tells of a guess
 std::string SequenceSource::note() const { return m_state->note; }
 
 std::string SequenceSource::patternOf(const std::string &folder)

@@ -89,5 +89,6 @@ std::size_t VideoSource::size() const { return m_state->decoder.frames(); }
 std::string VideoSource::name() const { return m_state->name; }
 bool VideoSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
 bool VideoSource::hasGyro() const { return false; }
+bool VideoSource::isCameraKnown() const { return m_state->note.empty(); } // the note tells of a guess
 std::string VideoSource::note() const { return m_state->note; }
 } // namespace bole

@@ -100,8 +100,10 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk) const
   return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
 }
 
-bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk) const
+bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
 {
+  if (!has_ranges)
+    return trunk.observations >= m_options.confirm_observations && trunk.hits >= 3 * trunk.misses;
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax &&
@@ -191,18 +193,25 @@ MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
   return nullptr;
 }
 
-std::vector<MapChange> TrunkMap::review()
+std::vector<MapChange> TrunkMap::review(bool has_ranges)
 {
   std::vector<MapChange> changes;
   const auto change = [&changes](MapTrunk &trunk, TrunkStatus to, int into = -1) {
     changes.push_back({trunk.id, into, trunk.status, to});
     trunk.status = to;
   };
+<<<<<<< HEAD
   for (const std::size_t i : m_active) {
     MapTrunk &trunk = m_trunks[i];
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk) && !hasBetterRival(trunk, 0))
+=======
+  for (MapTrunk &trunk : m_trunks) {
+    if (trunk.removed)
+      continue;
+    if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
+>>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
       change(trunk, TrunkStatus::confirmed);
-    else if (trunk.status != TrunkStatus::lost && isDisproved(trunk)) {
+    else if (trunk.status != TrunkStatus::lost && has_ranges && isDisproved(trunk)) {
       trunk.removed = true;
       change(trunk, TrunkStatus::lost);
     }
@@ -228,18 +237,19 @@ std::vector<MapChange> TrunkMap::review()
   return changes;
 }
 
-std::vector<TrunkRecord> TrunkMap::records() const
+std::vector<TrunkRecord> TrunkMap::records(double ground_z) const
 {
+  const double breast = ground_z + kBreastHeight;
   std::vector<TrunkRecord> records;
   for (const MapTrunk &trunk : m_trunks) {
     TrunkRecord record;
     record.id = trunk.id;
-    record.xy = trunk.trunk.axisAt(kBreastHeight).head<2>();
+    record.xy = trunk.trunk.axisAt(breast).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
     Eigen::Matrix<double, 2, 5> J = Eigen::Matrix<double, 2, 5>::Zero(); // of the place at breast height
     J.leftCols<2>().setIdentity();
-    J.rightCols<2>() = kBreastHeight * Eigen::Matrix2d::Identity();
+    J.rightCols<2>() = breast * Eigen::Matrix2d::Identity();
     record.covariance_xy = J * trunk.covariance * J.transpose();
     record.variance_radius = trunk.covariance(2, 2) * record.radius * record.radius;
     record.observations = trunk.observations;

@@ -2,10 +2,12 @@
 #include <bole/input/asl_source.h>
 #include <bole/input/truth.h>
 #include <bole/output/evaluation.h>
+#include <bole/output/summary_json.h>
 #include <bole/output/trunks_csv.h>
 
 #include <filesystem>
 #include <fmt/format.h>
+#include <optional>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -34,6 +36,22 @@ struct Reference
   std::vector<TruthTrunk> trunks;
   std::vector<TrunkVisibility> visibility;
 };
+
+/// What the run says of its world; one of an earlier version, which says nothing, had odometry.
+WorldReference worldOf(const std::string &summary)
+{
+  return std::filesystem::exists(summary) ? readReference(summary) : WorldReference();
+}
+
+/// Without odometry the world stands at the height of the first camera: the mean height is free too.
+void levelHeights(std::vector<PosePair> &pairs)
+{
+  double off = 0;
+  for (const PosePair &pair : pairs)
+    off += (pair.truth.t.z() - pair.estimate.t.z()) / static_cast<double>(pairs.size());
+  for (PosePair &pair : pairs)
+    pair.estimate.t.z() += off;
+}
 
 /// True poses at the stamps of the frames.
 std::vector<Pose> truePoses(const AslSource &source)
@@ -135,11 +153,18 @@ Evaluation evaluate(const std::string &run, const std::string &sequence,
     evaluation.time_shift_s = static_cast<double>(shift_ns) * 1e-9;
   }
 
-  const auto pairs = pairsOf(in_run("trajectory.tum"), shift_ns, reference.trajectory);
+  const WorldReference world = worldOf(in_run("summary.json"));
+  evaluation.reference = describe(world);
+  const auto levelled = [&](const char *name) {
+    std::vector<PosePair> pairs = pairsOf(in_run(name), shift_ns, reference.trajectory);
+    if (world.gravity != GravitySource::odometry)
+      levelHeights(pairs);
+    return pairs;
+  };
+  const std::vector<PosePair> pairs = levelled("trajectory.tum");
   evaluation.smoothed = report(pairs);
   if (std::filesystem::exists(in_run("trajectory_online.tum")))
-    evaluation.online =
-        report(pairsOf(in_run("trajectory_online.tum"), shift_ns, reference.trajectory));
+    evaluation.online = report(levelled("trajectory_online.tum"));
   if (!reference.odometry.empty()) {
     std::vector<PosePair> odometry;
     for (const PosePair &pair : pairs)
@@ -149,7 +174,8 @@ Evaluation evaluate(const std::string &run, const std::string &sequence,
   }
   if (!reference.trunks.empty() || evaluation.is_against_run)
     evaluation.trunks = trunkMetrics(readTrunks(in_run("trunks.csv")), reference.trunks,
-                                     reference.visibility, alignAll(pairs));
+                                     reference.visibility, alignAll(pairs),
+                                     world.scale == ScaleSource::odometry ? Alignment::xy_yaw : Alignment::xy_yaw_scale);
   return evaluation;
 }
 } // namespace bole

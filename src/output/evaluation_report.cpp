@@ -57,9 +57,10 @@ void addBins(std::string &text, const TrunkMetrics &trunks)
 void addTrunks(std::string &text, const TrunkMetrics &trunks, bool is_against_run)
 {
   add(text,
-      "\nTrunks: {} confirmed, {} matched one to one under {} m after alignment in x, y, yaw\n"
+      "\nTrunks: {} confirmed, {} matched one to one under {} m after alignment in x, y, yaw{}\n"
       "  recall {:.3f} ({} of {})   precision {:.3f}   F1 {:.3f}   duplicates {:.3f}\n\n",
-      trunks.confirmed, trunks.matches.size(), kMatchGate, trunks.recall, trunks.all.found,
+      trunks.confirmed, trunks.matches.size(), kMatchGate,
+      trunks.matching == Alignment::xy_yaw_scale ? " and scale" : "", trunks.recall, trunks.all.found,
       trunks.all.expected, trunks.precision, trunks.f1, trunks.duplicates);
   add(text, "  Position error [m]       median     RMSE\n");
   for (const auto &[alignment, name] :
@@ -150,6 +151,7 @@ Json toJson(const TrunkMetrics &trunks)
   Json json = {{"confirmed", trunks.confirmed},   {"precision", trunks.precision},
                {"recall", trunks.recall},         {"f1", trunks.f1},
                {"duplicates", trunks.duplicates}, {"gate_m", kMatchGate},
+               {"matched_after", toString(trunks.matching)},
                {"all", toJson(trunks.all)}};
   for (const auto &[key, bins] :
        {std::pair("by_range", &trunks.by_range), std::pair("by_parallax", &trunks.by_parallax)})
@@ -183,11 +185,14 @@ Json toJson(const TrunkMetrics &trunks)
 std::string toTable(const Evaluation &evaluation, bool verbose)
 {
   std::string text;
-  add(text, "{} against {}: {} of {} frames\n\n", evaluation.run, evaluation.sequence,
+  add(text, "{} against {}: {} of {} frames\n", evaluation.run, evaluation.sequence,
       evaluation.smoothed.absolute[0].poses, evaluation.frames);
   if (evaluation.time_shift_s)
-    add(text, "  The run's stamps were shifted by {:+.3f} s, for its motion to fit.\n\n",
+    add(text, "  The run's stamps were shifted by {:+.3f} s, for its motion to fit.\n",
         *evaluation.time_shift_s);
+  if (!evaluation.reference.empty())
+    add(text, "{}\n", evaluation.reference);
+  text += "\n";
   add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]",
       "x, y, yaw", "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");
   addTrajectory(text, "smoothed", evaluation.smoothed);
@@ -210,6 +215,7 @@ std::string toJson(const Evaluation &evaluation)
   json["against_run"] = evaluation.is_against_run;
   if (evaluation.time_shift_s)
     json["time_shift_s"] = *evaluation.time_shift_s;
+  json["reference"] = evaluation.reference;
   json["trajectory"]["smoothed"] = toJson(evaluation.smoothed);
   if (evaluation.online)
     json["trajectory"]["online"] = toJson(*evaluation.online);

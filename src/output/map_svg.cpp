@@ -105,6 +105,10 @@ std::string legend(const MapPicture &picture)
 {
   std::string text = fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", escaped(picture.title));
   double y = 40;
+  if (!picture.caption.empty()) {
+    text += fmt::format("<text x=\"10\" y=\"{:.0f}\" fill=\"#222\">{}</text>\n", y, picture.caption);
+    y += 18;
+  }
   const auto entry = [&](bool shown, const char *colour, const char *name) {
     if (!shown)
       return;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/version.hpp>
 #include <visp3/core/vpConfig.h>
+#include <visp3/core/vpException.h>
 
 extern "C" {
 #include <libavutil/avutil.h>
@@ -74,21 +76,9 @@ Json framesJson(const std::map<FrameStatus, std::size_t> &frames)
   return json;
 }
 
+Json positiveOrNull(double value) { return value > 0 ? Json(value) : Json(); }
 Json textOrNull(const std::string &text) { return text.empty() ? Json() : Json(text); }
 } // namespace
-
-const char *toString(ScaleSource source)
-{
-  switch (source) {
-  case ScaleSource::odometry:
-    return "odometry";
-  case ScaleSource::height:
-    return "height";
-  case ScaleSource::prior:
-    return "prior";
-  }
-  return "unknown";
-}
 
 std::string toJson(const RunSummary &summary)
 {
@@ -104,7 +94,11 @@ std::string toJson(const RunSummary &summary)
   json["camera"] = {{"width_px", camera.width}, {"height_px", camera.height}, {"fx_px", camera.fx},
                     {"fy_px", camera.fy},       {"cx_px", camera.cx},         {"cy_px", camera.cy}};
   json["preset"] = textOrNull(summary.preset);
-  json["scale"] = toString(summary.scale);
+  json["scale"] = toString(summary.reference.scale);
+  json["scale_sigma"] = positiveOrNull(summary.reference.scale_sigma);
+  json["gravity"] = toString(summary.reference.gravity);
+  json["gravity_sigma_rad"] = positiveOrNull(summary.reference.gravity_sigma);
+  json["ranges"] = summary.reference.has_ranges;
   json["frames"] = framesJson(summary.frames);
   json["trunks"] = trunksJson(summary.trunks);
   json["timing"] = timingJson(summary.timing);
@@ -115,6 +109,40 @@ std::string toJson(const RunSummary &summary)
                       {"opencv", CV_VERSION},
                       {"libav", av_version_info()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+namespace
+{
+template <typename Source> Source sourceOf(const std::string &path, const Json &json, const char *key, int count)
+{
+  if (!json.contains(key)) // of an earlier version
+    return static_cast<Source>(0);
+  for (int i = 0; i < count; ++i)
+    if (json.value(key, "") == toString(static_cast<Source>(i)))
+      return static_cast<Source>(i);
+  throw vpException(vpException::badValue, "%s: %s = \"%s\", is no known source", path.c_str(), key,
+                    json.value(key, "").c_str());
+}
+
+double numberOrZero(const Json &json, const char *key)
+{
+  return json.contains(key) && json[key].is_number() ? json[key].get<double>() : 0;
+}
+} // namespace
+
+WorldReference readReference(const std::string &path)
+{
+  std::ifstream file(path);
+  const Json json = Json::parse(file, nullptr, false);
+  if (!json.is_object())
+    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+  WorldReference reference;
+  reference.scale = sourceOf<ScaleSource>(path, json, "scale", 3);
+  reference.scale_sigma = numberOrZero(json, "scale_sigma");
+  reference.gravity = sourceOf<GravitySource>(path, json, "gravity", 3);
+  reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
+  reference.has_ranges = json.value("ranges", true);
+  return reference;
 }
 
 void writeSummary(const std::string &path, const RunSummary &summary) { writeAtomically(path, toJson(summary)); }

@@ -136,9 +136,9 @@ Alignments alignAll(const std::vector<PosePair> &pairs)
 
 TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector<TruthTrunk> &truth,
                           const std::vector<TrunkVisibility> &visibility,
-                          const Alignments &alignments)
+                          const Alignments &alignments, Alignment matching)
 {
-  const PlanarTransform &aligned = at(alignments, Alignment::xy_yaw);
+  const PlanarTransform &aligned = at(alignments, matching);
   std::vector<TrunkRecord> confirmed;
   std::copy_if(map.begin(), map.end(), std::back_inserter(confirmed),
                [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; });
@@ -151,6 +151,7 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
   const std::vector<int> partner = assign(distance, kMatchGate);
 
   TrunkMetrics metrics;
+  metrics.matching = matching;
   metrics.confirmed = confirmed.size();
   std::vector<bool> is_found(truth.size(), false);
   std::size_t duplicates = 0;

@@ -112,6 +112,20 @@ void addMotion(std::vector<OptionEntry> &entries, MotionModelOptions &o)
                                  {"motion.free_turn_sigma", &o.free_turn_sigma}});
 }
 
+void addVisual(std::vector<OptionEntry> &entries, VisualOdometryOptions &o)
+{
+  entries.insert(entries.end(), {{"visual.camera_height", &o.camera_height},
+                                 {"visual.camera_height_sigma", &o.camera_height_sigma},
+                                 {"visual.start_height", &o.start_height},
+                                 {"visual.start_depth", &o.start_depth},
+                                 {"visual.start_sigma", &o.start_sigma},
+                                 {"visual.step_sigma", &o.step_sigma},
+                                 {"visual.step_scale_sigma", &o.step_scale_sigma},
+                                 {"visual.turn_sigma", &o.turn_sigma},
+                                 {"visual.still_sigma", &o.still_sigma},
+                                 {"visual.focal_known", &o.focal_known}});
+}
+
 void addPoints(std::vector<OptionEntry> &entries, PointMotionOptions &o)
 {
   entries.insert(entries.end(), {{"points.max_points", &o.points.max_points},
@@ -309,6 +323,7 @@ std::vector<OptionEntry> optionEntries(PipelineOptions &options)
   std::vector<OptionEntry> entries;
   addFlow(entries, options.flow);
   addMotion(entries, options.motion);
+  addVisual(entries, options.visual);
   addPoints(entries, options.points);
   entries.insert(entries.end(), {{"gradient.sigma_px", &options.gradient.sigma_px},
                                  {"gradient.split", &options.gradient.split},

@@ -27,6 +27,7 @@ void PipelineOptions::validate() const
   flow.validate();
   motion.validate();
   points.validate();
+  visual.validate();
   gradient.validate();
   saliency.validate();
   detection.validate();

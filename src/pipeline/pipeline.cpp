@@ -57,12 +57,17 @@ FrameResult Pipeline::process(const Frame &frame)
   const double time_s = 1e-9 * static_cast<double>(frame.stamp_ns);
   Lap lap{result};
 
-  addPose(frame, result);
+  const GyroBias bias = m_points.gyroBias();
+  std::vector<RelativeMotion> motions;
+  if (m_options.flow.use_points)
+    motions = m_points.process(frame);
+  lap("points");
+  addPose(frame, bias, result);
   lap("predict");
   if (frame.status == FrameStatus::ok) {
-    if (m_options.flow.use_points)
-      addRelativePoses(m_points.process(frame));
-    lap("points");
+    if (!m_visual)
+      addRelativePoses(motions);
+    lap("poses");
     Gradient gradient = computeGradient(frame.image, m_options.gradient);
     lap("gradient");
     if (m_options.flow.use_saliency)
@@ -76,6 +81,7 @@ FrameResult Pipeline::process(const Frame &frame)
     detectNew(result);
     lap("detection");
     reviewMap();
+    reviewScale(0.1, false);
     lap("map");
   }
   else
@@ -92,30 +98,40 @@ FrameResult Pipeline::process(const Frame &frame)
   return result;
 }
 
-void Pipeline::addPose(const Frame &frame, FrameResult &result)
+void Pipeline::addPose(const Frame &frame, const GyroBias &bias, FrameResult &result)
 {
   m_indices.push_back(frame.index);
   if (m_smoother.poseCount() == 0) {
-    const PosePrior first = m_motion.first(frame);
-    m_ground_known = frame.wMb_odometry.has_value();
+    if (frame.wMb_odometry)
+      m_ground_z = 0;
+    else if (m_options.flow.use_points)
+      m_visual.emplace(m_camera, m_bMc, m_options.visual);
+    const PosePrior first = m_visual ? m_visual->first(frame, m_points.tracker()) : m_motion.first(frame);
     m_smoother.addFirstPose(first.mean, first.covariance);
     m_smoother.update();
     return;
   }
   const Pose wMa = m_smoother.pose(m_smoother.poseCount() - 1);
-  const MotionStep step = m_motion.step(frame, wMa, m_points.gyroBias(), m_velocity);
+  MotionStep step = m_motion.step(frame, wMa, bias, m_velocity);
+  std::vector<VisualLink> links;
+  if (m_visual)
+    step = visualStep(frame, step, links);
   const std::size_t pose = m_smoother.addPose(step.aMb, step.covariance);
   if (step.absolute)
     m_smoother.addPosePrior(pose, *step.absolute);
+  for (const VisualLink &link : links)
+    m_smoother.addOdometry(poseOf(link.a_index), poseOf(link.b_index), link.odometry);
   result.step_from_odometry = step.step_from_odometry;
   m_smoother.update();
 }
 
+std::size_t Pipeline::poseOf(std::size_t frame_index) const
+{
+  return static_cast<std::size_t>(std::lower_bound(m_indices.begin(), m_indices.end(), frame_index) - m_indices.begin());
+}
+
 void Pipeline::addRelativePoses(const std::vector<RelativeMotion> &motions)
 {
-  const auto poseOf = [this](std::size_t index) {
-    return static_cast<std::size_t>(std::lower_bound(m_indices.begin(), m_indices.end(), index) - m_indices.begin());
-  };
   bool added = false;
   for (const RelativeMotion &motion : motions) {
     if (!motion.estimate.hasDirection()) {
@@ -152,7 +168,7 @@ void Pipeline::estimateSaliency(const Frame &frame, FrameResult &result)
   const std::size_t pose = m_smoother.poseCount() - 1;
   if (pose > 0) {
     const Pose pMc = cameraAt(pose - 1).inverse() * cameraAt(pose);
-    if (result.step_from_odometry || !frame.gyro.empty())
+    if (result.step_from_odometry || m_visual || !frame.gyro.empty())
       turn = RotationPrior{pMc.R, 1e-6 * Eigen::Matrix3d::Identity()};
     if (result.step_from_odometry)
       step = TranslationPrior{pMc.t, 1e-4 * Eigen::Matrix3d::Identity()};
@@ -162,11 +178,12 @@ void Pipeline::estimateSaliency(const Frame &frame, FrameResult &result)
 
 ElevationRange Pipeline::elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const
 {
-  if (!m_ground_known)
+  if (!m_ground_z)
     return m_options.detection.profile.range;
   const double d = trunk.radius() / relative.ratio();
   const double tangent = std::sqrt(std::max(d * d - trunk.radius() * trunk.radius(), 0.01));
-  return {(m_options.flow.trunk_low - wMc.t.z()) / tangent, (m_options.flow.trunk_high - wMc.t.z()) / tangent};
+  const double above = wMc.t.z() - *m_ground_z;
+  return {(m_options.flow.trunk_low - above) / tangent, (m_options.flow.trunk_high - above) / tangent};
 }
 
 /// Borders behind nearer trunks of the map are hidden.
@@ -233,9 +250,15 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
 {
   const std::size_t pose = m_smoother.poseCount() - 1;
   const Pose wMc = cameraAt(pose);
+<<<<<<< HEAD
   for (const std::size_t i : m_map.active()) {
     MapTrunk &trunk = m_map.trunks()[i];
     if ((trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
+=======
+  for (MapTrunk &trunk : m_map.trunks()) {
+    const bool is_far = !isTurning() && (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range;
+    if (trunk.removed || is_far)
+>>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
       continue;
     const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
@@ -251,7 +274,7 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
       observe(trunk, pose, prediction, tracked, time_s);
     else if (tracked.status != TrackingStatus::occluded)
       m_map.recordMiss(trunk);
-    if (result.saliency && tracked.status == TrackingStatus::tracked) {
+    if (result.saliency && !isTurning() && tracked.status == TrackingStatus::tracked) {
       const double foreground =
           foregroundBetween(result.saliency->p_background, m_camera, tracked.optimum, prediction.range);
       if (foreground >= 0)
@@ -321,9 +344,10 @@ void Pipeline::detectNew(FrameResult &result)
 {
   if (m_online.size() % static_cast<std::size_t>(m_options.flow.detect_every) != 0)
     return;
-  if ((m_options.flow.detect_lines || !m_ground_known) && result.saliency)
+  const bool has_ranges = !isTurning() && (m_visual || m_ground_z);
+  if ((m_options.flow.detect_lines || !has_ranges) && result.saliency)
     detectSingle(result);
-  if (!m_options.flow.detect_window || !m_ground_known)
+  if (!m_options.flow.detect_window || !has_ranges)
     return;
   std::vector<DetectorView> views;
   for (const View &view : m_views)
@@ -341,7 +365,14 @@ void Pipeline::detectNew(FrameResult &result)
 void Pipeline::detectSingle(FrameResult &result)
 {
   const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
+<<<<<<< HEAD
   result.lines = detectLines(m_views.back().gradient, result.saliency->p_background, m_camera, wMc.R, inhibited(true),
+=======
+  vpImage<float> p_background = result.saliency->p_background;
+  if (isTurning()) // no parallax: what stands upright and stays where it is must do
+    p_background = 0.f;
+  result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(),
+>>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
                              m_options.detection.profile, m_options.lines);
   for (const LineDetection &line : result.lines)
     adopt(line);
@@ -401,7 +432,7 @@ void Pipeline::adopt(const Detection &detection)
 void Pipeline::reviewMap()
 {
   refreshMap();
-  for (const MapChange &change : m_map.review()) {
+  for (const MapChange &change : m_map.review(!isTurning())) {
     const MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(change.id)];
     if (trunk.removed && m_smoother.hasTrunk(trunk.smoother_id))
       m_smoother.removeTrunk(trunk.smoother_id);
@@ -419,11 +450,12 @@ void Pipeline::refreshMap()
 
 std::vector<TrunkRecord> Pipeline::map() const
 {
-  std::vector<TrunkRecord> records = m_map.records();
-  if (m_smoother.poseCount() == 0)
+  std::vector<TrunkRecord> records = m_map.records(m_ground_z.value_or(0));
+  if (m_smoother.poseCount() == 0 || isTurning())
     return records;
   const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>();
-  const double variance = m_options.motion.scale_sigma * m_options.motion.scale_sigma;
+  const double sigma = m_visual ? estimateScale(true).sigma : m_options.motion.scale_sigma;
+  const double variance = sigma * sigma;
   for (TrunkRecord &record : records) {
     const Eigen::Vector2d by_log_scale = record.xy - origin;
     record.covariance_xy += variance * by_log_scale * by_log_scale.transpose();
@@ -438,6 +470,7 @@ void Pipeline::finish()
     return;
   m_smoother.optimize();
   refreshMap();
+  reviewScale(0, true);
 }
 
 std::vector<Pipeline::StampedPose> Pipeline::smoothedTrajectory() const

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -62,6 +63,40 @@ TEST(Track, MapsTheDemonstrationFlight)
     confirmed += line.find("confirmed") != std::string::npos;
   EXPECT_GE(confirmed, 3);
   EXPECT_EQ(run("solve " + folder + "/graph.g2o").status, 0);
+}
+
+TEST(Track, MapsAPlainVideoAndSaysWhereItsMetreComesFrom)
+{
+  const std::string folder = freshFolder("plain");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --odometry none --frames 60").status, 0);
+  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  EXPECT_EQ(summary.at("scale"), "prior");
+  EXPECT_GT(summary.at("scale_sigma"), 0.05);
+  EXPECT_EQ(summary.at("gravity"), "trunks");
+  EXPECT_EQ(summary.at("ranges"), true);
+  std::ifstream map(folder + "/map.svg");
+  const std::string svg((std::istreambuf_iterator<char>(map)), std::istreambuf_iterator<char>());
+  EXPECT_THAT(svg, HasSubstr("scale: prior on the radius"));
+  const Outcome table = run("evaluate " + folder + " " + kFlight);
+  ASSERT_EQ(table.status, 0);
+  EXPECT_THAT(table.text, HasSubstr("scale: prior on the radius"));
+  EXPECT_THAT(table.text, HasSubstr("x, y, yaw and scale"));
+  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
+  const auto &path = evaluation.at("trajectory").at("smoothed");
+  EXPECT_LT(path.at("ate").at("xy_yaw_scale").at("rmse_m"), 0.02 * 6); // 60 frames fly more than 6 m
+  EXPECT_NEAR(std::log(path.at("scale").get<double>()), 0, 0.8);      // the prior knows it to a factor of 1.6
+}
+
+TEST(Track, AKnownHeightOfTheCameraIsTheMetreOfAPlainVideo)
+{
+  const std::string folder = freshFolder("height");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --odometry none --camera-height 1.5 --frames 60").status,
+            0);
+  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  EXPECT_EQ(summary.at("scale"), "height");
+  ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
+  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
+  EXPECT_NEAR(evaluation.at("trajectory").at("smoothed").at("scale").get<double>(), 1, 0.25);
 }
 
 void expectRefused(const std::string &arguments, const std::string &folder, const std::string &names)

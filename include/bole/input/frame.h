@@ -71,6 +71,8 @@ public:
   virtual std::string name() const = 0;
   virtual bool hasOdometry() const = 0;
   virtual bool hasGyro() const = 0;
+  /// False where the focal length is a guess.
+  virtual bool isCameraKnown() const { return true; }
   /// What the user should be told about how the input is read (an assumed camera); empty when
   /// nothing.
   virtual std::string note() const { return {}; }

@@ -34,6 +34,7 @@ public:
   std::string name() const override;
   bool hasOdometry() const override;
   bool hasGyro() const override;
+  bool isCameraKnown() const override;
   std::string note() const override;
 
   /// The pattern of a folder of numbered images, or empty.

@@ -31,6 +31,7 @@ public:
   std::string name() const override;
   bool hasOdometry() const override;
   bool hasGyro() const override;
+  bool isCameraKnown() const override;
   std::string note() const override;
 
 private:

@@ -111,18 +111,20 @@ public:
   void recordForeground(MapTrunk &trunk, double range, double foreground) const;
 
   /// Promotes, loses and merges by what is known now. The caller carries the changes to the smoother.
-  std::vector<MapChange> review();
+  /// \p has_ranges: false while the camera has only turned, so that a trunk earns its place by its bearing and width.
+  std::vector<MapChange> review(bool has_ranges = true);
 
   /// Log odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
   /// often it was missed, how it moved against the background, its contrast, its radius and how well its place is
   /// known. A logistic regression on simulated flights: see trunk_evidence.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
 
-  std::vector<TrunkRecord> records() const;
+  /// \p ground_z: height of the ground in the world [m], over which breast height counts.
+  std::vector<TrunkRecord> records(double ground_z = 0) const;
 
 private:
   bool isDisproved(const MapTrunk &trunk) const;
-  bool mayBeConfirmed(const MapTrunk &trunk) const;
+  bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;
   double advantage(const MapTrunk &trunk, const MapTrunk &rival) const;
   bool hasBetterRival(const MapTrunk &trunk, double margin) const;

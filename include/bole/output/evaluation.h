@@ -36,12 +36,15 @@ struct Evaluation
   std::optional<TrajectoryReport> online;   ///< trajectory_online.tum
   std::optional<TrajectoryReport> odometry; ///< the pose filter at the frames of trajectory.tum
   std::optional<TrunkMetrics> trunks;       ///< where the sequence has trees.csv
+  std::string reference; ///< describe() of the run's metre and up, from its summary.json; empty without one
 };
 
 /// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with
 /// another run: then its smoothed trajectory and its confirmed trunks stand for the truth, all of
 /// them expected, and what is measured is how alike two runs are. Errors: vpException naming the
-/// file that is missing or faulty, or that has no common stamps with the truth.
+/// file that is missing or faulty, or that has no common stamps with the truth. Where the summary of
+/// the run says that its metre is not odometry's, trunks are matched after alignment in scale too;
+/// where its world stands at the height of the first camera, the mean height is aligned.
 Evaluation evaluate(const std::string &run, const std::string &sequence,
                     const EvaluationOptions &options = {});
 

@@ -6,6 +6,7 @@
 #include <bole/input/frame.h>
 #include <bole/map/trunk_record.h>
 #include <bole/output/timing_csv.h>
+#include <bole/output/world_reference.h>
 
 #include <map>
 #include <string>
@@ -13,14 +14,6 @@
 
 namespace bole
 {
-/// Where the metre of the map comes from.
-enum class ScaleSource {
-  odometry, ///< the pose filter
-  height,   ///< a known height over the ground
-  prior     ///< the radius a trunk usually has: distances are right only as far as that is
-};
-const char *toString(ScaleSource source);
-
 struct RunSummary
 {
   std::string version;                   ///< of bole
@@ -29,7 +22,7 @@ struct RunSummary
   PinholeCamera camera;
   bool has_odometry = false, has_gyro = false;
   bool is_complete = true;               ///< false: the run was stopped, this is what was known by then
-  ScaleSource scale = ScaleSource::odometry;
+  WorldReference reference;              ///< where the metre and up come from
   std::map<FrameStatus, std::size_t> frames;
   std::vector<TrunkRecord> trunks;
   TimingTable timing;
@@ -37,8 +30,10 @@ struct RunSummary
 };
 
 /// Inputs, preset, camera, frames by status, trunks by status with the medians of their radius, standard deviation and
-/// observations, scale source, median cost by stage, versions of the libraries.
+/// observations, sources of scale and gravity, median cost by stage, versions of the libraries.
 std::string toJson(const RunSummary &summary);
+/// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
+WorldReference readReference(const std::string &path);
 /// toJson(), written atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
 } // namespace bole

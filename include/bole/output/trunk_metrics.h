@@ -14,7 +14,7 @@
 
 namespace bole
 {
-/// [m] how far, after the alignment in x, y and yaw, a trunk may be from the one of the truth it
+/// [m] how far, after the alignment in x, y and yaw (TrunkMetrics::matching), a trunk may be from the one of the truth it
 /// stands for.
 constexpr double kMatchGate = 0.5;
 
@@ -43,7 +43,7 @@ struct Unmatched
 {
   int id = 0;
   int nearest_id = -1;         ///< in the other set (for a miss: any status), -1 if that is empty
-  double nearest_distance = 0; ///< [m], after the alignment in x, y and yaw
+  double nearest_distance = 0; ///< [m], after TrunkMetrics::matching
   bool is_duplicate = false;  ///< within the gate of a trunk of the truth that has a better partner
   TrunkRecord estimate;       ///< false positive: the trunk; miss: the nearest of the map
   TrunkVisibility visibility; ///< of the missed trunk
@@ -72,6 +72,7 @@ struct TrunkBin
 
 struct TrunkMetrics
 {
+  Alignment matching = Alignment::xy_yaw; ///< after which the trunks were matched
   std::size_t confirmed = 0;
   double precision = 0; ///< matched / confirmed, against all trunks of the truth, near and far
   double recall = 0;    ///< expected and matched / expected (TrunkVisibility::is_expected)
@@ -83,10 +84,11 @@ struct TrunkMetrics
   std::vector<Unmatched> false_positives, misses;
 };
 
-/// Matches the confirmed trunks of \p map one to one with \p truth (assign(), after the alignment
-/// in x, y and yaw, under kMatchGate) and measures them. Misses, false positives and duplicates
+/// Matches the confirmed trunks of \p map one to one with \p truth (assign(), after \p matching:
+/// in x, y and yaw, and in scale where the map's metre is only estimated; under kMatchGate) and
+/// measures them. Misses, false positives and duplicates
 /// always count. \param visibility of each trunk of \p truth.
 TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector<TruthTrunk> &truth,
                           const std::vector<TrunkVisibility> &visibility,
-                          const Alignments &alignments);
+                          const Alignments &alignments, Alignment matching = Alignment::xy_yaw);
 } // namespace bole

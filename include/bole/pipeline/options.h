@@ -8,6 +8,7 @@
 #include <bole/map/trunk_map.h>
 #include <bole/motion/point_motion.h>
 #include <bole/pipeline/motion_model.h>
+#include <bole/pipeline/visual_odometry.h>
 #include <bole/saliency/saliency_options.h>
 #include <bole/smoothing/smoother.h>
 #include <bole/tracking/trunk_tracker.h>
@@ -48,6 +49,7 @@ struct PipelineOptions
   FlowOptions flow;
   MotionModelOptions motion;
   PointMotionOptions points = withoutOdometry();
+  VisualOdometryOptions visual;
   GradientOptions gradient;
   SaliencyOptions saliency;
   DetectorOptions detection;

@@ -21,6 +21,7 @@
 /// Memory: the window of the detector and the graph of the smoother; no image is kept beyond the window.
 /// Not thread-safe; no globals.
 
+#include <bole/output/world_reference.h>
 #include <bole/pipeline/options.h>
 #include <bole/saliency/saliency.h>
 
@@ -52,7 +53,7 @@ struct FrameResult
   std::optional<Saliency> saliency;
   std::vector<std::pair<const char *, double>> timing_ms; ///< a stage each, in flow order
   UpdateStatus smoother_status = UpdateStatus::ok;
-  bool step_from_odometry = false;
+  bool step_from_odometry = false; ///< of a pose filter, or seen by the points of a plain video
 };
 
 class Pipeline
@@ -67,9 +68,11 @@ public:
   void finish();
 
   const std::vector<MapTrunk> &mapTrunks() const { return m_map.trunks(); }
-  /// The trunks, with covariances that carry the common error of the odometry's scale: it moves every trunk along its
+  /// The trunks, with covariances that carry the common error of the scale: it moves every trunk along its
   /// line from the first pose and changes every radius in proportion, and no camera sees it.
   std::vector<TrunkRecord> map() const;
+  /// Where the metre and up come from, as of the last frame.
+  WorldReference reference() const;
   struct StampedPose
   {
     std::int64_t stamp_ns = 0;
@@ -92,7 +95,19 @@ private:
   };
   struct Lap;
 
-  void addPose(const Frame &frame, FrameResult &result);
+  void addPose(const Frame &frame, const GyroBias &bias, FrameResult &result);
+  MotionStep visualStep(const Frame &frame, const MotionStep &predicted, std::vector<VisualLink> &links);
+  void learnGround(const Pose &wMb);
+  bool isTurning() const { return m_visual && !m_visual->hasUnit(); } ///< without any parallax so far
+  struct ScaleEstimate
+  {
+    double log_correction = 0, sigma = 0; ///< of the scale that the map has now
+    ScaleSource source = ScaleSource::prior;
+  };
+  ScaleEstimate estimateScale(bool with_radii) const;
+  void reviewScale(double least_correction, bool with_radii);
+  void rescale(double factor);
+  std::size_t poseOf(std::size_t frame_index) const;
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
   void addTurn(std::size_t a, std::size_t b, const RelativePoseEstimate &estimate);
   void estimateSaliency(const Frame &frame, FrameResult &result);
@@ -119,6 +134,7 @@ private:
   PipelineOptions m_options;
   MotionModel m_motion;
   PointMotion m_points;
+  std::optional<VisualOdometry> m_visual; ///< of a plain video: one that starts without odometry
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   TrunkMap m_map;
@@ -127,6 +143,6 @@ private:
   std::vector<std::size_t> m_pose_of_frame; ///< pose of each processed frame, by its place in m_indices
   std::vector<std::size_t> m_indices;       ///< Frame::index of each processed frame
   Vector6d m_velocity = Vector6d::Zero();   ///< of the body, in its frame
-  bool m_ground_known = false;              ///< the world's z = 0 is the ground
+  std::optional<double> m_ground_z;         ///< height of the ground in the world, where it is known [m]
 };
 } // namespace bole

@@ -76,4 +76,11 @@ std::optional<std::size_t> untiedPose(const Graph &graph);
 /// of range, an edge from a vertex to itself, NaN, a covariance or F that is clearly indefinite, a
 /// sigma that is not positive, a pose that no chain of odometry and priors ties to the world.
 void validate(const Graph &graph);
+
+/// \p graph with every length multiplied by \p factor (> 0) about the origin of the world, as seen
+/// from the camera (the lever arm bMc keeps its length): what a flight of unknown scale becomes when
+/// its metre is found. Heights and the priors on radii stay: they are what knows the metre.
+///
+/// Laws (each a test): no residual but theirs changes; scaled(scaled(g, f), 1 / f) is g.
+Graph scaled(const Graph &graph, double factor);
 } // namespace bole

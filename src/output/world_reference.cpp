@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/output/world_reference.h>
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace bole
+{
+const char *toString(ScaleSource source)
+{
+  switch (source) {
+  case ScaleSource::odometry:
+    return "odometry";
+  case ScaleSource::height:
+    return "height";
+  case ScaleSource::prior:
+    return "prior";
+  }
+  return "unknown";
+}
+
+const char *toString(GravitySource source)
+{
+  switch (source) {
+  case GravitySource::odometry:
+    return "odometry";
+  case GravitySource::trunks:
+    return "trunks";
+  case GravitySource::assumed:
+    return "assumed";
+  }
+  return "unknown";
+}
+
+std::string describe(const WorldReference &reference)
+{
+  std::string scale = "odometry", up = "odometry";
+  if (reference.scale == ScaleSource::height)
+    scale = "height of the camera";
+  else if (reference.scale == ScaleSource::prior)
+    scale = "prior on the radius";
+  if (reference.gravity == GravitySource::trunks)
+    up = "trunks";
+  else if (reference.gravity == GravitySource::assumed)
+    up = "first image taken to be upright";
+  if (reference.scale_sigma > 0)
+    scale += fmt::format(" (+- {:.0f} %)", 100 * reference.scale_sigma);
+  if (reference.gravity_sigma > 0)
+    up += fmt::format(" (+- {:.1f} degrees)", reference.gravity_sigma * 180 / M_PI);
+  return fmt::format("scale: {}; up: {}{}", scale, up,
+                     reference.has_ranges ? "" : "; the camera only turned: bearings, no ranges");
+}
+} // namespace bole

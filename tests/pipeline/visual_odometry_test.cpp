@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What moves the pipeline when the pose filter, the points or both are missing.
+#include "motion/rendered_walls.h"
+
+#include <bole/geometry/so3.h>
+#include <bole/pipeline/pipeline.h>
+
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+const PinholeCamera kCamera;
+const Pose kMount = SmootherOptions::forwardCamera();
+
+/// The frame that a camera at wMc (camera axes) would bring.
+Frame frameAt(int k, const Pose &wMc)
+{
+  Frame frame;
+  frame.index = static_cast<std::size_t>(k);
+  frame.stamp_ns = k * 100000000LL;
+  frame.image = test::drawWalls(kCamera, wMc);
+  return frame;
+}
+
+/// Body poses over a ground at z = 0, from poses in camera axes.
+Pose bodyAt(const Pose &wMc) { return Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.5}) * kMount * wMc * kMount.inverse(); }
+
+Pose sideways(int k) { return {expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0, 0.04 * k}}; }
+
+TEST(PlainVideo, StepsAreThoseOfThePointsUpToOneScale)
+{
+  Pipeline pipeline(kCamera, kMount);
+  for (int k = 0; k < 24; ++k)
+    pipeline.process(frameAt(k, sideways(k)));
+  const auto path = pipeline.smoothedTrajectory();
+  ASSERT_EQ(path.size(), 24u);
+  const auto cameraAt = [&](std::size_t k) { return kMount.inverse() * path[0].wMb.inverse() * path[k].wMb * kMount; };
+  const double unit = sideways(23).t.norm() / cameraAt(23).t.norm();
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const Pose truth = sideways(0).inverse() * sideways(static_cast<int>(k));
+    EXPECT_LT((unit * cameraAt(k).t - truth.t).norm(), 0.02 * sideways(23).t.norm()) << k;
+    EXPECT_LT(logSo3(cameraAt(k).R.transpose() * truth.R).norm(), 0.01) << k;
+  }
+  EXPECT_EQ(pipeline.reference().scale, ScaleSource::prior);
+  EXPECT_GT(pipeline.reference().scale_sigma, 0.1);
+  EXPECT_TRUE(pipeline.reference().has_ranges);
+}
+
+TEST(PlainVideo, ACameraThatOnlyTurnsHasNoRangesAndSaysSo)
+{
+  Pipeline pipeline(kCamera, kMount);
+  FrameResult last;
+  for (int k = 0; k < 20; ++k)
+    last = pipeline.process(frameAt(k, {expSo3({0, 0.01 * k, 0}), {0, 0, 0}}));
+  const Pose turned = pipeline.smoothedTrajectory().front().wMb.inverse() * last.wMb;
+  EXPECT_NEAR(logSo3(turned.R).norm(), 0.19, 0.01);
+  EXPECT_LT(turned.t.norm(), 0.01);
+  EXPECT_FALSE(pipeline.reference().has_ranges);
+  EXPECT_NE(describe(pipeline.reference()).find("no ranges"), std::string::npos);
+  for (const TrunkRecord &trunk : pipeline.map())
+    EXPECT_NE(trunk.status, TrunkStatus::confirmed);
+}
+
+TEST(PlainVideo, FrozenFramesStandStill)
+{
+  Pipeline pipeline(kCamera, kMount);
+  Pose before;
+  for (int k = 0; k < 12; ++k)
+    before = pipeline.process(frameAt(k, sideways(k))).wMb;
+  for (int k = 12; k < 22; ++k) {
+    const Pose now = pipeline.process(frameAt(k, sideways(11))).wMb;
+    EXPECT_LT(now.minus(before).head<3>().norm(), 0.02) << k;
+    before = now;
+  }
+}
+
+
+TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
+{
+  Pipeline pipeline(kCamera, kMount);
+  Pose before, filter_before;
+  for (int k = 0; k < 20; ++k) {
+    Frame frame = frameAt(k, sideways(k));
+    frame.wMb_odometry = bodyAt(sideways(k));
+    if (k >= 12)
+      frame.image = vpImage<unsigned char>(240, 320, 250);
+    const FrameResult result = pipeline.process(frame);
+    if (k >= 12) {
+      const Pose step = before.inverse() * result.wMb, filter = filter_before.inverse() * *frame.wMb_odometry;
+      EXPECT_LT(step.minus(filter).head<3>().norm(), 2e-3) << k;
+      EXPECT_LT(step.minus(filter).tail<3>().norm(), 2e-3) << k;
+      EXPECT_TRUE(result.step_from_odometry) << k;
+    }
+    before = result.wMb;
+    filter_before = *frame.wMb_odometry;
+  }
+}
+} // namespace
+} // namespace bole
