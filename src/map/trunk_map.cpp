@@ -200,16 +200,9 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
     changes.push_back({trunk.id, into, trunk.status, to});
     trunk.status = to;
   };
-<<<<<<< HEAD
   for (const std::size_t i : m_active) {
     MapTrunk &trunk = m_trunks[i];
-    if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk) && !hasBetterRival(trunk, 0))
-=======
-  for (MapTrunk &trunk : m_trunks) {
-    if (trunk.removed)
-      continue;
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
->>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
       change(trunk, TrunkStatus::confirmed);
     else if (trunk.status != TrunkStatus::lost && has_ranges && isDisproved(trunk)) {
       trunk.removed = true;

@@ -250,15 +250,9 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
 {
   const std::size_t pose = m_smoother.poseCount() - 1;
   const Pose wMc = cameraAt(pose);
-<<<<<<< HEAD
   for (const std::size_t i : m_map.active()) {
     MapTrunk &trunk = m_map.trunks()[i];
-    if ((trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
-=======
-  for (MapTrunk &trunk : m_map.trunks()) {
-    const bool is_far = !isTurning() && (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range;
-    if (trunk.removed || is_far)
->>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
+    if (!isTurning() && (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
       continue;
     const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
@@ -365,14 +359,10 @@ void Pipeline::detectNew(FrameResult &result)
 void Pipeline::detectSingle(FrameResult &result)
 {
   const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
-<<<<<<< HEAD
-  result.lines = detectLines(m_views.back().gradient, result.saliency->p_background, m_camera, wMc.R, inhibited(true),
-=======
   vpImage<float> p_background = result.saliency->p_background;
   if (isTurning()) // no parallax: what stands upright and stays where it is must do
     p_background = 0.f;
-  result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(),
->>>>>>> 797dabc (Map plain videos: steps from points, up from trunks, the metre from radii or a known height)
+  result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(true),
                              m_options.detection.profile, m_options.lines);
   for (const LineDetection &line : result.lines)
     adopt(line);
