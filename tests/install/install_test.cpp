@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What somebody gets who installs bole: the README's program against the installed tree alone.
+#include "support/shell.h"
+
 #include <gmock/gmock.h>
 
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -12,24 +13,8 @@
 namespace
 {
 namespace fs = std::filesystem;
+using bole::test::Outcome;
 using testing::HasSubstr;
-
-struct Outcome
-{
-  int status = 0;
-  std::string text;
-};
-
-Outcome run(const std::string &command)
-{
-  Outcome outcome;
-  FILE *pipe = popen(("( " + command + " ) 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer;
-  while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.text.append(buffer.data(), n);
-  outcome.status = pclose(pipe);
-  return outcome;
-}
 
 std::string textOf(const fs::path &path)
 {
@@ -60,7 +45,7 @@ protected:
     std::string pattern = (fs::temp_directory_path() / "bole-install-XXXXXX").string();
     s_folder = mkdtemp(pattern.data());
     s_prefix = s_folder / "prefix";
-    s_installed = run(BOLE_CMAKE " --install " BOLE_BINARY_DIR " --prefix " + s_prefix.string());
+    s_installed = bole::test::runShell(BOLE_CMAKE " --install " BOLE_BINARY_DIR " --prefix " + s_prefix.string());
   }
   static void TearDownTestSuite() { fs::remove_all(s_folder); }
   void SetUp() override { ASSERT_EQ(s_installed.status, 0) << s_installed.text; }
@@ -84,13 +69,13 @@ TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
   const std::string sanitizers = BOLE_SANITIZERS;
   if (!sanitizers.empty())
     configure += " -DCMAKE_CXX_FLAGS=-fsanitize=" + sanitizers;
-  const Outcome configured = run(configure);
+  const Outcome configured = bole::test::runShell(configure);
   ASSERT_EQ(configured.status, 0) << configured.text;
   EXPECT_THAT(configured.text, HasSubstr("data in " + (s_prefix / "share/bole").string()));
-  const Outcome built = run(BOLE_CMAKE " --build " + build.string());
+  const Outcome built = bole::test::runShell(BOLE_CMAKE " --build " + build.string());
   ASSERT_EQ(built.status, 0) << built.text;
 
-  const Outcome ran = run("cd " + (s_prefix / "share/bole").string() + " && " + (build / "outside").string());
+  const Outcome ran = bole::test::runShell("cd " + (s_prefix / "share/bole").string() + " && " + (build / "outside").string());
   EXPECT_EQ(ran.status, 0) << ran.text;
 }
 
@@ -105,7 +90,7 @@ TEST_F(Install, TheCommandFindsItsPresetsAndItsFlight)
 {
   const fs::path share = s_prefix / "share/bole", folder = s_folder / "run";
   const Outcome ran =
-      run((s_prefix / "bin/bole").string() + " track " + (share / "data/park-forward").string() + " -o " +
+      bole::test::runShell((s_prefix / "bin/bole").string() + " track " + (share / "data/park-forward").string() + " -o " +
           folder.string() + " --config " + (share / "config/default.yaml").string() + " --no-video --frames 5");
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_TRUE(fs::exists(folder / "trunks.csv"));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole graph` and `bole solve` as their users run them: on a real run, and on files gone bad.
+#include "support/shell.h"
+
 #include <gmock/gmock.h>
 
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -14,24 +15,10 @@
 namespace
 {
 namespace fs = std::filesystem;
+using bole::test::Outcome;
 using testing::HasSubstr;
 
-struct Outcome
-{
-  int status = 0;
-  std::string text;
-};
-
-Outcome run(const std::string &arguments)
-{
-  Outcome outcome;
-  FILE *pipe = popen((std::string(BOLE_EXECUTABLE) + " " + arguments + " 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer;
-  while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.text.append(buffer.data(), n);
-  outcome.status = pclose(pipe);
-  return outcome;
-}
+Outcome run(const std::string &arguments) { return bole::test::runShell(BOLE_EXECUTABLE " " + arguments); }
 
 std::vector<std::string> linesOf(const std::string &path)
 {

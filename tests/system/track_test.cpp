@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The command as its users run it: a whole flight, and their mistakes.
+#include "support/shell.h"
+
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -13,24 +14,13 @@
 namespace
 {
 namespace fs = std::filesystem;
+using bole::test::Outcome;
 using testing::HasSubstr;
 const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
 
-struct Outcome
-{
-  int status = 0;
-  std::string text;
-};
-
 Outcome run(const std::string &arguments, const std::string &launcher = "")
 {
-  Outcome outcome;
-  FILE *pipe = popen((launcher + BOLE_EXECUTABLE + " " + arguments + " 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer;
-  while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.text.append(buffer.data(), n);
-  outcome.status = pclose(pipe);
-  return outcome;
+  return bole::test::runShell(launcher + BOLE_EXECUTABLE + " " + arguments);
 }
 
 std::string freshFolder(const std::string &name)
