@@ -59,7 +59,6 @@ void TrunkMap::recordView(MapTrunk &trunk, const TrunkView &view) const
   const double turn = std::remainder(view.bearing - trunk.bearing_first, 2 * M_PI);
   trunk.bearing_low = std::min(trunk.bearing_low, turn);
   trunk.bearing_high = std::max(trunk.bearing_high, turn);
-  trunk.range_min_seen = std::min(trunk.range_min_seen, view.range);
   trunk.first_seen_s = std::min(trunk.first_seen_s, view.time_s);
   trunk.last_seen_s = std::max(trunk.last_seen_s, view.time_s);
   ++trunk.observations;

@@ -406,11 +406,8 @@ void Pipeline::adopt(const Detection &detection)
     if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) &&
         tracked.left_used && tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
       seen.emplace_back(view.pose, tracked);
-    else if (tracked.status != TrackingStatus::not_visible && tracked.status != TrackingStatus::occluded)
-      ++trunk.window_misses;
   }
-  trunk.window_hits = trunk.hits;
-  trunk.hits = 0;
+  trunk.hits = 0; // it was fitted to these: only what comes after puts it to the test
   m_smoother.update();
   const Trunk fitted = m_smoother.trunk(smoother_id);
   double sum = 0;

@@ -78,7 +78,6 @@ void Pipeline::rescale(double factor)
     kept[id]->smoother_id = id;
   m_smoother.optimize(1e-6, 10);
   for (MapTrunk &trunk : m_map.trunks()) {
-    trunk.range_min_seen *= factor;
     if (trunk.removed) {
       trunk.trunk.xy *= factor;
       trunk.trunk.log_radius += std::log(factor);

@@ -54,7 +54,6 @@ struct MapTrunk
   Matrix5d covariance = Matrix5d::Identity();
   int observations = 0;                      ///< summary factors
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
-  int window_hits = 0, window_misses = 0;        ///< in the frames before that one
   int found_again = 0;                           ///< times the detector came to the same reading later
   double contrast = 0;                           ///< running mean of the weaker border's
   double first_seen_s = 0, last_seen_s = 0;
@@ -64,7 +63,6 @@ struct MapTrunk
   double innovation2 = 0;                    ///< running mean of TrunkView::innovation2
   double foreground = 0;                     ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
-  double range_min_seen = 1e9;               ///< nearest it was [m]
   bool removed = false;                      ///< out of the smoother (merged, or a candidate given up)
 
   double parallax() const { return bearing_high - bearing_low; }

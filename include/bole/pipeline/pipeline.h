@@ -140,7 +140,6 @@ private:
   TrunkMap m_map;
   std::deque<View> m_views; ///< oldest first
   std::vector<StampedPose> m_online;
-  std::vector<std::size_t> m_pose_of_frame; ///< pose of each processed frame, by its place in m_indices
   std::vector<std::size_t> m_indices;       ///< Frame::index of each processed frame
   Vector6d m_velocity = Vector6d::Zero();   ///< of the body, in its frame
   std::optional<double> m_ground_z;         ///< height of the ground in the world, where it is known [m]
