@@ -80,7 +80,8 @@ public:
     double refine_px = 5;     ///< half-width of the second scan (2 .. 20)
     int refinements = 1;      ///< scans after the first (0 .. 5)
     /// Without a motion prior: what the camera may do between two frames, after the turn is taken out.
-    double step_sigma_m = 0.12;    ///< per axis (0.001 .. 10)
+    double step_sigma_m = 0.12;    ///< across the trunks, per axis (0.001 .. 10)
+    double climb_sigma_m = 0.03;   ///< along them, which they do not tell (0.001 .. 10)
     double turn_sigma_rad = 0.006; ///< about each axis (1e-4 .. 1)
     double velocity_gain = 0.9;    ///< of the last translation expected again (0 .. 1); 0: stands still
     double memory_rate = 0.15;     ///< how fast remembered contrast follows (0.01 .. 1)
@@ -173,12 +174,16 @@ private:
   };
 
   // vpMbTrunkTrackerPose.cpp: the estimation
-  Prediction predict(const bole::RotationAligner::Reference &thumbnails);
+  Eigen::Vector3d alongTrunks() const;
+  Prediction predictAlone(const bole::RotationAligner::Reference &thumbnails) const;
+  Prediction predict(const bole::RotationAligner::Reference &thumbnails) const;
   Status estimate(const vpImage<unsigned char> &I, const Prediction &prediction);
   void predictTrunks(const vpImage<unsigned char> &I);
   void scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px);
   static std::vector<float> response(const vpMbtDistanceTrunk::BorderState &state);
   Vector6d agree(const Matrix6d &covariance);
+  Matrix6d estimatedInObject() const;
+  Vector6d estimated(const Vector6d &xi) const;
   void choosePeaks(const Vector6d &twist, double sigma_px, double reach_px);
   double expectedSigma(const vpMbtDistanceTrunk &trunk, bole::Border side, const Matrix6d &covariance) const;
   void servo(const Prediction &prediction);
@@ -199,10 +204,9 @@ private:
   bole::RotationAligner::Reference m_reference; ///< of the last image that was tracked
   vpHomogeneousMatrix m_reference_cMo;
   std::optional<MotionPrior> m_prior;
-  vpHomogeneousMatrix m_step;     ///< c_k M c_k-1 of the last two tracked frames
+  Eigen::Vector3d m_velocity = Eigen::Vector3d::Zero(); ///< of the camera, m a frame, object frame
   int m_frames_since_good = 0;
-  bool m_has_step = false;
-  Matrix6d m_posterior = Matrix6d::Zero();
+  Matrix6d m_posterior = Matrix6d::Zero(), m_reference_posterior = Matrix6d::Zero();
   Eigen::MatrixXd m_unobserved;
   vpMatrix m_L;
   vpColVector m_error, m_w, m_piece_weight, m_by_log_radius;

@@ -147,6 +147,7 @@ const std::map<std::string, Setter> &trunkKeys()
       {"refine_px", [](O &o, double v) { o.refine_px = v; }},
       {"refinements", [](O &o, double v) { o.refinements = int(v); }},
       {"step_sigma_m", [](O &o, double v) { o.step_sigma_m = v; }},
+      {"climb_sigma_m", [](O &o, double v) { o.climb_sigma_m = v; }},
       {"turn_sigma_rad", [](O &o, double v) { o.turn_sigma_rad = v; }},
       {"velocity_gain", [](O &o, double v) { o.velocity_gain = v; }},
       {"memory_rate", [](O &o, double v) { o.memory_rate = v; }},

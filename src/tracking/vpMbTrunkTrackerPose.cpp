@@ -56,8 +56,6 @@ vpHomogeneousMatrix moved(const vpHomogeneousMatrix &cMo, const Vector6d &xi)
   return vpExponentialMap::direct(v).inverse() * cMo;
 }
 
-Vector3d centre(const vpHomogeneousMatrix &cMo) { return Pose::fromVisp(cMo).inverse().t; }
-
 /// Cost of following a peak, half a squared deviation: how its contrast differs from what is expected, how far it is.
 double peakCost(const bole::ContrastPeak &peak, double expected_offset, double sigma_px, double reference, bool signs)
 {
@@ -70,15 +68,40 @@ double peakCost(const bole::ContrastPeak &peak, double expected_offset, double s
 }
 } // namespace
 
-vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails)
+Matrix6d vpMbTrunkTracker::estimatedInObject() const
 {
-  Prediction prediction{m_cMo, m_posterior};
-  const int frames = m_frames_since_good + 1;
-  if (m_prior) {
-    prediction.cMo = m_prior->cMo;
-    prediction.covariance = m_prior->covariance;
-    return prediction;
+  Matrix6d J;
+  for (unsigned i = 0; i < 6; ++i)
+    for (unsigned j = 0; j < 6; ++j)
+      J(int(i), int(j)) = oJo[i][j];
+  return J;
+}
+
+/// The part of the camera's twist \p xi that lies in the degrees of freedom to be estimated.
+Vector6d vpMbTrunkTracker::estimated(const Vector6d &xi) const
+{
+  if (isoJoIdentity)
+    return xi;
+  const Matrix6d V = twistMatrix(m_cMo);
+  return V * estimatedInObject() * V.inverse() * xi;
+}
+
+/// Mean direction of the trunks, object frame: what they say nothing about moving along.
+Vector3d vpMbTrunkTracker::alongTrunks() const
+{
+  Vector3d sum = Vector3d::Zero();
+  for (const vpMbtDistanceTrunk &trunk : m_trunks) {
+    const Vector3d axis = trunk.object().axis();
+    sum += sum.dot(axis) < 0 ? Vector3d(-axis) : axis;
   }
+  return sum.normalized();
+}
+
+/// From the last good frame: the turn by the alignment of whole images, the step by the last velocity. Along the
+/// trunks the camera is expected to stay: a velocity that is never seen must not be integrated.
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone(const bole::RotationAligner::Reference &thumbnails) const
+{
+  const double frames = m_frames_since_good + 1;
   const Pose before = Pose::fromVisp(m_reference_cMo);
   Pose now = before;
   double turn_sigma = m_options.turn_sigma_rad;
@@ -87,19 +110,28 @@ vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAlign
   if (turn.ok)
     now.R = turn.c2Rc1 * before.R;
   else
-    turn_sigma = 0.05;
-  Vector3d at = before.inverse().t;
-  if (m_has_step)
-    at += m_options.velocity_gain * frames * centre(m_step); // m_step holds the last step as a pose at its end
-  now.t = -(now.R * at);
-  prediction.cMo = now.toVisp();
+    turn_sigma = 0.05 * std::sqrt(frames);
+  const Vector3d up = alongTrunks();
+  const Vector3d step = m_options.velocity_gain * frames * (m_velocity - up.dot(m_velocity) * up);
+  now.t = -(now.R * (before.inverse().t + step));
+  Prediction prediction;
+  prediction.cMo = moved(m_cMo, estimated(twistBetween(m_cMo, now.toVisp())));
   const Matrix6d carried = twistMatrix(prediction.cMo * m_reference_cMo.inverse());
-  Vector6d variance;
-  variance.head<3>().setConstant(std::pow(m_options.step_sigma_m, 2) * frames);
-  variance.tail<3>().setConstant(turn_sigma * turn_sigma);
-  prediction.covariance = carried * m_posterior * carried.transpose();
-  prediction.covariance.diagonal() += variance;
+  const Vector3d c_up = now.R * up;
+  const double step_variance = std::pow(m_options.step_sigma_m, 2) * frames;
+  const double climb_variance = std::pow(m_options.climb_sigma_m, 2) * frames;
+  prediction.covariance = carried * m_reference_posterior * carried.transpose();
+  prediction.covariance.topLeftCorner<3, 3>() +=
+      step_variance * Matrix3d::Identity() + (climb_variance - step_variance) * c_up * c_up.transpose();
+  prediction.covariance.diagonal().tail<3>().array() += turn_sigma * turn_sigma;
   return prediction;
+}
+
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails) const
+{
+  if (!m_prior)
+    return predictAlone(thumbnails);
+  return {moved(m_cMo, estimated(twistBetween(m_cMo, m_prior->cMo))), m_prior->covariance};
 }
 
 void vpMbTrunkTracker::predictTrunks(const vpImage<unsigned char> &I)
@@ -180,7 +212,7 @@ Vector6d vpMbTrunkTracker::agree(const Matrix6d &covariance)
           {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
       borders.push_back({-focal() * row, response(state)});
     }
-  return bole::vote(borders, covariance, m_options.vote).twist;
+  return estimated(bole::vote(borders, covariance, m_options.vote).twist);
 }
 
 void vpMbTrunkTracker::choosePeaks(const Vector6d &twist, double sigma_px, double reach_px)
@@ -297,12 +329,7 @@ void vpMbTrunkTracker::servo(const Prediction &prediction)
     if (isoJoIdentity)
       xi = inverted(H) * b;
     else { // only the estimated degrees of freedom, given in the object frame
-      const Matrix6d V = twistMatrix(m_cMo);
-      Matrix6d J;
-      for (unsigned i = 0; i < 6; ++i)
-        for (unsigned j = 0; j < 6; ++j)
-          J(int(i), int(j)) = oJo[i][j];
-      const Matrix6d VJ = V * J;
+      const Matrix6d VJ = twistMatrix(m_cMo) * estimatedInObject();
       const MatrixXd HJ = VJ.transpose() * H * VJ;
       xi = VJ * HJ.completeOrthogonalDecomposition().solve(VJ.transpose() * b);
     }
