@@ -8,12 +8,16 @@
 /// leave one motion of three free: going round the trunk. `hold` leaves it at rest, `circle` gives it a speed as
 /// vpServo's secondary task, which cannot disturb the two.
 ///
-/// A small integral on log r/d takes out what a drone does not obey: it drifts outwards on a circle, and it flies
-/// slower than it is told.
+/// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
+/// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
+/// decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is told) shows as a
+/// drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
 ///
 /// The features come from the trunk as tracked in the image of the moment; where it was missed for a frame or two, from
 /// the map and the pose. A distance in metres needs the map's radius and is as good as that; a ratio needs nothing.
 
+#include <bole/tasks/drone_response.h>
+#include <bole/tasks/feature_filter.h>
 #include <bole/tasks/servo_task.h>
 #include <bole/vpFeatureTrunk.h>
 
@@ -27,20 +31,23 @@ struct TrunkTaskOptions
   double distance = 3;         ///< camera to axis, where no ratio is given [m], 0.5 to 20
   double bearing = 0;          ///< to be kept, positive right [rad], -0.5 to 0.5
   double speed = 0;            ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
-  double gain = 0.7;           ///< of vpServo [1/s], 0.05 to 3
-  double integral = 0.15;      ///< of log r/d [1/s], 0 to 2
-  double smoothing = 0.35;     ///< weight of a new image in the features, 0.05 to 1
+  double gain = 1.0;           ///< of vpServo [1/s], 0.05 to 3
+  double bearing_noise = 0.002; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
+  double ratio_noise = 0.015;  ///< of its log r/d, 1e-5 to 0.5
+  double unrest = 0.06;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
   double largest_speed = 0.7;  ///< [m/s], 0.05 to 3
   double choice_angle = 0.35;  ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
   double choice_range = 7;     ///< nor those beyond this [m], 1 to 20
   int choice_views = 25;       ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
   double search_s = 40;        ///< gives up after [s], 1 to 600
+  ResponseOptions response;
   SafetyOptions safety;
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
-/// Laws (each a test, on exact features): the error decays at the gain; circling keeps bearing and log r/d.
+/// Laws (each a test, on exact features): the error decays at the gain, with a drone that obeys at once and with one
+/// that is late and slow; circling keeps bearing and log r/d; a steady push moves neither.
 class TrunkTask : public ServoTask
 {
 public:
@@ -52,8 +59,8 @@ public:
   const TrunkTaskOptions &options() const { return m_options; }
   Values errors() const override;
 
-  /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for \p feature; \p dt since the call before [s].
-  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double dt);
+  /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for the \p feature of the frame of \p time_s [s].
+  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s);
 
 protected:
   bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
@@ -65,16 +72,20 @@ private:
   int successor(const Pipeline &pipeline) const;
   RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk) const;
   void desire(double radius);
+  void filter(const vpFeatureTrunk &feature, double time_s);
+  Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius);
+  Eigen::Matrix<double, 2, 4> interactionOf(vpFeatureTrunk feature) const;
 
   Pose m_bMc;
   TrunkTaskOptions m_options;
   Sidestep m_sidestep;
   vpServo m_servo;
-  vpFeatureTrunk m_current, m_desired;
+  vpFeatureTrunk m_current, m_desired; ///< as it will stand when the command acts; as it should
+  DroneResponse m_response;
+  FeatureFilter m_bearing, m_log_ratio; ///< at the frame
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
   double m_time_s = 0, m_ratio = 0.05;
-  double m_sum = 0; ///< of the integral
   bool m_has_feature = false;
 };
 } // namespace bole
