@@ -70,6 +70,48 @@ private:
   int m_stride;
   std::vector<Eigen::Vector2f> m_xy;
 };
+
+/// Those of one place of every pixel, 4x4 pixels after 4x4 pixels: they do not change from frame to frame.
+struct RayTiles
+{
+  int columns; ///< tiles in a row
+  std::vector<float> x, y;
+  std::vector<int> valid; ///< -1, or 0 beyond the right or lower border
+
+  RayTiles(const RayTable &table, int width, int height, float fu, float fv) : columns((width + 3) / 4)
+  {
+    for (int row = 0; row < height; row += 4)
+      for (int column = 0; column < width; column += 4)
+        for (int k = 0; k < 16; ++k) {
+          const int u = column + (k & 3), v = row + (k >> 2);
+          const Eigen::Vector2f xy = table.at(std::min(u, width - 1), std::min(v, height - 1), fu, fv);
+          x.push_back(xy.x());
+          y.push_back(xy.y());
+          valid.push_back(u < width && v < height ? -1 : 0);
+        }
+  }
+  std::size_t first(int column0, int row0) const
+  {
+    return 16 * (static_cast<std::size_t>(row0 / 4) * columns + column0 / 4);
+  }
+};
+
+/// Of the sample: a rank-1 lattice, regular in time, well spread over the pixel in both directions.
+RayTiles tilesOf(const RayTable &table, const PinholeCamera &camera, int sample)
+{
+  return {table, camera.width, camera.height, std::fmod(0.5f + sample * 0.7548777f, 1.f),
+          std::fmod(0.5f + sample * 0.5698403f, 1.f)};
+}
+
+/// atan2 to 2e-6 rad: what clouds and far woods are looked up by.
+float azimuthOf(float x, float y)
+{
+  const float ax = std::abs(x), ay = std::abs(y), t = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-20f), t2 = t * t;
+  float angle = t * (0.99997726f + t2 * (-0.33262347f + t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
+  angle = ay > ax ? 1.57079633f - angle : angle;
+  angle = x < 0 ? 3.14159265f - angle : angle;
+  return y < 0 ? -angle : angle;
+}
 } // namespace
 
 void RendererOptions::validate() const
@@ -89,8 +131,7 @@ struct ForestRenderer::State
   State(const Forest &forest_, const RendererOptions &options_);
   void trace(const Pose &wMc_open, const Pose &wMc_close);
   void traceTruth(const Pose &wMc, RenderedFrame &frame) const;
-  void aim(const Pose &wMc, int column0, int row0, float fu, float fv, RTCRayHit16 &rays,
-           int *valid) const;
+  static void aim(const Pose &wMc, const RayTiles &tiles, std::size_t first, RTCRayHit16 &packet);
   float shade(const RTCRayHit16 &rays, int k) const;
   float shadeGround(const Eigen::Vector3f &p, float distance) const;
   float shadeBark(unsigned quad, float u, float v, float distance) const;
@@ -102,7 +143,8 @@ struct ForestRenderer::State
   ForestMesh mesh;
   RayScene scene;
   LightMaps light;
-  RayTable rays;
+  RayTiles centres;            ///< rays through the middle of the pixels
+  std::vector<RayTiles> tiles; ///< one a sample
   NoiseTexture furrowed, smooth, cover;
   SensorImage sensor;
   std::vector<float> radiance;
@@ -115,7 +157,7 @@ ForestRenderer::State::State(const Forest &forest_, const RendererOptions &optio
       mesh(forest),
       scene(mesh),
       light(forest, mesh, scene),
-      rays(options.camera),
+      centres(RayTable(options.camera), options.camera.pinhole.width, options.camera.pinhole.height, 0.5f, 0.5f),
       furrowed(furrowedBark(forest.options.seed)),
       smooth(smoothBark(forest.options.seed)),
       cover(groundCover(forest.options.seed)),
@@ -123,6 +165,9 @@ ForestRenderer::State::State(const Forest &forest_, const RendererOptions &optio
       radiance(static_cast<std::size_t>(options.camera.pinhole.width) *
                options.camera.pinhole.height)
 {
+  const RayTable table(options.camera);
+  for (int sample = 0; sample < options.samples_per_pixel; ++sample)
+    tiles.push_back(tilesOf(table, options.camera.pinhole, sample));
   const bool sunny = forest.options.light == Light::sun;
   haze_radiance = sunny ? 0.45f : 0.8f;
   haze_length = sunny ? 110.f : 80.f;
@@ -137,40 +182,34 @@ const SimulatedTrunk &ForestRenderer::State::trunkAt(unsigned quad) const
                                       : forest.far_trunks[index - forest.trunks.size()];
 }
 
-/// Rays of the 4x4 pixels from (column0, row0), all through the same place of their pixel. The
-/// parameter of a ray is its depth along the optical axis.
-void ForestRenderer::State::aim(const Pose &wMc, int column0, int row0, float fu, float fv,
-                                RTCRayHit16 &packet, int *valid) const
+/// Rays of the 4x4 pixels whose directions stand at \p first of \p tiles. The parameter of a ray is its depth along the
+/// optical axis.
+void ForestRenderer::State::aim(const Pose &wMc, const RayTiles &tiles, std::size_t first, RTCRayHit16 &packet)
 {
   const Eigen::Matrix3f R = wMc.R.cast<float>();
   const Eigen::Vector3f t = wMc.t.cast<float>();
-  const int width = options.camera.pinhole.width, height = options.camera.pinhole.height;
+  const float *x = &tiles.x[first], *y = &tiles.y[first];
   for (int k = 0; k < 16; ++k) {
-    const int column = std::min(column0 + (k & 3), width - 1),
-              row = std::min(row0 + (k >> 2), height - 1);
-    valid[k] = column0 + (k & 3) < width && row0 + (k >> 2) < height ? -1 : 0;
-    const Eigen::Vector2f xy = rays.at(column, row, fu, fv);
-    const Eigen::Vector3f direction = R.col(0) * xy.x() + R.col(1) * xy.y() + R.col(2);
-    packet.ray.org_x[k] = t.x();
-    packet.ray.org_y[k] = t.y();
-    packet.ray.org_z[k] = t.z();
-    packet.ray.dir_x[k] = direction.x();
-    packet.ray.dir_y[k] = direction.y();
-    packet.ray.dir_z[k] = direction.z();
-    packet.ray.tnear[k] = 0.02f;
-    packet.ray.tfar[k] = 300;
-    packet.ray.time[k] = 0;
-    packet.ray.mask[k] = 0xffffffffu;
-    packet.ray.flags[k] = 0;
-    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
-    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    packet.ray.dir_x[k] = R(0, 0) * x[k] + R(0, 1) * y[k] + R(0, 2);
+    packet.ray.dir_y[k] = R(1, 0) * x[k] + R(1, 1) * y[k] + R(1, 2);
+    packet.ray.dir_z[k] = R(2, 0) * x[k] + R(2, 1) * y[k] + R(2, 2);
   }
+  std::fill_n(packet.ray.org_x, 16, t.x());
+  std::fill_n(packet.ray.org_y, 16, t.y());
+  std::fill_n(packet.ray.org_z, 16, t.z());
+  std::fill_n(packet.ray.tnear, 16, 0.02f);
+  std::fill_n(packet.ray.tfar, 16, 300.f);
+  std::fill_n(packet.ray.time, 16, 0.f);
+  std::fill_n(packet.ray.mask, 16, 0xffffffffu);
+  std::fill_n(packet.ray.flags, 16, 0u);
+  std::fill_n(packet.hit.geomID, 16, RTC_INVALID_GEOMETRY_ID);
+  std::fill_n(packet.hit.instID[0], 16, RTC_INVALID_GEOMETRY_ID);
 }
 
 float ForestRenderer::State::skyAt(const Eigen::Vector3f &direction) const
 {
   const Eigen::Vector3f d = direction.normalized();
-  const float azimuth = std::atan2(d.y(), d.x());
+  const float azimuth = azimuthOf(d.x(), d.y());
   const float ridge = 0.03f + 0.05f * cover.at(azimuth * 90, 300, 6);
   if (d.z() < ridge) { // woods beyond the scenery, with stems in them
     return haze_radiance * (0.55f + 0.3f * furrowed.at(azimuth * 800, 2000 * d.z(), 1));
@@ -245,11 +284,10 @@ void ForestRenderer::State::trace(const Pose &wMc_open, const Pose &wMc_close)
   alignas(64) int valid[16];
   for (int row = 0; row < height; row += 4) {
     for (int column = 0; column < width; column += 4) {
+      const std::size_t first = centres.first(column, row);
+      std::copy_n(&centres.valid[first], 16, valid);
       for (int sample = 0; sample < samples; ++sample) {
-        // A rank-1 lattice: regular in time, well spread over the pixel in both directions.
-        const float fu = std::fmod(0.5f + sample * 0.7548777f, 1.f),
-                    fv = std::fmod(0.5f + sample * 0.5698403f, 1.f);
-        aim(poses[sample], column, row, fu, fv, packet, valid);
+        aim(poses[sample], tiles[sample], first, packet);
         scene.intersect(valid, packet);
         for (int k = 0; k < 16; ++k) {
           if (valid[k]) {
@@ -274,7 +312,9 @@ void ForestRenderer::State::traceTruth(const Pose &wMc, RenderedFrame &frame) co
   alignas(64) int valid[16];
   for (int row = 0; row < height; row += 4) {
     for (int column = 0; column < width; column += 4) {
-      aim(wMc, column, row, 0.5f, 0.5f, packet, valid);
+      const std::size_t first = centres.first(column, row);
+      std::copy_n(&centres.valid[first], 16, valid);
+      aim(wMc, centres, first, packet);
       scene.intersect(valid, packet);
       for (int k = 0; k < 16; ++k) {
         if (!valid[k] || packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
