@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/body_velocity.h>
 #include <bole/geometry/pose.h>
 #include <bole/input/camera_file.h>
 #include <bole/vpRobotArDrone.h>
@@ -10,7 +11,6 @@
 #include <cmath>
 #include <mutex>
 #include <thread>
-#include <visp3/core/vpVelocityTwistMatrix.h>
 #include <visp3/robot/vpRobotException.h>
 
 namespace
@@ -194,23 +194,10 @@ void vpRobotArDrone::trim()
 void vpRobotArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
 {
   m_state->requireOpen();
-  if (v.size() != 6)
-    throw vpRobotException(vpRobotException::dimensionError, "velocity of %u numbers, must be 6",
-                           v.size());
-  if (frame != vpRobot::CAMERA_FRAME && frame != vpRobot::REFERENCE_FRAME)
-    throw vpRobotException(vpRobotException::wrongStateError,
-                           "frame, must be CAMERA_FRAME or REFERENCE_FRAME");
-  for (unsigned i = 0; i < 6; ++i)
-    if (!std::isfinite(v[i]))
-      throw vpRobotException(vpRobotException::wrongStateError, "velocity %u is not finite", i);
-  vpColVector saturation(6, getMaxTranslationVelocity());
-  for (unsigned i = 3; i < 6; ++i)
-    saturation[i] = getMaxRotationVelocity();
-  vpColVector body = vpRobot::saturateVelocities(v, saturation, false);
-  if (frame == vpRobot::CAMERA_FRAME)
-    body = vpVelocityTwistMatrix(m_state->options.bMc) * body;
+  const Eigen::Vector4d wanted = bole::bodyVelocity(
+      frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
   const std::lock_guard<std::mutex> lock(m_state->mutex);
-  m_state->wanted = {body[0], body[1], body[2], body[5]};
+  m_state->wanted = wanted;
   m_state->has_wanted = true;
   m_state->renewed_ns = bole::steadyNowNs();
 }

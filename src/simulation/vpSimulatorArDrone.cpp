@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/body_velocity.h>
 #include <bole/geometry/so3.h>
 #include <bole/input/camera_file.h>
 #include <bole/simulation/h264_link.h>
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <visp3/core/vpVelocityTwistMatrix.h>
 #include <visp3/robot/vpRobotException.h>
 
 namespace
@@ -205,20 +205,7 @@ void vpSimulatorArDrone::trim() { m_state->requireOpen(); }
 void vpSimulatorArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
 {
   m_state->requireOpen();
-  if (v.size() != 6)
-    throw vpRobotException(vpRobotException::dimensionError, "velocity of %u numbers, must be 6", v.size());
-  if (frame != vpRobot::CAMERA_FRAME && frame != vpRobot::REFERENCE_FRAME)
-    throw vpRobotException(vpRobotException::wrongStateError, "frame, must be CAMERA_FRAME or REFERENCE_FRAME");
-  for (unsigned i = 0; i < 6; ++i)
-    if (!std::isfinite(v[i]))
-      throw vpRobotException(vpRobotException::wrongStateError, "velocity %u is not finite", i);
-  vpColVector saturation(6, getMaxTranslationVelocity());
-  for (unsigned i = 3; i < 6; ++i)
-    saturation[i] = getMaxRotationVelocity();
-  vpColVector body = vpRobot::saturateVelocities(v, saturation, false);
-  if (frame == vpRobot::CAMERA_FRAME)
-    body = vpVelocityTwistMatrix(m_state->options.bMc) * body;
-  m_state->wanted = {body[0], body[1], body[2], body[5]};
+  m_state->wanted = bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
   m_state->has_wanted = true;
   m_state->renewed = m_state->time();
 }
