@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/tasks/obstacles.h>
 #include <bole/tasks/trunk_task.h>
 
 #include <algorithm>
@@ -9,7 +10,7 @@ namespace bole
 {
 namespace
 {
-constexpr double kSweep_s = 9;          ///< one sidestep to and fro before a trunk is chosen
+constexpr double kSweep_s = 9;          ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
 constexpr double kPause_s = 0.25;       ///< without a command it hovered: what was sent before is over
 constexpr double kFirstDrift = 0.3;     ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
@@ -32,6 +33,12 @@ void TrunkTaskOptions::validate() const
   require("ratio_noise", ratio_noise, 1e-5, 0.5);
   require("unrest", unrest, 1e-3, 2);
   require("largest_speed", largest_speed, 0.05, 3);
+  require("sway", sway, 0, 2);
+  require("sway_period", sway_period, 1, 60);
+  require("sway_s", sway_s, 0, 600);
+  require("radius_sigma", radius_sigma, 1e-3, 1);
+  require("free_way", free_way, 0, 5);
+  require("choice_evidence", choice_evidence, -20, 20);
   require("choice_angle", choice_angle, 0.02, 0.6);
   require("choice_range", choice_range, 1, 20);
   require("choice_views", choice_views, 1, 1000);
@@ -50,8 +57,8 @@ TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
   m_servo.setLambda(m_options.gain);
   m_servo.addFeature(m_current, m_desired, vpFeatureTrunk::selectBearing() | vpFeatureTrunk::selectLogRatio());
   m_servo.set_cVe(vpVelocityTwistMatrix(m_bMc.inverse().toVisp()));
-  vpMatrix eJe(6, 3);
-  eJe[0][0] = eJe[1][1] = eJe[5][2] = 1; // vx, vy, wz
+  vpMatrix eJe(6, 2);
+  eJe[0][0] = eJe[5][1] = 1; // vx, wz
   m_servo.set_eJe(eJe);
 }
 
@@ -70,23 +77,32 @@ bool TrunkTask::sees(const FrameResult &result, const Pipeline &) const
   return m_target < 0 || trackedTrunk(result, m_target) != nullptr;
 }
 
-/// The nearest confirmed trunk straight ahead of where the search began.
-int TrunkTask::choose(const Pipeline &pipeline, const Pose &wMb) const
+/// The nearest trunk straight ahead of where the search began that is surely one; after two sweeps without such a one,
+/// the surest that is confirmed.
+int TrunkTask::choose(const Pipeline &pipeline, double elapsed_s) const
 {
-  int best = -1;
-  double best_range = m_options.choice_range;
+  const MapTrunk *nearest = nullptr, *surest = nullptr;
+  double least_range = m_options.choice_range;
   const double heading = yawOf(m_sidestep.start());
   for (const MapTrunk &trunk : pipeline.mapTrunks()) {
     if (trunk.removed || trunk.status != TrunkStatus::confirmed || trunk.observations < m_options.choice_views)
       continue;
-    const Eigen::Vector2d w = trunk.trunk.axisAt(wMb.t.z()).head<2>() - m_sidestep.start().t.head<2>();
-    const double angle = std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI);
-    if (std::abs(angle) < m_options.choice_angle && w.norm() < best_range) {
-      best = trunk.id;
-      best_range = w.norm();
+    const Pose &start = m_sidestep.start();
+    const Eigen::Vector2d w = trunk.trunk.axisAt(start.t.z()).head<2>() - start.t.head<2>();
+    const double angle = std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI), range = w.norm();
+    if (std::abs(angle) > m_options.choice_angle || range > m_options.choice_range)
+      continue;
+    const double evidence = pipeline.evidence(trunk);
+    if (!surest || evidence > pipeline.evidence(*surest))
+      surest = &trunk;
+    if (evidence >= m_options.choice_evidence && range < least_range) {
+      nearest = &trunk;
+      least_range = range;
     }
   }
-  return best;
+  if (nearest)
+    return nearest->id;
+  return surest && elapsed_s > 2 * kSweep_s ? surest->id : -1;
 }
 
 /// The trunk that stands where the target stood: ids change when trunks merge.
@@ -110,7 +126,7 @@ TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipelin
     return {true, Eigen::Vector4d::Zero(), "no trunk found"};
   }
   if (elapsed > kSweep_s)
-    m_target = choose(pipeline, result.wMb);
+    m_target = choose(pipeline, elapsed);
   if (m_target >= 0) {
     enter(TaskPhase::servoing);
     m_has_feature = false;
@@ -120,15 +136,24 @@ TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipelin
 
 void TrunkTask::desire(double radius)
 {
-  m_ratio = m_options.ratio > 0 ? m_options.ratio : std::min(0.5, radius / m_options.distance);
+  if (m_options.ratio > 0)
+    m_ratio = m_options.ratio;
+  else if (!m_rests || m_ratio <= 0)
+    m_ratio = std::min(0.5, radius / m_options.distance);
   m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
 }
 
+/// As tracked in this image; where it was missed, and for the distance while it sways, as the map has it: pose and place
+/// in it rest on all images.
 RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk) const
 {
-  if (const TrackedTrunk *tracked = trackedTrunk(result, m_target))
-    return tracked->relative;
-  return relativeTrunk(result.wMb, m_bMc, trunk.trunk);
+  RelativeTrunk seen = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
+  if (const TrackedTrunk *tracked = trackedTrunk(result, m_target)) {
+    seen.cRt = tracked->relative.cRt;
+    if (m_options.ratio > 0 || m_rests)
+      seen.log_ratio = tracked->relative.log_ratio;
+  }
+  return seen;
 }
 
 TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
@@ -152,7 +177,38 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
-  return {false, velocityFor(feature, trunk->trunk.radius(), time_s), m_options.speed != 0 ? "circles" : "holds"};
+  const double sway = swayNow(*trunk, time_s);
+  const double round = isFree(*trunk, pipeline, result.wMb, m_options.speed + sway) ? m_options.speed + m_options.sway * sway : 0;
+  TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
+  if (sway != 0)
+    command.reason = "sways to measure the range";
+  else if (m_options.speed != 0)
+    command.reason = round != 0 ? "circles" : "way blocked: waits";
+  return command;
+}
+
+/// -1 to 1; 0 once the radius is known, and where no distance is asked for.
+double TrunkTask::swayNow(const MapTrunk &trunk, double time_s)
+{
+  if (m_options.speed != 0 || m_options.ratio > 0 || m_rests)
+    return 0;
+  if (m_sway_start_s < 0)
+    m_sway_start_s = time_s;
+  const double t = time_s - m_sway_start_s, turns = t / m_options.sway_period;
+  const bool is_central = std::abs(std::remainder(turns - 0.25, 0.5)) < 0.03; // comes to rest where it turns
+  m_rests = is_central && (std::sqrt(trunk.covariance(2, 2)) < m_options.radius_sigma || t > m_options.sway_s);
+  return m_rests ? 0 : std::cos(2 * M_PI * turns);
+}
+
+/// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
+bool TrunkTask::isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const
+{
+  const Eigen::Vector2d way = (speed > 0 ? 1 : -1) * wMb.R.col(1).head<2>().normalized();
+  for (const Obstacle &other : obstacles(pipeline, wMb, 3, 1))
+    if (other.id != trunk.id && other.is_confirmed && way.dot(other.xy - wMb.t.head<2>()) > 0 &&
+        other.clearance(wMb.t.head<2>(), 1) < m_options.free_way)
+      return false;
+  return true;
 }
 
 /// How bearing and log r/d of \p feature move with (vx, vy, vz, wz) of the body.
@@ -190,41 +246,36 @@ void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
   m_time_s = time_s;
 }
 
-/// m_current as it would come to stand if the drone's lags ran out from when the command acts; the drift that is fed
-/// forward [1/s].
-Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius)
+/// m_current as it would come to stand if the drone's lags ran out from when the command acts; how it will move besides
+/// [1/s]: by its drift, and by flying sideways at \p round.
+Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, double time_s, double round)
 {
   const ResponseOptions &response = m_options.response;
-  const auto J = interactionOf(feature);
-  DroneResponse ahead = m_response;
-  const Eigen::Vector2d path = J * ahead.advance(m_time_s + response.delay);
+  const Eigen::Matrix<double, 2, 4> J = interactionOf(feature);
   const double most = kLargestDrift / feature.distance();
   const Eigen::Vector2d drift(std::clamp(m_bearing.drift(), -most, most), std::clamp(m_log_ratio.drift(), -most, most));
+  DroneResponse ahead = m_response;
+  const Eigen::Vector2d there = J * ahead.advance(time_s + response.delay) + response.delay * drift;
   const Eigen::Vector2d rate = J * ahead.velocity() + drift;
-  const double lead_s = response.delay;
-  m_current.buildFrom(m_bearing.value() + path(0) + lead_s * drift(0) + response.turn_lag * rate(0), feature.inclination(),
-                      feature.tip(), m_log_ratio.value() + path(1) + lead_s * drift(1) + response.speed_lag * rate(1),
-                      radius);
-  return drift;
+  m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * rate(0), feature.inclination(), feature.tip(),
+                      m_log_ratio.value() + there(1) + response.speed_lag * rate(1), radius);
+  ahead.send(time_s, {0, round, 0, 0});
+  ahead.advance(time_s + response.delay + response.turn_lag); // the turn lags too: it is to match what is flown then
+  return drift + J.col(1) * ahead.velocity().y();
 }
 
-Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double radius, double time_s)
+Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round)
 {
   filter(feature, time_s);
   desire(radius);
-  const Eigen::Vector2d drift = lead(feature, radius);
+  round = std::clamp(round, -m_options.largest_speed, m_options.largest_speed);
+  const Eigen::Vector2d besides = lead(feature, radius, time_s, round);
   vpColVector v = m_servo.computeControlLaw(), against(2);
-  against[0] = -drift(0);
-  against[1] = -drift(1);
+  against[0] = -besides(0);
+  against[1] = -besides(1);
   v += m_servo.getTaskJacobianPseudoInverse() * against;
-  if (m_options.speed != 0) {
-    vpColVector round(3); // going left the trunk moves right: turn right with it
-    round[1] = m_options.speed;
-    round[2] = -m_options.speed / m_current.distance();
-    v += m_servo.secondaryTask(round);
-  }
-  const Eigen::Vector2d flat = limited({v[0], v[1]}, m_options.largest_speed);
-  const Eigen::Vector4d velocity(flat.x(), flat.y(), 0, std::clamp(v[2], -kLargestTurn, kLargestTurn));
+  const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
+  const Eigen::Vector4d velocity(flat.x(), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
   m_response.send(time_s, velocity);
   return velocity;
 }

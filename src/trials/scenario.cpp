@@ -64,7 +64,7 @@ Scenario oneTrunk(const ScenarioOptions &options, const ForestOptions &forest, R
   addLine(path, {0, 0}, at - at.normalized() * (trunk.radius + 0.8));
   if (options.kind == ServoKind::circle)
     for (double a = 0; a < 2 * M_PI; a += 0.05)
-      add(path, at.x() + options.goal_range * std::cos(a), at.y() + options.goal_range * std::sin(a));
+      add(path, at.x() + trunk.radius / options.ratio * std::cos(a), at.y() + trunk.radius / options.ratio * std::sin(a));
   Scenario scenario;
   scenario.forest = Forest::plant(forest, path, {trunk});
   scenario.target = 0;
@@ -121,7 +121,7 @@ void ScenarioOptions::validate() const
       throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
   };
   require("density", density, 0, 0.3);
-  require("goal_range", goal_range, 0.5, 20);
+  require("ratio", ratio, 0.01, 0.5);
   require("length", length, 1, 1000);
 }
 

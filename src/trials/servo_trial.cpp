@@ -114,7 +114,7 @@ TrunkTaskOptions trunkOptions(const ServoTrialOptions &options)
   task.search_s = options.loop.search_most_s;
   if (options.scenario.kind == ServoKind::circle) {
     task.speed = options.speed > 0 ? options.speed : 0.5;
-    task.ratio = options.ratio > 0 ? options.ratio : 0.07;
+    task.ratio = options.ratio > 0 ? options.ratio : options.scenario.ratio;
   }
   return task;
 }
@@ -241,7 +241,10 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
 {
   ServoTrialResult result;
   result.seed = options.scenario.seed;
-  const Scenario scenario = makeScenario(options.scenario);
+  ScenarioOptions asked = options.scenario;
+  if (options.ratio > 0)
+    asked.ratio = options.ratio;
+  const Scenario scenario = makeScenario(asked);
   vpSimulatorArDrone::Options settings = options.robot;
   settings.setSeed(options.scenario.seed);
   settings.start = scenario.start;

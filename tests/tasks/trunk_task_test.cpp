@@ -59,7 +59,7 @@ TEST(TrunkTask, TheErrorDecaysAtTheGain)
   TrunkTask task(flight.bMc, options);
   const double bearing = flight.feature().bearing(), ratio = std::log(flight.distance() / 3);
   for (int k = 0; k < 100; ++k) // 2 s
-    flight.move(task.velocityFor(flight.feature(), 0.2, k * kStep));
+    flight.move(task.velocityFor(flight.feature(), 0.2, k * kStep, 0));
   const double left = std::exp(-0.5 * 2);
   EXPECT_NEAR(flight.feature().bearing() / bearing, left, 0.03);
   EXPECT_NEAR(std::log(flight.distance() / 3) / ratio, left, 0.03);
@@ -73,7 +73,7 @@ TEST(TrunkTask, HoldsTheBearingAskedForAndNotOnlyStraightAhead)
   options.ratio = 0.06;
   TrunkTask task(flight.bMc, options);
   for (int k = 0; k < 2000; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep));
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0));
   EXPECT_NEAR(flight.feature().bearing(), 0.2, 1e-3);
   EXPECT_NEAR(flight.distance(), 0.15 / 0.06, 1e-2);
 }
@@ -85,7 +85,7 @@ TEST(TrunkTask, AWrongRadiusSlowsButDoesNotMoveTheRatioItKeeps)
   options.ratio = 0.06;
   TrunkTask task(flight.bMc, options);
   for (int k = 0; k < 2500; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.25, k * kStep)); // believes 0.25 m
+    flight.move(task.velocityFor(flight.feature(), 0.25, k * kStep, 0)); // believes 0.25 m
   EXPECT_NEAR(std::exp(flight.feature().logRatio()), 0.06, 1e-3);
 }
 
@@ -99,7 +99,7 @@ TEST(TrunkTask, CirclesAtTheRatioAndTheSpeedAskedFor)
   double turned = 0;
   for (int k = 0; k < 1600; ++k) { // 32 s at 0.5 m/s round 2.5 m is once round
     const Eigen::Vector2d a = flight.wMb.t.head<2>() - flight.trunk.xy;
-    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep));
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0.5));
     const Eigen::Vector2d b = flight.wMb.t.head<2>() - flight.trunk.xy;
     turned += std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
     ASSERT_NEAR(flight.feature().bearing(), 0, 0.01);
@@ -115,7 +115,7 @@ TEST(TrunkTask, ASteadyPushMovesNothing)
   options.ratio = 0.05;
   TrunkTask task(flight.bMc, options);
   for (int k = 0; k < 1000; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep) + Eigen::Vector4d(-0.05, 0.1, 0, 0.02));
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0) + Eigen::Vector4d(-0.05, 0.1, 0, 0.02));
   EXPECT_NEAR(flight.distance(), 3, 0.005);
   EXPECT_NEAR(flight.feature().bearing(), 0, 0.001);
 }
@@ -134,7 +134,7 @@ struct SlowFlight : Flight
     for (int k = 0; k < static_cast<int>((to_s - from_s) / 0.1); ++k) { // frames
       const double t = from_s + 0.1 * k;
       drone.advance(t);
-      drone.send(t, obeyed * task.velocityFor(feature(), radius, t));
+      drone.send(t, obeyed * task.velocityFor(feature(), radius, t, task.options().speed));
       for (int i = 0; i < 5; ++i)
         move(drone.advance(t + kStep * (i + 1)) / kStep);
     }
@@ -209,7 +209,7 @@ TEST(TrunkTask, KeepsItsLargestSpeed)
   TrunkTaskOptions options;
   options.largest_speed = 0.4;
   TrunkTask task(flight.bMc, options);
-  EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0).head<2>().norm(), 0.4 + 1e-9);
+  EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
 }
 
 TEST(TrunkTask, RefusesOptionsOutOfRange)

@@ -68,6 +68,8 @@ public:
   void finish();
 
   const std::vector<MapTrunk> &mapTrunks() const { return m_map.trunks(); }
+  /// Log odds that \p trunk is one (TrunkMap::evidence).
+  double evidence(const MapTrunk &trunk) const { return m_map.evidence(trunk); }
   /// The trunks, with covariances that carry the common error of the scale: it moves every trunk along its
   /// line from the first pose and changes every radius in proportion, and no camera sees it.
   std::vector<TrunkRecord> map() const;

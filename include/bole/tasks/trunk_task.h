@@ -4,9 +4,15 @@
 /// Image-based servoing on one trunk: hold its bearing and distance, or circle round it.
 ///
 /// Idea: two of vpFeatureTrunk's four numbers, bearing and log r/d, are what a drone that keeps its own roll, pitch and
-/// height can choose. vpServo drives both to their desired values over the drone's Jacobian (vx, vy, wz). Two numbers
-/// leave one motion of three free: going round the trunk. `hold` leaves it at rest, `circle` gives it a speed as
-/// vpServo's secondary task, which cannot disturb the two.
+/// height can choose. vpServo drives both to their desired values over the drone's Jacobian: the bearing by turning,
+/// log r/d by flying ahead, one axis each, since their lags differ. What is left is sideways: `hold` leaves it at rest,
+/// `circle` gives it a speed, and what that does to the two is fed forward.
+///
+/// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
+/// has none. So `hold` by distance first sways sideways, features held, until the map knows the radius
+/// to radius_sigma. Then it rests, and keeps the r/d that the distance has become: that is an image's, and does not
+/// wander as poses do. What no parallax tells is the scale of the drone's odometry. (Swaying on a slant, so that the
+/// height, which has no such error, gives the metre, was tried: the borders then found were worse.)
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
 /// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
@@ -31,13 +37,19 @@ struct TrunkTaskOptions
   double distance = 3;         ///< camera to axis, where no ratio is given [m], 0.5 to 20
   double bearing = 0;          ///< to be kept, positive right [rad], -0.5 to 0.5
   double speed = 0;            ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
-  double gain = 1.0;           ///< of vpServo [1/s], 0.05 to 3
-  double bearing_noise = 0.002; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
-  double ratio_noise = 0.015;  ///< of its log r/d, 1e-5 to 0.5
-  double unrest = 0.06;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
-  double largest_speed = 0.7;  ///< [m/s], 0.05 to 3
+  double gain = 2;             ///< of vpServo [1/s], 0.05 to 3
+  double bearing_noise = 0.0015; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
+  double ratio_noise = 0.025;  ///< of its log r/d, 1e-5 to 0.5
+  double unrest = 0.15;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
+  double largest_speed = 0.9;  ///< [m/s], 0.05 to 3
+  double sway = 0.8;           ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
+  double sway_period = 6;      ///< [s], 1 to 60
+  double sway_s = 25;          ///< sways no longer than this [s], 0 to 600
+  double radius_sigma = 0.01;  ///< standard deviation of log r, without the scale, at which it rests, 1e-3 to 1
+  double free_way = 0.9;       ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
   double choice_angle = 0.35;  ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
   double choice_range = 7;     ///< nor those beyond this [m], 1 to 20
+  double choice_evidence = 2;  ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
   int choice_views = 25;       ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
   double search_s = 40;        ///< gives up after [s], 1 to 600
   ResponseOptions response;
@@ -59,8 +71,9 @@ public:
   const TrunkTaskOptions &options() const { return m_options; }
   Values errors() const override;
 
-  /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for the \p feature of the frame of \p time_s [s].
-  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s);
+  /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for the \p feature of the frame of \p time_s [s],
+  /// going round at \p round [m/s], positive to the left.
+  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round);
 
 protected:
   bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
@@ -68,12 +81,14 @@ protected:
 
 private:
   TaskCommand search(const FrameResult &result, const Pipeline &pipeline, double time_s);
-  int choose(const Pipeline &pipeline, const Pose &wMb) const;
+  int choose(const Pipeline &pipeline, double elapsed_s) const;
   int successor(const Pipeline &pipeline) const;
   RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk) const;
   void desire(double radius);
+  double swayNow(const MapTrunk &trunk, double time_s);
+  bool isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s);
-  Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius);
+  Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
   Eigen::Matrix<double, 2, 4> interactionOf(vpFeatureTrunk feature) const;
 
   Pose m_bMc;
@@ -85,7 +100,9 @@ private:
   FeatureFilter m_bearing, m_log_ratio; ///< at the frame
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
-  double m_time_s = 0, m_ratio = 0.05;
+  double m_time_s = 0, m_ratio = 0;
+  double m_sway_start_s = -1; ///< -1: has not begun
+  bool m_rests = false;       ///< has swayed enough
   bool m_has_feature = false;
 };
 } // namespace bole

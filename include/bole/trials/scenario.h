@@ -23,7 +23,7 @@ struct ScenarioOptions
   ServoKind kind = ServoKind::hold;
   std::uint64_t seed = 1;     ///< same seed, same scenario
   double density = 0;         ///< trunks a m^2; 0: 0.03 for hold and circle, 0.04 for gap, 0.05 for slalom
-  double goal_range = 4;      ///< circle: the ring round the trunk that is kept clear [m], 0.5 to 20
+  double ratio = 0.07;        ///< circle: r/d of the ring round the trunk that is kept clear, 0.01 to 0.5
   double length = 40;         ///< slalom [m], 1 to 1000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
