@@ -37,6 +37,7 @@
 /// Cost: see README, "Against ViSP's edge trackers". One tracker a thread.
 
 #include <bole/tracking/border_vote.h>
+#include <bole/tracking/camera_motion.h>
 #include <bole/tracking/image_health.h>
 #include <bole/tracking/rotation_aligner.h>
 #include <bole/vpMbtDistanceTrunk.h>
@@ -80,10 +81,10 @@ public:
     double refine_px = 5;     ///< half-width of the second scan (2 .. 20)
     int refinements = 1;      ///< scans after the first (0 .. 5)
     /// Without a motion prior: what the camera may do between two frames, after the turn is taken out.
-    double step_sigma_m = 0.12;    ///< across the trunks, per axis (0.001 .. 10)
-    double climb_sigma_m = 0.03;   ///< along them, which they do not tell (0.001 .. 10)
+    double step_sigma_m = 0.12;    ///< across the trunks, per axis, while its velocity is unknown (0.001 .. 10)
+    double accel_sigma_m = 0.03;   ///< change of that step from one frame to the next (0.001 .. 10)
+    double climb_sigma_m = 0.03;   ///< along the trunks, which they do not tell (0.001 .. 10)
     double turn_sigma_rad = 0.006; ///< about each axis (1e-4 .. 1)
-    double velocity_gain = 0.9;    ///< of the last translation expected again (0 .. 1); 0: stands still
     double memory_rate = 0.15;     ///< how fast remembered contrast follows (0.01 .. 1)
     double min_support = 0.35;     ///< share of the visible borders that must agree, else lost (0.05 .. 1)
     double unobserved_m = 0.5;     ///< a direction the image knows worse than this is not observed (0.01 .. 10)
@@ -175,8 +176,8 @@ private:
 
   // vpMbTrunkTrackerPose.cpp: the estimation
   Eigen::Vector3d alongTrunks() const;
-  Prediction predictAlone(const bole::RotationAligner::Reference &thumbnails) const;
-  Prediction predict(const bole::RotationAligner::Reference &thumbnails) const;
+  Prediction predictAlone(const bole::RotationAligner::Reference &thumbnails);
+  Prediction predict(const bole::RotationAligner::Reference &thumbnails);
   Status estimate(const vpImage<unsigned char> &I, const Prediction &prediction);
   void predictTrunks(const vpImage<unsigned char> &I);
   void scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px);
@@ -202,11 +203,10 @@ private:
   bole::ImageHealth m_health;
   bole::RotationAligner m_aligner;
   bole::RotationAligner::Reference m_reference; ///< of the last image that was tracked
-  vpHomogeneousMatrix m_reference_cMo;
+  bole::CameraMotion m_motion;          ///< since then, without a prior
   std::optional<MotionPrior> m_prior;
-  Eigen::Vector3d m_velocity = Eigen::Vector3d::Zero(); ///< of the camera, m a frame, object frame
   int m_frames_since_good = 0;
-  Matrix6d m_posterior = Matrix6d::Zero(), m_reference_posterior = Matrix6d::Zero();
+  Matrix6d m_posterior = Matrix6d::Zero();
   Eigen::MatrixXd m_unobserved;
   vpMatrix m_L;
   vpColVector m_error, m_w, m_piece_weight, m_by_log_radius;

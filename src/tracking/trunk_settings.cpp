@@ -149,7 +149,7 @@ const std::map<std::string, Setter> &trunkKeys()
       {"step_sigma_m", [](O &o, double v) { o.step_sigma_m = v; }},
       {"climb_sigma_m", [](O &o, double v) { o.climb_sigma_m = v; }},
       {"turn_sigma_rad", [](O &o, double v) { o.turn_sigma_rad = v; }},
-      {"velocity_gain", [](O &o, double v) { o.velocity_gain = v; }},
+      {"accel_sigma_m", [](O &o, double v) { o.accel_sigma_m = v; }},
       {"memory_rate", [](O &o, double v) { o.memory_rate = v; }},
       {"min_support", [](O &o, double v) { o.min_support = v; }},
       {"unobserved_m", [](O &o, double v) { o.unobserved_m = v; }},

@@ -58,9 +58,9 @@ void vpMbTrunkTracker::Options::validate() const
   check("refine_px", refine_px, 2, 20);
   check("refinements", refinements, 0, 5);
   check("step_sigma_m", step_sigma_m, 0.001, 10);
+  check("accel_sigma_m", accel_sigma_m, 0.001, 10);
   check("climb_sigma_m", climb_sigma_m, 0.001, 10);
   check("turn_sigma_rad", turn_sigma_rad, 1e-4, 1);
-  check("velocity_gain", velocity_gain, 0, 1);
   check("memory_rate", memory_rate, 0.01, 1);
   check("min_support", min_support, 0.05, 1);
   check("unobserved_m", unobserved_m, 0.01, 10);
@@ -102,6 +102,9 @@ void vpMbTrunkTracker::setOptions(const Options &options)
   m_options = options;
   m_health = bole::ImageHealth(options.health);
   m_aligner = bole::RotationAligner(options.aligner);
+  m_motion = bole::CameraMotion({options.step_sigma_m, options.accel_sigma_m, options.climb_sigma_m});
+  if (m_status != Status::not_initialised)
+    m_motion.start(Pose::fromVisp(m_cMo), m_posterior);
   for (vpMbtDistanceTrunk &trunk : m_trunks)
     trunk.setOptions(options.trunk);
 }
@@ -204,7 +207,6 @@ void vpMbTrunkTracker::init(const vpImage<unsigned char> &I)
     trunk.forget();
   m_posterior = Matrix6d::Identity() * 1e-4; // 1 cm, 0.6 degrees
   m_frames_since_good = 0;
-  m_velocity.setZero();
   m_prior.reset();
   setPose(I, m_cMo);
   learn(I);
@@ -219,8 +221,7 @@ void vpMbTrunkTracker::setPose(const vpImage<unsigned char> &I, const vpHomogene
   if (&I != &m_I)
     m_I = I;
   m_reference = bole::RotationAligner::reduce(I);
-  m_reference_cMo = m_cMo;
-  m_reference_posterior = m_posterior;
+  m_motion.start(Pose::fromVisp(m_cMo), m_posterior);
   m_frames_since_good = 0;
   m_status = Status::tracked;
   m_message = "initialised";
@@ -240,7 +241,6 @@ void vpMbTrunkTracker::resetTracker()
   nbCylinders = 0;
   m_cMo.eye();
   m_prior.reset();
-  m_velocity.setZero();
   m_frames_since_good = 0;
   m_reference = {};
   m_unobserved.resize(6, 0);
@@ -295,15 +295,14 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
     return;
   }
   keep(prediction);
-  const Eigen::Vector3d before = Pose::fromVisp(m_reference_cMo).inverse().t;
-  const Eigen::Vector3d now = Pose::fromVisp(m_cMo).inverse().t;
-  m_velocity = (now - before) / (m_frames_since_good + 1);
+  if (m_prior)
+    m_motion.replace(Pose::fromVisp(m_cMo), m_posterior, m_frames_since_good + 1);
+  else
+    m_motion.update(Pose::fromVisp(m_cMo), m_posterior);
   m_frames_since_good = 0;
   for (std::size_t k : m_in_view)
     m_trunks[k].remember(m_options.memory_rate);
   m_reference = thumbnails;
-  m_reference_cMo = m_cMo;
-  m_reference_posterior = m_posterior;
   projectionError = computeProjError ? computeCurrentProjectionError(I, m_cMo, m_cam) : 90.0;
   if (m_unobserved.cols() == 0)
     finish(Status::tracked, "all directions are observed");

@@ -97,37 +97,17 @@ Vector3d vpMbTrunkTracker::alongTrunks() const
   return sum.normalized();
 }
 
-/// From the last good frame: the turn by the alignment of whole images, the step by the last velocity. Along the
-/// trunks the camera is expected to stay: a velocity that is never seen must not be integrated.
-vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone(const bole::RotationAligner::Reference &thumbnails) const
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone(const bole::RotationAligner::Reference &thumbnails)
 {
-  const double frames = m_frames_since_good + 1;
-  const Pose before = Pose::fromVisp(m_reference_cMo);
-  Pose now = before;
-  double turn_sigma = m_options.turn_sigma_rad;
+  const int frames = m_frames_since_good + 1;
   const bole::RotationAlignment turn = m_aligner.align(
       m_reference, thumbnails, bole::PinholeCamera::fromVisp(m_cam, int(m_I.getWidth()), int(m_I.getHeight())));
-  if (turn.ok)
-    now.R = turn.c2Rc1 * before.R;
-  else
-    turn_sigma = 0.05 * std::sqrt(frames);
-  const Vector3d up = alongTrunks();
-  const Vector3d step = m_options.velocity_gain * frames * (m_velocity - up.dot(m_velocity) * up);
-  now.t = -(now.R * (before.inverse().t + step));
-  Prediction prediction;
-  prediction.cMo = moved(m_cMo, estimated(twistBetween(m_cMo, now.toVisp())));
-  const Matrix6d carried = twistMatrix(prediction.cMo * m_reference_cMo.inverse());
-  const Vector3d c_up = now.R * up;
-  const double step_variance = std::pow(m_options.step_sigma_m, 2) * frames;
-  const double climb_variance = std::pow(m_options.climb_sigma_m, 2) * frames;
-  prediction.covariance = carried * m_reference_posterior * carried.transpose();
-  prediction.covariance.topLeftCorner<3, 3>() +=
-      step_variance * Matrix3d::Identity() + (climb_variance - step_variance) * c_up * c_up.transpose();
-  prediction.covariance.diagonal().tail<3>().array() += turn_sigma * turn_sigma;
-  return prediction;
+  const auto expected = m_motion.predict(frames, turn.ok ? turn.c2Rc1 : Matrix3d::Identity(),
+                                         turn.ok ? m_options.turn_sigma_rad : 0.05 * std::sqrt(double(frames)), alongTrunks());
+  return {moved(m_cMo, estimated(twistBetween(m_cMo, expected.cMo.toVisp()))), expected.covariance};
 }
 
-vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails) const
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails)
 {
   if (!m_prior)
     return predictAlone(thumbnails);
