@@ -72,13 +72,20 @@ public:
     bole::VisibleBorder line;        ///< predicted
     std::vector<bool> hidden;        ///< samples behind another trunk
     bole::BorderProfile profile;     ///< last search
+    std::vector<float> whole;        ///< its mean over the whole border
     std::vector<float> contrast;     ///< of the whole border at each offset of the last search
     std::vector<bole::ContrastPeak> peaks;
     int chosen = -1;                 ///< peak of the whole border that the pieces follow
     std::vector<Piece> pieces;
     double remembered_contrast = 0;  ///< signed, mean over the frames before; 0: none yet
     int remembered_frames = 0;
+    std::vector<float> remembered_profile; ///< grey across the border in the frames before, kProfileReach to each side
+
+    /// How well the last search at \p offset_px looks like the frames before: normalised correlation of the
+    /// profiles, -1 .. 1; 0 where nothing is remembered or the search did not reach.
+    double likeness(int offset_px) const;
   };
+  static constexpr int kProfileReach = 6; ///< [px]
 
   vpMbtDistanceTrunk();
   explicit vpMbtDistanceTrunk(const Options &options);
@@ -136,6 +143,8 @@ public:
   unsigned int nbFeature = 0; ///< rows of L
 
 private:
+  static void rememberProfile(BorderState &state, double rate);
+
   Options m_options;
   bole::Cylinder m_object, m_camera;
   bole::RelativeTrunk m_relative;

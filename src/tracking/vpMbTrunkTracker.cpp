@@ -5,6 +5,7 @@
 #include <bole/vpMbTrunkTracker.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <fmt/format.h>
@@ -63,6 +64,10 @@ void vpMbTrunkTracker::Options::validate() const
   check("turn_sigma_rad", turn_sigma_rad, 1e-4, 1);
   check("memory_rate", memory_rate, 0.01, 1);
   check("min_support", min_support, 0.05, 1);
+  check("min_agreement", min_agreement, 0, 1);
+  check("max_jump", max_jump, 0.1, 1000);
+  check("max_sigma_m", max_sigma_m, 0.001, 100);
+  check("max_sigma_rad", max_sigma_rad, 0.001, 3.2);
   check("unobserved_m", unobserved_m, 0.01, 10);
   check("lever_m", lever_m, 0.1, 100);
 }
@@ -74,6 +79,7 @@ const char *vpMbTrunkTracker::toString(Status status)
   case Status::tracked: return "tracked";
   case Status::partly_on_prior: return "partly on the prior";
   case Status::no_trunk: return "no trunk in view";
+  case Status::uncertain: return "uncertain";
   case Status::lost: return "lost";
   case Status::wrong_size: return "wrong size";
   case Status::black: return "black";
@@ -205,6 +211,8 @@ void vpMbTrunkTracker::init(const vpImage<unsigned char> &I)
   setCameraParameters(m_cam);
   for (vpMbtDistanceTrunk &trunk : m_trunks)
     trunk.forget();
+  m_agreement = -1;
+  m_is_doubtful = false;
   m_posterior = Matrix6d::Identity() * 1e-4; // 1 cm, 0.6 degrees
   m_frames_since_good = 0;
   m_prior.reset();
@@ -260,6 +268,20 @@ void vpMbTrunkTracker::reInitModel(const vpImage<unsigned char> &I, const std::s
   initFromPose(I, cMo);
 }
 
+/// Why the pose just found is not to be vouched for; empty: it is.
+std::string vpMbTrunkTracker::doubt() const
+{
+  const double metres = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.topLeftCorner<3, 3>()).eigenvalues()(2));
+  const double radians = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.bottomRightCorner<3, 3>()).eigenvalues()(2));
+  if (metres > m_options.max_sigma_m)
+    return fmt::format("the position is known to {:.2g} m only", metres);
+  if (radians > m_options.max_sigma_rad)
+    return fmt::format("the attitude is known to {:.2g} rad only", radians);
+  if (!m_prior && m_is_doubtful)
+    return fmt::format("the borders agree to {:.2f} only: the trunks found may be others", m_agreement);
+  return "";
+}
+
 void vpMbTrunkTracker::finish(Status status, const std::string &message)
 {
   m_status = status;
@@ -290,7 +312,7 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
     m_cMo = prediction.cMo;
     m_posterior = prediction.covariance;
     ++m_frames_since_good;
-    finish(status, status == Status::lost ? "the borders of the trunks are not where they must be"
+    finish(status, status == Status::lost ? "the borders of the trunks are not where they can be"
                                           : "no trunk of the model is in view");
     return;
   }
@@ -304,7 +326,9 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
     m_trunks[k].remember(m_options.memory_rate);
   m_reference = thumbnails;
   projectionError = computeProjError ? computeCurrentProjectionError(I, m_cMo, m_cam) : 90.0;
-  if (m_unobserved.cols() == 0)
+  if (const std::string why = doubt(); !why.empty())
+    finish(Status::uncertain, why);
+  else if (m_unobserved.cols() == 0)
     finish(Status::tracked, "all directions are observed");
   else
     finish(Status::partly_on_prior, fmt::format("{} directions are not observed", m_unobserved.cols()));

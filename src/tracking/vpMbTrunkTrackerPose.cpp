@@ -26,6 +26,8 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 /// Inverse of a covariance or an information.
 Matrix6d inverted(const Matrix6d &m) { return MatrixXd(m).llt().solve(MatrixXd::Identity(6, 6)); }
 
+constexpr double kTrustAgain = 0.08; ///< of agreement beyond Options::min_agreement
+
 const std::array<Border, 2> kBorders{Border::left, Border::right};
 
 Matrix6d twistMatrix(const vpHomogeneousMatrix &aMb)
@@ -171,6 +173,10 @@ std::vector<float> vpMbTrunkTracker::response(const vpMbtDistanceTrunk::BorderSt
   for (std::size_t k = 0; k < g.size(); ++k) {
     const float share = reference != 0 ? g[k] / reference : 0;
     sharp[k] = std::min(known ? std::max(share, 0.f) : std::abs(share), 1.f);
+    if (!state.remembered_profile.empty()) {
+      const float alike = std::max(0.f, float(state.likeness(int(k) - int(g.size()) / 2)));
+      sharp[k] = std::min(1.5f * sharp[k], 1.f) * alike * alike;
+    }
   }
   for (std::size_t k = 1; k + 1 < g.size(); ++k)
     wide[k] = std::max({sharp[k], 0.9f * sharp[k - 1], 0.9f * sharp[k + 1]});
@@ -192,7 +198,8 @@ Vector6d vpMbTrunkTracker::agree(const Matrix6d &covariance)
           {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
       borders.push_back({-focal() * row, response(state)});
     }
-  return estimated(bole::vote(borders, covariance, m_options.vote).twist);
+  m_vote = bole::vote(borders, covariance, m_options.vote);
+  return estimated(m_vote.twist);
 }
 
 void vpMbTrunkTracker::choosePeaks(const Vector6d &twist, double sigma_px, double reach_px)
@@ -217,7 +224,10 @@ void vpMbTrunkTracker::choosePeaks(const Vector6d &twist, double sigma_px, doubl
       int best = -1;
       double least = 4.5; // three standard deviations
       for (int p = 0; p < int(state.peaks.size()); ++p) {
-        const double cost = peakCost(state.peaks[std::size_t(p)], expected, sigma_px, reference, signs);
+        const bole::ContrastPeak &peak = state.peaks[std::size_t(p)];
+        double cost = peakCost(peak, expected, sigma_px, reference, signs);
+        if (!state.remembered_profile.empty())
+          cost += 2 * (1 - std::max(0.0, state.likeness(int(std::lround(peak.offset_px)))));
         if (cost < least)
           least = cost, best = p;
       }
@@ -362,7 +372,19 @@ Status vpMbTrunkTracker::estimate(const vpImage<unsigned char> &I, const Predict
     choosePeaks(Vector6d::Zero(), m_options.border_sigma_px, 3);
     servo(prediction);
   }
-  return support() < m_options.min_support ? Status::lost : Status::tracked;
+  const double agreeing = support();
+  judge(0.5 * (m_vote.score + agreeing));
+  const Vector6d jump = twistBetween(prediction.cMo, m_cMo);
+  const bool has_jumped = !m_prior && jump.dot(prediction.covariance.ldlt().solve(jump)) > m_options.max_jump;
+  return has_jumped || agreeing < m_options.min_support ? Status::lost : Status::tracked;
+}
+
+/// Whether the borders agree as well as they do where a tracker is right: over the last few frames, and once
+/// they did not, clearly better before they are trusted again.
+void vpMbTrunkTracker::judge(double agreement)
+{
+  m_agreement = m_agreement < 0 ? agreement : 0.5 * (m_agreement + agreement);
+  m_is_doubtful = m_agreement < m_options.min_agreement + (m_is_doubtful ? kTrustAgain : 0);
 }
 
 /// The signed contrast of each border at a pose that the caller vouches for: what the first frame is expected to show.

@@ -15,6 +15,7 @@ using Eigen::Vector3d;
 namespace
 {
 const std::array<Border, 2> kBorders{Border::left, Border::right};
+constexpr double kProfileRate = 0.5; ///< how fast the remembered profile follows: the background moves on behind the border
 
 void check(const char *name, double value, double low, double high)
 {
@@ -120,7 +121,8 @@ void vpMbtDistanceTrunk::scan(const vpImage<unsigned char> &I, int half_px)
     state.peaks.clear();
     if (!state.visible)
       continue;
-    state.profile = bole::sampleBorder(I, state.line, half_px + 3, m_options.samples, m_options.pieces, state.hidden);
+    state.profile = bole::sampleBorder(I, state.line, half_px + kProfileReach, m_options.samples, m_options.pieces, state.hidden);
+    state.whole = state.profile.whole();
     state.contrast = state.profile.contrast(-1);
     state.peaks = bole::contrastPeaks(state.contrast);
     const auto weak = [&](const bole::ContrastPeak &p) {
@@ -172,6 +174,37 @@ void vpMbtDistanceTrunk::search(const vpImage<unsigned char> &I, int half_px)
   }
 }
 
+double vpMbtDistanceTrunk::BorderState::likeness(int offset_px) const
+{
+  const int middle = int(whole.size()) / 2 + offset_px;
+  if (remembered_profile.empty() || middle < kProfileReach || middle + kProfileReach >= int(whole.size()))
+    return 0;
+  const float *now = whole.data() + middle - kProfileReach;
+  const float n = 2 * kProfileReach + 1;
+  float a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+  for (int k = 0; k < 2 * kProfileReach + 1; ++k) {
+    const float x = now[k], y = remembered_profile[std::size_t(k)];
+    a += x, b += y, aa += x * x, bb += y * y, ab += x * y;
+  }
+  const float va = aa - a * a / n, vb = bb - b * b / n;
+  return va > 1 && vb > 1 ? double((ab - a * b / n) / std::sqrt(va * vb)) : 0;
+}
+
+/// The profile around the chosen peak, moved to its sub-pixel place, is mixed into the remembered one.
+void vpMbtDistanceTrunk::rememberProfile(BorderState &state, double rate)
+{
+  const double middle = double(state.whole.size() / 2) + state.peaks[std::size_t(state.chosen)].offset_px;
+  const int first = int(std::floor(middle)) - kProfileReach;
+  if (first < 0 || first + 2 * kProfileReach + 1 >= int(state.whole.size()))
+    return;
+  const float part = float(middle - std::floor(middle)), gain = state.remembered_profile.empty() ? 1.f : float(rate);
+  state.remembered_profile.resize(2 * kProfileReach + 1, 0.f);
+  for (std::size_t k = 0; k < state.remembered_profile.size(); ++k) {
+    const float *at = state.whole.data() + first + k;
+    state.remembered_profile[k] += gain * ((1 - part) * at[0] + part * at[1] - state.remembered_profile[k]);
+  }
+}
+
 void vpMbtDistanceTrunk::remember(double rate)
 {
   for (BorderState &state : m_border) {
@@ -181,6 +214,7 @@ void vpMbtDistanceTrunk::remember(double rate)
     const double gain = std::max(rate, 1.0 / (state.remembered_frames + 1));
     state.remembered_contrast += gain * (seen - state.remembered_contrast);
     ++state.remembered_frames;
+    rememberProfile(state, kProfileRate);
   }
 }
 
@@ -189,6 +223,7 @@ void vpMbtDistanceTrunk::forget()
   for (BorderState &state : m_border) {
     state.remembered_contrast = 0;
     state.remembered_frames = 0;
+    state.remembered_profile.clear();
   }
 }
 

@@ -88,7 +88,7 @@ TEST_F(TrunkSettingsFile, TheFilesInModelsAreReadAndTrunksXmlHoldsTheDefaults)
   changed.trunk.pieces = 9, changed.trunk.samples = 99, changed.trunk.min_length_px = 99, changed.trunk.min_width_px = 9;
   changed.trunk.min_contrast = 9, changed.border_sigma_px = 9, changed.lean_sigma_rad = 0.4, changed.radius_sigma = 0.9;
   changed.scan_min_px = 9, changed.scan_max_px = 99, changed.refine_px = 9, changed.refinements = 4, changed.step_sigma_m = 9, changed.climb_sigma_m = 9;
-  changed.turn_sigma_rad = 0.9, changed.accel_sigma_m = 0.1, changed.min_support = 0.9, changed.unobserved_m = 9, changed.lever_m = 9;
+  changed.turn_sigma_rad = 0.9, changed.accel_sigma_m = 0.1, changed.min_support = 0.9, changed.min_agreement = 0.9, changed.max_jump = 9, changed.max_sigma_m = 9, changed.max_sigma_rad = 0.9, changed.unobserved_m = 9, changed.lever_m = 9;
   changed.health.detect_frozen = false;
   const auto o = readTrunkSettings((models / "trunks.xml").string(), changed).options;
   EXPECT_EQ(o.trunk.pieces, defaults.trunk.pieces);
@@ -108,6 +108,10 @@ TEST_F(TrunkSettingsFile, TheFilesInModelsAreReadAndTrunksXmlHoldsTheDefaults)
   EXPECT_EQ(o.climb_sigma_m, defaults.climb_sigma_m);
   EXPECT_EQ(o.accel_sigma_m, defaults.accel_sigma_m);
   EXPECT_EQ(o.min_support, defaults.min_support);
+  EXPECT_EQ(o.min_agreement, defaults.min_agreement);
+  EXPECT_EQ(o.max_jump, defaults.max_jump);
+  EXPECT_EQ(o.max_sigma_m, defaults.max_sigma_m);
+  EXPECT_EQ(o.max_sigma_rad, defaults.max_sigma_rad);
   EXPECT_EQ(o.unobserved_m, defaults.unobserved_m);
   EXPECT_EQ(o.lever_m, defaults.lever_m);
   EXPECT_EQ(o.health.detect_frozen, defaults.health.detect_frozen);
