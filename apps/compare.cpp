@@ -86,9 +86,8 @@ void measureBasin(const Arguments &arguments, const TestFlight &flight, const st
       BasinRow best;
       double best_sum = -1;
       for (const int range : {8, 16, 32}) { // the range that answers most steps right
-        EdgeSettings settings;
+        EdgeSettings settings = bestOf(report.sweeps, kind, Help::alone);
         settings.range = range;
-        settings.far_m = arguments.far_m;
         Contender contender(kind, Help::alone, settings);
         const BasinRow row = basin(flight, cao, contender, has_clutter, options);
         double sum = 0;

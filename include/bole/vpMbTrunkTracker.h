@@ -94,7 +94,7 @@ public:
     double min_support = 0.35;     ///< share of the visible borders that must agree, else lost (0.05 .. 1)
     /// Without a motion prior: mean of the vote's share and the supporting share, over a few frames, below which
     /// the trunks found may be others (0 .. 1). Right poses of simulated flights have 0.79, wrong ones 0.57.
-    double min_agreement = 0.66;
+    double min_agreement = 0.68;
     /// Without a motion prior: squared Mahalanobis distance from the motion expected beyond which trunks were taken for
     /// others, and the pose is not believed (0.1 .. 1000). Right poses of simulated flights stay below 6 in 998 of 1000 frames.
     double max_jump = 6;
@@ -187,6 +187,8 @@ private:
     Matrix6d covariance;
   };
 
+  static constexpr double kRightAgreement = 0.79; ///< of right poses, mean over simulated flights: what a start is taken for
+
   // vpMbTrunkTrackerPose.cpp: the estimation
   Eigen::Vector3d alongTrunks() const;
   Prediction predictAlone(const bole::RotationAligner::Reference &thumbnails);
@@ -220,7 +222,7 @@ private:
   bole::RotationAligner::Reference m_reference; ///< of the last image that was tracked
   bole::CameraMotion m_motion;          ///< since then, without a prior
   bole::Vote m_vote;          ///< of the first scan
-  double m_agreement = -1;    ///< over the last frames; below 0: not yet known
+  double m_agreement = kRightAgreement; ///< over the last frames
   bool m_is_doubtful = false; ///< what judge() made of it
   std::optional<MotionPrior> m_prior;
   int m_frames_since_good = 0;

@@ -211,7 +211,7 @@ void vpMbTrunkTracker::init(const vpImage<unsigned char> &I)
   setCameraParameters(m_cam);
   for (vpMbtDistanceTrunk &trunk : m_trunks)
     trunk.forget();
-  m_agreement = -1;
+  m_agreement = kRightAgreement;
   m_is_doubtful = false;
   m_posterior = Matrix6d::Identity() * 1e-4; // 1 cm, 0.6 degrees
   m_frames_since_good = 0;

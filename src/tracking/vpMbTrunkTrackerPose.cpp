@@ -26,7 +26,7 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 /// Inverse of a covariance or an information.
 Matrix6d inverted(const Matrix6d &m) { return MatrixXd(m).llt().solve(MatrixXd::Identity(6, 6)); }
 
-constexpr double kTrustAgain = 0.08; ///< of agreement beyond Options::min_agreement
+constexpr double kTrustAgain = 0.06; ///< of agreement beyond Options::min_agreement
 
 const std::array<Border, 2> kBorders{Border::left, Border::right};
 
@@ -383,7 +383,7 @@ Status vpMbTrunkTracker::estimate(const vpImage<unsigned char> &I, const Predict
 /// they did not, clearly better before they are trusted again.
 void vpMbTrunkTracker::judge(double agreement)
 {
-  m_agreement = m_agreement < 0 ? agreement : 0.5 * (m_agreement + agreement);
+  m_agreement += 0.25 * (agreement - m_agreement);
   m_is_doubtful = m_agreement < m_options.min_agreement + (m_is_doubtful ? kTrustAgain : 0);
 }
 
