@@ -143,6 +143,7 @@ void run(const Arguments &arguments)
   std::fputs(toTable(report).c_str(), stdout);
   writeAtomically((fs::path(arguments.out) / "compare.json").string(), toJson(report));
   writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
+  writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
 }
 } // namespace
 
@@ -164,7 +165,7 @@ void addCompare(CLI::App &app)
       ->capture_default_str();
   command->footer("Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
                   "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are used.\n"
-                  "Prints the table and writes OUT/compare.json and OUT/compare.html.\n"
+                  "Prints the table and writes OUT/compare.json, compare.html and compare.svg.\n"
                   "Examples:\n"
                   "  bole compare data/park-forward -o run/compare --basin --faults\n"
                   "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");

@@ -35,7 +35,7 @@ class Plot
 public:
   Plot(double x_most, double y_least, double y_most, bool log_y) : m_x_most(x_most), m_y0(y_least), m_y1(y_most), m_log(log_y)
   {
-    m_svg = "<svg width=\"1000\" height=\"360\" font-family=\"sans-serif\" font-size=\"12\">"
+    m_svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"360\" font-family=\"sans-serif\" font-size=\"12\">"
             "<rect width=\"1000\" height=\"360\" fill=\"white\"/>\n";
   }
   double x(double v) const { return 60 + 600 * v / m_x_most; }
@@ -102,9 +102,26 @@ std::string basinPlot(const std::vector<BasinRow> &rows)
     std::vector<std::pair<double, double>> points;
     for (std::size_t s = 0; s < rows[i].steps_px.size(); ++s)
       points.emplace_back(rows[i].steps_px[s], rows[i].success[s]);
-    plot.line(points, rows[i].name + (rows[i].has_clutter ? ", forest" : ", plain"), i, !rows[i].has_clutter);
+    const auto same = std::find_if(rows.begin(), rows.end(), [&](const BasinRow &row) { return row.name == rows[i].name; });
+    plot.line(points, rows[i].name + (rows[i].has_clutter ? ", forest" : ", plain"), 3 * std::size_t(same - rows.begin()) + 1,
+              !rows[i].has_clutter); // every third colour: a hue a tracker
   }
   return plot.text();
+}
+
+void addBasin(std::string &html, const std::vector<BasinRow> &rows)
+{
+  html += "<h2>Basin</h2><table><tr><th>tracker, help: share of right answers (silent failures) after a yaw step of";
+  for (const double step : rows[0].steps_px)
+    add(html, "<th>{:g} px", step);
+  html += "<th>pairs<th>settings</tr>\n";
+  for (const BasinRow &row : rows) {
+    add(html, "<tr><td>{}, {}", escaped(row.name), row.has_clutter ? "forest" : "plain");
+    for (std::size_t s = 0; s < row.success.size(); ++s)
+      add(html, "<td>{:.2f} ({:.2f})", row.success[s], row.silent[s]);
+    add(html, "<td>{}<td>{}</tr>\n", row.pairs, escaped(row.settings));
+  }
+  html += "</table>\n" + basinPlot(rows);
 }
 
 void addScores(std::string &html, const std::vector<Score> &scores)
@@ -140,6 +157,8 @@ void addSweeps(std::string &html, const std::vector<SweepResult> &sweeps)
 }
 } // namespace
 
+std::string toSvg(const ComparisonReport &report) { return errorPlot(report); }
+
 std::string toHtml(const ComparisonReport &report)
 {
   std::string html = "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><style>body{font-family:sans-serif;margin:2em}"
@@ -154,7 +173,7 @@ std::string toHtml(const ComparisonReport &report)
     addScores(html, report.timing);
   }
   if (!report.basin.empty())
-    html += "<h2>Basin</h2>\n" + basinPlot(report.basin);
+    addBasin(html, report.basin);
   if (!report.faults.empty())
     addFaults(html, report.faults);
   if (!report.sweeps.empty())

@@ -151,6 +151,33 @@ TEST(DistanceTrunk, SamplesBehindANearerTrunkAreHidden)
   EXPECT_TRUE(near.border(Border::left).visible && near.border(Border::right).visible);
 }
 
+TEST(DistanceTrunk, KnowsABorderByItsProfile)
+{
+  const PinholeCamera camera;
+  vpMbtDistanceTrunk trunk;
+  trunk.buildFrom(test::uprightTrunk(4, 0.5, 0.15));
+  trunk.setCameraParameters(camera.toVisp());
+  // two trunks, side by side: the other's left border has the contrast of ours, but not its neighbourhood
+  const std::vector<Cylinder> two = {test::uprightTrunk(4, 0.5, 0.15), test::uprightTrunk(4, 0.7, 0.02)};
+  trunk.predict(cameraAt({0, 0, 1.2}).toVisp(), 320, 240);
+  trunk.search(test::drawTrunks(camera, cameraAt({0, 0, 1.2}), two, 1), 3);
+  EXPECT_EQ(trunk.border(Border::left).likeness(0), 0); // nothing remembered yet
+  trunk.remember(0.2);
+  const Pose moved = cameraAt({0, 0.04, 1.2}); // everything goes 2 px to the right in the image
+  trunk.scan(test::drawTrunks(camera, moved, two, 2), 14);
+  const auto &left = trunk.border(Border::left);
+  const double own = std::max(left.likeness(-2), left.likeness(-1)); // whole pixels: it may lie between two
+  EXPECT_GT(own, 0.85);
+  int others = 0;
+  for (const auto &peak : left.peaks)
+    if (std::abs(peak.offset_px + 2) > 2) {
+      ++others;
+      EXPECT_LT(left.likeness(int(std::lround(peak.offset_px))), own - 0.2) << peak.offset_px;
+    }
+  EXPECT_GT(others, 0);
+  EXPECT_EQ(left.likeness(1000), 0); // beyond the search
+}
+
 TEST(DistanceTrunk, RefusesWhatIsNoTrunk)
 {
   vpMbtDistanceTrunk trunk;

@@ -116,6 +116,46 @@ TEST(TrunkTrackerFaults, AnotherPlaceIsLostAndNotTracked)
   EXPECT_EQ(scene.tracker.getStatus(), Status::lost);
 }
 
+/// Frames until the tracker complains when three of five trunks are gone from frame 6 on; 99: never.
+int framesToDoubt()
+{
+  Scene scene;
+  std::vector<Cylinder> left(scene.trunks.begin(), scene.trunks.begin() + 2);
+  for (int k = 1; k <= 15; ++k) {
+    const bool has_complained =
+        scene.complains(k < 6 ? scene.image(k) : test::drawTrunks(scene.camera, Scene::pose(k), left, unsigned(k) + 1));
+    if (has_complained)
+      return k - 5;
+  }
+  return 99;
+}
+
+TEST(TrunkTrackerFaults, WithoutAPriorFewAgreeingBordersAreNotVouchedFor)
+{
+  const int frames = framesToDoubt();
+  EXPECT_GE(frames, 1); // not while all five are there
+  EXPECT_LE(frames, 4);
+}
+
+TEST(TrunkTrackerFaults, AJumpWithoutAPriorIsLostAndWithOneFollowed)
+{
+  const Pose jumped = cameraAt({0.2, 0.75, 1.2}, 0.03);
+  for (const bool has_prior : {false, true}) {
+    Scene scene;
+    for (int k = 1; k <= 4; ++k)
+      ASSERT_FALSE(scene.complains(scene.image(k)));
+    vpMatrix covariance(6, 6);
+    covariance.eye(6);
+    covariance *= 4e-4;
+    if (has_prior)
+      scene.tracker.setMotionPrior(jumped.toVisp(), covariance);
+    EXPECT_EQ(scene.complains(test::drawTrunks(scene.camera, jumped, scene.trunks, 9)), !has_prior);
+    if (has_prior) {
+      EXPECT_LT(test::metresApart(Pose::fromVisp(scene.tracker.getPose()), jumped), 0.05);
+    }
+  }
+}
+
 TEST(TrunkTrackerFaults, NoTrunkInViewIsSaid)
 {
   Scene scene;

@@ -25,6 +25,8 @@ struct ComparisonReport
 
 std::string toTable(const ComparisonReport &report);
 std::string toJson(const ComparisonReport &report);
+/// Position error by frame of all trackers: the plot of the page alone.
+std::string toSvg(const ComparisonReport &report);
 /// Self-contained; position error by frame, basins and faults as inline SVG and tables.
 std::string toHtml(const ComparisonReport &report);
 } // namespace bole
