@@ -99,7 +99,8 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
     const Vector3d low = profile.cRl * Vector3d(1, q, options.range.low * horizontal);
     const Vector3d high = profile.cRl * Vector3d(1, q, options.range.high * horizontal);
     const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
-    const double rows_full = camera.fy * (options.range.high - options.range.low) * horizontal;
+    const double rows_full =
+        std::min(camera.fy * (options.range.high - options.range.low) * horizontal, double(camera.height));
     if (line.rows() >= options.rows_min * rows_full)
       profile.mean[static_cast<std::size_t>(i + half)] = static_cast<float>(meanAlongOnly(g, line));
   }

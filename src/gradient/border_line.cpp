@@ -144,4 +144,23 @@ double meanAlongOnly(const vpImage<float> &g, const BorderLine &line)
   }
   return rows ? sum / rows : 0;
 }
+
+double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sign)
+{
+  constexpr int kParts = 8;
+  double sum = 0, squares = 0;
+  for (int part = 0; part < kParts; ++part) {
+    BorderLine piece = line;
+    piece.row_begin = line.row_begin + part * line.rows() / kParts;
+    piece.row_end = line.row_begin + (part + 1) * line.rows() / kParts;
+    double strongest = -1;
+    for (const double shift : {-1.0, 0.0, 1.0}) { // bow and taper
+      piece.x_top = line.xAt(piece.row_begin) + shift;
+      strongest = std::max(strongest, sign * meanAlongOnly(g, piece));
+    }
+    sum += strongest;
+    squares += strongest * strongest;
+  }
+  return sum > 0 ? sum * sum / (kParts * squares) : 0;
+}
 } // namespace bole

@@ -18,6 +18,8 @@ void MapOptions::validate() const
   require("map.confirm_parallax", confirm_parallax, 0, 1);
   require("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
   require("map.confirm_evidence", confirm_evidence, -20, 20);
+  require("map.turning_evenness", turning_evenness, 0, 1);
+  require("map.turning_contrast", turning_contrast, 0, 0.5);
   require("map.doubt_observations", doubt_observations, 3, 1000);
   require("map.doubt_candidate", doubt_candidate, -50, 0);
   require("map.doubt_confirmed", doubt_confirmed, -50, 0);
@@ -63,6 +65,7 @@ void TrunkMap::recordView(MapTrunk &trunk, const TrunkView &view) const
   trunk.last_seen_s = std::max(trunk.last_seen_s, view.time_s);
   ++trunk.observations;
   trunk.innovation2 += (view.innovation2 - trunk.innovation2) / std::min(trunk.observations, 30);
+  trunk.evenness += (view.evenness - trunk.evenness) / std::min(trunk.observations, 30);
   ++trunk.hits;
   trunk.misses_in_a_row = 0;
   const auto blend = [](std::optional<double> &mean, double now) {
@@ -90,10 +93,12 @@ void TrunkMap::recordForeground(MapTrunk &trunk, double range, double foreground
   trunk.foreground += (foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
-bool TrunkMap::isDisproved(const MapTrunk &trunk) const
+bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
 {
   if (trunk.observations < m_options.doubt_observations)
     return false;
+  if (!has_ranges)
+    return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
   if (trunk.status == TrunkStatus::confirmed)
     return evidence(trunk) < m_options.doubt_confirmed;
   return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
@@ -102,7 +107,8 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk) const
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
 {
   if (!has_ranges)
-    return trunk.observations >= m_options.confirm_observations && trunk.hits >= 3 * trunk.misses;
+    return trunk.observations >= m_options.confirm_observations && trunk.hits >= 3 * trunk.misses &&
+           trunk.evenness >= m_options.turning_evenness && trunk.contrast >= m_options.turning_contrast;
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax &&
@@ -203,7 +209,7 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
     MapTrunk &trunk = m_trunks[i];
     if (trunk.status == TrunkStatus::candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
       change(trunk, TrunkStatus::confirmed);
-    else if (trunk.status != TrunkStatus::lost && has_ranges && isDisproved(trunk)) {
+    else if (trunk.status != TrunkStatus::lost && isDisproved(trunk, has_ranges)) {
       trunk.removed = true;
       change(trunk, TrunkStatus::lost);
     }
@@ -227,6 +233,18 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(), [this](std::size_t i) { return m_trunks[i].removed; }),
                  m_active.end());
   return changes;
+}
+
+std::vector<int> TrunkMap::removeAll()
+{
+  std::vector<int> removed;
+  for (const std::size_t i : m_active) {
+    m_trunks[i].removed = true;
+    m_trunks[i].status = TrunkStatus::lost;
+    removed.push_back(m_trunks[i].id);
+  }
+  m_active.clear();
+  return removed;
 }
 
 std::vector<TrunkRecord> TrunkMap::records(double ground_z) const

@@ -6,12 +6,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace bole
 {
 namespace
 {
 constexpr double kRange = 1.5, kStep = 0.1; // of the log of the factor
+constexpr int kSteps = 31;
+
+double logFactor(double step) { return -kRange + kStep * step; }
 
 double medianOf(std::vector<double> values)
 {
@@ -40,6 +44,25 @@ double residual_px(const std::vector<PointMatch> &matches, const PinholeCamera &
                            .sigma;
   return sigma * camera.fx;
 }
+
+constexpr std::size_t kParts = 5; ///< of a video, to see how well they agree
+
+/// Where the sum of the curves has its minimum, one part of the video left out (kParts: none); nothing when it lies at
+/// the end of the range.
+std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &curves, std::size_t left_out)
+{
+  std::vector<double> sum(kSteps, 0.0);
+  for (std::size_t i = 0; i < curves.size(); ++i)
+    if (i * kParts / curves.size() != left_out)
+      for (int k = 0; k < kSteps; ++k)
+        sum[static_cast<std::size_t>(k)] += curves[i][static_cast<std::size_t>(k)];
+  const auto best = std::min_element(sum.begin(), sum.end());
+  if (best == sum.begin() || best + 1 == sum.end())
+    return std::nullopt;
+  const double before = *(best - 1), after = *(best + 1), curvature = before - 2 * *best + after;
+  const double vertex = curvature > 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0;
+  return logFactor(static_cast<double>(best - sum.begin()) + vertex);
+}
 } // namespace
 
 void FocalOptions::validate() const
@@ -50,7 +73,7 @@ void FocalOptions::validate() const
   require(min_flow >= 0.005 && min_flow <= 1, "focal.min_flow", min_flow, "in 0.005 .. 1");
   require(max_residual >= 0.001 && max_residual <= 1, "focal.max_residual", max_residual, "in 0.001 .. 1");
   require(min_pairs >= 2 && min_pairs <= 1000, "focal.min_pairs", min_pairs, "in 2 .. 1000");
-  require(max_spread >= 0.01 && max_spread <= 1, "focal.max_spread", max_spread, "in 0.01 .. 1");
+  require(max_sigma >= 0.01 && max_sigma <= 1, "focal.max_sigma", max_sigma, "in 0.01 .. 1");
 }
 
 FocalFromTurning::FocalFromTurning(const PinholeCamera &guess, const FocalOptions &options)
@@ -70,33 +93,37 @@ void FocalFromTurning::add(const PointTracker &tracker)
   const double flow = medianFlow_px(matches);
   if (flow < m_options.min_flow * m_guess.width)
     return;
-  std::vector<double> residuals;
-  for (double x = -kRange; x < kRange + 0.5 * kStep; x += kStep)
-    residuals.push_back(residual_px(matches, m_guess, x));
-  const auto best = std::min_element(residuals.begin(), residuals.end());
-  if (best == residuals.begin() || best + 1 == residuals.end() || *best > m_options.max_residual * flow)
+  ++m_moved;
+  std::vector<double> curve;
+  for (int i = 0; i < kSteps; ++i)
+    curve.push_back(residual_px(matches, m_guess, logFactor(i)));
+  if (*std::min_element(curve.begin(), curve.end()) > m_options.max_residual * flow)
     return;
-  const double before = *(best - 1), after = *(best + 1), curvature = before - 2 * *best + after;
-  const double vertex = curvature > 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0;
-  m_log_factors.push_back(-kRange + kStep * (static_cast<double>(best - residuals.begin()) + vertex));
+  for (double &residual : curve)
+    residual = std::log(residual);
+  m_curves.push_back(std::move(curve));
 }
 
 FocalEstimate FocalFromTurning::estimate() const
 {
   FocalEstimate estimate;
-  estimate.pairs = static_cast<int>(m_log_factors.size());
-  if (estimate.pairs < m_options.min_pairs)
+  estimate.pairs = static_cast<int>(m_curves.size());
+  if (estimate.pairs < m_options.min_pairs || 2 * estimate.pairs < m_moved)
     return estimate;
-  const double centre = medianOf(m_log_factors);
-  std::vector<double> off;
-  for (const double x : m_log_factors)
-    off.push_back(std::abs(x - centre));
-  const double spread = 1.48 * medianOf(off);
-  // pairs share frames: those of frames_back frames count as one
-  const double independent = std::max(1.0, double(estimate.pairs) * m_options.every / m_options.frames_back);
-  estimate.factor = std::exp(centre);
-  estimate.sigma = std::max(0.01, spread / std::sqrt(independent));
-  estimate.known = spread < m_options.max_spread;
+  const std::optional<double> best = bestLogFactor(m_curves, kParts);
+  if (!best)
+    return estimate;
+  // how far it moves when one part of the video is left out
+  double squares = 0;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    const std::optional<double> without = bestLogFactor(m_curves, part);
+    if (!without)
+      return estimate;
+    squares += (*without - *best) * (*without - *best);
+  }
+  estimate.factor = std::exp(*best);
+  estimate.sigma = std::max(0.01, std::sqrt(squares * (kParts - 1) / kParts));
+  estimate.known = estimate.sigma < m_options.max_sigma;
   return estimate;
 }
 } // namespace bole

@@ -16,11 +16,18 @@ namespace
 {
 constexpr double kDegree = M_PI / 180;
 constexpr double kPriorSigma = 20 * kDegree;
+constexpr double kChance = 0.2;               ///< share of edges at random that agree with the best direction
 
 struct Edge
 {
   Eigen::Vector3d normal; ///< unit, of the plane through the camera centre and the edge
-  double weight = 1;
+  Eigen::Vector3d ray;    ///< unit, to its middle
+
+  /// Sine of the angle, seen along the ray, between the edge and the direction to \p up. The distance of \p up from
+  /// the plane alone would be small for any edge when \p up lies along the ray: in a narrow field of view all would
+  /// agree on the optical axis.
+  double off(const Eigen::Vector3d &up) const { return normal.dot(up) / across(up); }
+  double across(const Eigen::Vector3d &up) const { return std::max(0.05, ray.cross(up).norm()); }
 };
 
 /// One straight edge a patch, where there is one: its centre and gradient direction from the
@@ -64,7 +71,7 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
         continue;
       }
       const Eigen::Vector3d far = camera.ray(centre + 20 * along);
-      edges.push_back({ray.cross(far).normalized(), 1});
+      edges.push_back({ray.cross(far).normalized(), ray.normalized()});
     }
   }
   return edges;
@@ -102,7 +109,8 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image,
   if (edges.size() < static_cast<std::size_t>(options.min_edges)) {
     return estimate;
   }
-  const double sigma = options.sigma_deg * kDegree, prior = 1 / (kPriorSigma * kPriorSigma);
+  const double sigma = options.sigma_deg * kDegree;
+  constexpr double kPrior = 1 / (kPriorSigma * kPriorSigma);
   double best = 1e300;
   for (const double roll : {0.0, -0.25, 0.25, -0.12, 0.12}) {
     Eigen::Vector3d up = (expSo3({0, 0, roll}) * expected).normalized();
@@ -110,21 +118,21 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image,
     double width = 4; // of the kernel, in sigmas: from wide to narrow
     for (int iteration = 0; iteration < 15; ++iteration, width = std::max(1.0, 0.8 * width)) {
       const Matrix32d B = directionBasis(up);
-      H = prior * Eigen::Matrix2d::Identity();
-      Eigen::Vector2d g = -prior * directionMinus(expected, up);
+      H = kPrior * Eigen::Matrix2d::Identity();
+      Eigen::Vector2d g = -kPrior * directionMinus(expected, up);
       for (const Edge &edge : edges) {
-        const double e = edge.normal.dot(up) / (sigma * width);
-        const Eigen::Vector2d J = B.transpose() * edge.normal;
+        const double e = edge.off(up) / (sigma * width);
+        const Eigen::Vector2d J = B.transpose() * edge.normal / edge.across(up);
         const double w = motion::weightOf(e, 1.5) / (sigma * sigma) / options.inflation;
         H += w * J * J.transpose();
-        g += w * J * edge.normal.dot(up);
+        g += w * J * edge.off(up);
       }
       up = directionPlus(up, -H.ldlt().solve(g));
     }
-    double cost = 0.5 * prior * directionMinus(expected, up).squaredNorm();
+    double cost = 0.5 * kPrior * directionMinus(expected, up).squaredNorm();
     int agreeing = 0;
     for (const Edge &edge : edges) {
-      const double e = edge.normal.dot(up) / sigma;
+      const double e = edge.off(up) / sigma;
       cost += motion::costOf(e, 1.5) / options.inflation;
       agreeing += std::abs(e) < 2;
     }
@@ -135,8 +143,10 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image,
       estimate.edges = agreeing;
     }
   }
-  estimate.status =
-      estimate.edges >= options.min_edges ? VerticalStatus::ok : VerticalStatus::too_few_edges;
+  // edges at random agree too: those of a painted wall would put up anywhere
+  const double beyond_chance = estimate.edges - kChance * static_cast<double>(edges.size());
+  if (estimate.edges >= options.min_edges && beyond_chance > 0.5 * estimate.edges)
+    estimate.status = VerticalStatus::ok;
   return estimate;
 }
 

@@ -224,6 +224,7 @@ void addLines(std::vector<OptionEntry> &entries, LineDetectorOptions &o)
                                  {"lines.foreground_b", &o.foreground_b},
                                  {"lines.inhibition_px", &o.inhibition_px},
                                  {"lines.threshold", &o.threshold},
+                                 {"lines.turning_threshold", &o.turning_threshold},
                                  {"lines.width_min_px", &o.width_min_px},
                                  {"lines.width_max_px", &o.width_max_px}});
 }
@@ -271,6 +272,8 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
                                  {"map.confirm_parallax", &o.confirm_parallax},
                                  {"map.confirm_position_sigma", &o.confirm_position_sigma},
                                  {"map.confirm_evidence", &o.confirm_evidence},
+                                 {"map.turning_evenness", &o.turning_evenness},
+                                 {"map.turning_contrast", &o.turning_contrast},
                                  {"map.doubt_observations", &o.doubt_observations},
                                  {"map.doubt_candidate", &o.doubt_candidate},
                                  {"map.doubt_confirmed", &o.doubt_confirmed},

@@ -33,6 +33,9 @@ SmootherOptions withCamera(SmootherOptions options, const Pose &bMc)
   return options;
 }
 
+/// Where no range is known: what trunks fill that stand far away too, and whatever the pitch is wrong by.
+constexpr ElevationRange kTurningRange = {-0.06, 0.2};
+
 double bearingOf(const Pose &wMc, const Trunk &trunk)
 {
   const Eigen::Vector2d w = trunk.xy - wMc.t.head<2>();
@@ -114,8 +117,12 @@ void Pipeline::addPose(const Frame &frame, const GyroBias &bias, FrameResult &re
   const Pose wMa = m_smoother.pose(m_smoother.poseCount() - 1);
   MotionStep step = m_motion.step(frame, wMa, bias, m_velocity);
   std::vector<VisualLink> links;
-  if (m_visual)
+  if (m_visual) {
+    const bool was_turning = isTurning();
     step = visualStep(frame, step, links);
+    if (was_turning && !isTurning())
+      forgetUnranged();
+  }
   const std::size_t pose = m_smoother.addPose(step.aMb, step.covariance);
   if (step.absolute)
     m_smoother.addPosePrior(pose, *step.absolute);
@@ -178,6 +185,8 @@ void Pipeline::estimateSaliency(const Frame &frame, FrameResult &result)
 
 ElevationRange Pipeline::elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const
 {
+  if (isTurning())
+    return kTurningRange;
   if (!m_ground_z)
     return m_options.detection.profile.range;
   const double d = trunk.radius() / relative.ratio();
@@ -239,10 +248,9 @@ bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPredicti
   const SummaryFactor summary{tracked.optimum, tracked.energy, tracked.f, tracked.F};
   if (m_smoother.addObservation(pose, trunk.smoother_id, summary) != SummaryStatus::ok)
     return false;
-  const Pose wMc = cameraAt(pose);
   const double innovation2 = misfit(tracked, prediction.relative);
-  m_map.recordView(trunk, {time_s, bearingOf(wMc, trunk.trunk), (trunk.trunk.xy - wMc.t.head<2>()).norm(),
-                           tracked.left_contrast, tracked.right_contrast, innovation2});
+  m_map.recordView(trunk, {time_s, bearingOf(cameraAt(pose), trunk.trunk), tracked.left_contrast,
+                           tracked.right_contrast, tracked.evenness, innovation2});
   return true;
 }
 
@@ -276,7 +284,7 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
     }
     result.trunks.push_back({trunk.id, trunk.status, tracked.status,
                              tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
-                             (trunk.trunk.xy - wMc.t.head<2>()).norm()});
+                             isTurning() ? 0 : (trunk.trunk.xy - wMc.t.head<2>()).norm()});
   }
 }
 
@@ -359,11 +367,17 @@ void Pipeline::detectNew(FrameResult &result)
 void Pipeline::detectSingle(FrameResult &result)
 {
   const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
-  vpImage<float> p_background = result.saliency->p_background;
-  if (isTurning()) // no parallax: what stands upright and stays where it is must do
-    p_background = 0.f;
+  // without parallax, what stands upright and stays where it is must do
+  const vpImage<float> *p_background = isTurning() ? nullptr : &result.saliency->p_background;
+  ProfileOptions profile = m_options.detection.profile;
+  LineDetectorOptions lines = m_options.lines;
+  if (isTurning()) {
+    profile.range = kTurningRange;
+    lines.threshold = lines.turning_threshold;
+    lines.either_polarity = false; // without parallax a bright gap between trunks looks like one
+  }
   result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(true),
-                             m_options.detection.profile, m_options.lines);
+                             profile, lines);
   for (const LineDetection &line : result.lines)
     adopt(line);
 }

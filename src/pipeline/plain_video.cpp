@@ -24,6 +24,15 @@ MotionStep Pipeline::visualStep(const Frame &frame, const MotionStep &predicted,
   return visual.step;
 }
 
+/// What was held by its bearing alone has a guess for its range: it would pull on the path that now has a length.
+void Pipeline::forgetUnranged()
+{
+  for (const int id : m_map.removeAll())
+    if (const std::size_t smoother_id = m_map.trunks()[static_cast<std::size_t>(id)].smoother_id;
+        m_smoother.hasTrunk(smoother_id))
+      m_smoother.removeTrunk(smoother_id);
+}
+
 /// The ground under the camera, smoothed: bumps and slopes of some metres stay.
 void Pipeline::learnGround(const Pose &wMb)
 {

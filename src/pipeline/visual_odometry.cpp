@@ -169,7 +169,10 @@ Odometry VisualOdometry::toBody(const Pose &caMcb, Matrix6d covariance, bool is_
   if (is_held)
     covariance.topRows<3>().setZero(), covariance.leftCols<3>().setZero();
   covariance.topLeftCorner<3, 3>() += (least * least + along * along) * Matrix3d::Identity();
-  covariance.bottomRightCorner<3, 3>() += m_options.turn_sigma * m_options.turn_sigma * Matrix3d::Identity();
+  constexpr double kFocalSigma = 0.15; // of log f where it is guessed: a turn is wrong by as much of itself
+  const double guessed = m_options.focal_known ? 0 : kFocalSigma * logSo3(caMcb.R).norm();
+  const double turn_variance = m_options.turn_sigma * m_options.turn_sigma + guessed * guessed;
+  covariance.bottomRightCorner<3, 3>() += turn_variance * Matrix3d::Identity();
   const Matrix6d to_body = adjoint(m_bMc);
   return {m_bMc * Pose(caMcb.R, s * caMcb.t) * m_bMc.inverse(), to_body * covariance * to_body.transpose()};
 }

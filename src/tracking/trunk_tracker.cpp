@@ -115,6 +115,20 @@ Eigen::Matrix2d offsetCovariance(const VisibleBorder &left, const VisibleBorder 
   J << left.J_mid, right.J_mid;
   return J * covariance * J.transpose() + 0.5 * Eigen::Matrix2d::Identity(); // bow and noise: 0.7 px
 }
+
+double evennessOf(const Gradient &gradient, const PinholeCamera &camera, const TrackingResult &result,
+                  const ElevationRange &range)
+{
+  double sum = 0;
+  const auto add = [&](Border border, double contrast) {
+    sum += evennessAlong(gradient.signed_x, borderLine(camera, result.optimum, border, range), contrast < 0 ? -1 : 1);
+  };
+  if (result.left_used)
+    add(Border::left, result.left_contrast);
+  if (result.right_used)
+    add(Border::right, result.right_contrast);
+  return sum / (result.left_used + result.right_used);
+}
 } // namespace
 
 void TrackingOptions::validate() const
@@ -218,6 +232,7 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   if (flipped(result.left_contrast, prediction.left_contrast) ||
       flipped(result.right_contrast, prediction.right_contrast))
     return finish(TrackingStatus::sign_changed);
+  result.evenness = evennessOf(gradient, camera, result, prediction.range);
   return finish(TrackingStatus::tracked);
 }
 } // namespace bole

@@ -40,7 +40,7 @@ struct Scene
   std::vector<LineDetection> detect(const vpImage<float> &p_background) const
   {
     const Gradient gradient = computeGradient(draw(trunks, wMc, kCamera), {1, is_split, 3});
-    return detectLines(gradient, p_background, kCamera, wMc.R, known, {}, options);
+    return detectLines(gradient, &p_background, kCamera, wMc.R, known, {}, options);
   }
   std::vector<LineDetection> detect() const { return detect(salient(trunks, wMc)); }
 };
@@ -110,6 +110,24 @@ TEST(LineDetector, ThePapersPolarityKnowsDarkTrunksOnly)
   dark.is_split = true; // on the blurred negative and positive parts
   dark.options.border_a = -400;
   EXPECT_EQ(dark.detect().size(), 1u);
+}
+
+TEST(LineDetector, WithoutSaliencyItTakesEveryUprightPair)
+{
+  const Scene scene;
+  const Gradient gradient = computeGradient(draw(scene.trunks, scene.wMc, kCamera), {1, false, 3});
+  const auto found = detectLines(gradient, nullptr, kCamera, scene.wMc.R, {}, {}, scene.options);
+  EXPECT_EQ(found.size(), kTrunks.size());
+}
+
+TEST(LineDetector, ABorderBelongsToOneTrunk)
+{
+  Scene scene; // two dark trunks side by side: the bright gap between them shares a border with each
+  scene.trunks = {{3, 0.35, 0.15, 40}, {3, -0.35, 0.15, 40}};
+  const auto found = scene.detect(vpImage<float>(240, 320, 0.05f));
+  ASSERT_EQ(found.size(), 2u);
+  for (const LineDetection &line : found)
+    EXPECT_NEAR(line.relative.ratio(), 0.15 / std::hypot(3, 0.35), 0.005);
 }
 
 TEST(LineDetector, HoldsToTheWidthsItIsGiven)

@@ -152,4 +152,26 @@ TEST(MeanGradient, SamplesOutsideTheImageCountAsZero)
   EXPECT_NEAR(meanAlongOnly(g, line), 0.5, 0.02);
   EXPECT_EQ(meanAlong(g, BorderLine()).mean, 0);
 }
+
+TEST(Evenness, TellsABorderAlongTheWholeLineFromAPieceOfIt)
+{
+  BorderLine line;
+  line.x_top = 20;
+  line.slope = 0.05;
+  line.row_begin = 10;
+  line.row_end = 90;
+  const auto borderOver = [&](int rows, float value) {
+    vpImage<float> g(100, 60, 0.f);
+    for (int v = line.row_begin; v < line.row_begin + rows; ++v)
+      for (int shift = -2; shift <= 2; ++shift)
+        g[v][static_cast<int>(line.xAt(v)) + shift] = value;
+    return g;
+  };
+  EXPECT_NEAR(evennessAlong(borderOver(80, 0.1f), line, 1), 1, 1e-6);
+  EXPECT_NEAR(evennessAlong(borderOver(40, 0.1f), line, 1), 0.5, 1e-6); // half of the line: 4^2 / (8 * 4)
+  EXPECT_NEAR(evennessAlong(borderOver(10, 0.1f), line, 1), 1.0 / 8, 1e-6);
+  EXPECT_EQ(evennessAlong(borderOver(80, -0.1f), line, 1), 0); // the other polarity
+  EXPECT_NEAR(evennessAlong(borderOver(80, -0.1f), line, -1), 1, 1e-6);
+  EXPECT_EQ(evennessAlong(borderOver(0, 0.f), line, 1), 0);
+}
 } // namespace

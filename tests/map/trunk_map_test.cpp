@@ -32,10 +32,10 @@ protected:
     return added;
   }
   /// \p views more views, the bearing sweeping \p parallax in all of them.
-  void see(MapTrunk &trunk, int views, double parallax = 0.2, double innovation2 = 0.1, double range = 4)
+  void see(MapTrunk &trunk, int views, double parallax = 0.2, double innovation2 = 0.1)
   {
     for (int i = 0; i < views; ++i, m_time_s += 0.1)
-      m_map.recordView(trunk, {m_time_s, 0.5 + parallax * i / std::max(1, views - 1), range, -0.1, 0.1, innovation2});
+      m_map.recordView(trunk, {m_time_s, 0.5 + parallax * i / std::max(1, views - 1), -0.1, 0.1, 0.9, innovation2});
   }
   void miss(MapTrunk &trunk, int frames)
   {
@@ -57,6 +57,22 @@ protected:
   double m_time_s = 0;
 };
 } // namespace
+
+TEST_F(Life, WithoutParallaxATrunkEarnsItsPlaceByEvenBordersAlone)
+{
+  MapTrunk &even = add(trunkAt(5, 0)), &uneven = add(trunkAt(5, 3)), &faint = add(trunkAt(5, -3));
+  for (int i = 0; i < 20; ++i) {
+    m_map.recordView(even, {0.1 * i, 0.5, -0.05, 0.05, 0.6, 0.1});
+    m_map.recordView(uneven, {0.1 * i, 1.5, -0.05, 0.05, 0.2, 0.1});
+    m_map.recordView(faint, {0.1 * i, 2.5, -0.003, 0.05, 0.6, 0.1});
+  }
+  m_map.review(false);
+  EXPECT_EQ(even.status, TrunkStatus::confirmed);
+  EXPECT_NE(uneven.status, TrunkStatus::confirmed);
+  EXPECT_NE(faint.status, TrunkStatus::confirmed);
+  EXPECT_EQ(m_map.removeAll().size(), m_map.trunks().size() - 2); // those two were given up before
+  EXPECT_TRUE(m_map.active().empty());
+}
 
 TEST_F(Life, StartsAsACandidate)
 {
@@ -101,7 +117,7 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
       MapTrunk &trunk = map.add(0, trunkAt(3, 1));
       trunk.covariance = 1e-4 * Matrix5d::Identity();
       for (int i = 0; i < 20; ++i)
-        map.recordView(trunk, {0.1 * i, 0.02 * i, 7, 0.1, -0.1, 0.1});
+        map.recordView(trunk, {0.1 * i, 0.02 * i, 0.1, -0.1, 0.9, 0.1});
       if (is_spoilt)
         c.spoil(trunk);
       map.review();
@@ -283,7 +299,7 @@ TEST_F(Life, ParallaxIsTheSpreadOfTheBearingsAlsoAcrossHalfATurn)
 {
   MapTrunk &trunk = add(trunkAt(-3, 0));
   for (const double bearing : {3.10, -3.10, 3.05})
-    m_map.recordView(trunk, {0, bearing, 3, 0, 0, 0});
+    m_map.recordView(trunk, {0, bearing, 0, 0, 0.9, 0});
   EXPECT_NEAR(trunk.parallax(), 2 * M_PI - 6.2 + 0.05, 1e-12);
 }
 

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 namespace
@@ -151,6 +152,31 @@ TEST(Vertical, TrunksPointToTheZenith)
     EXPECT_EQ(estimate.status, VerticalStatus::ok);
     EXPECT_LT(directionMinus(up, estimate.up).norm(), 0.02) << tilt.transpose();
   }
+}
+
+TEST(Vertical, ANarrowFieldOfViewDoesNotTakeTheOpticalAxisForTheZenith)
+{
+  PinholeCamera narrow = kCamera;
+  narrow.fx = narrow.fy = 1300;
+  const Eigen::Vector3d up = expSo3({0.05, 0, -0.06}) * Eigen::Vector3d(0, -1, 0);
+  const auto estimate = gravityFromVerticals(drawTrunks(narrow, up), narrow);
+  EXPECT_LT(std::abs(std::atan2(estimate.up.x(), -estimate.up.y()) - std::atan2(up.x(), -up.y())), 0.02); // roll
+  EXPECT_LT(std::abs(estimate.up.z()), 0.3);
+}
+
+TEST(Vertical, EdgesAtRandomTellNothing)
+{
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> at(0, 1);
+  cv::Mat grey(240, 320, CV_8U, cv::Scalar(128));
+  for (int i = 0; i < 120; ++i) {
+    const cv::Point2d p(320 * at(random), 240 * at(random));
+    const double angle = M_PI * at(random);
+    cv::line(grey, p, p + 40 * cv::Point2d(std::cos(angle), std::sin(angle)), cv::Scalar(at(random) < 0.5 ? 20 : 235), 3);
+  }
+  vpImage<unsigned char> image(240, 320);
+  std::copy(grey.datastart, grey.dataend, image.bitmap);
+  EXPECT_EQ(gravityFromVerticals(image, kCamera).status, VerticalStatus::too_few_edges);
 }
 
 TEST(Vertical, AnImageWithoutEdgesKeepsWhatWasExpected)

@@ -56,4 +56,9 @@ MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line);
 
 /// Only the mean, linear between columns, for scans: about 0.15 us for 100 rows.
 double meanAlongOnly(const vpImage<float> &g, const BorderLine &line);
+
+/// How evenly a border of the \p sign runs along the whole line: the squared mean of eight parts over their mean
+/// square, each part at its strongest within a pixel. 1: all parts alike, as on the silhouette of a trunk; 1/8: one part
+/// alone, as on a branch that crosses; 0: the parts are against the sign.
+double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sign);
 } // namespace bole

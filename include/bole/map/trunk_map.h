@@ -27,6 +27,9 @@ struct MapOptions
   double confirm_position_sigma = 0.40; ///< standard deviation of the place at which it may be [m], 0.01 to 10
   double confirm_evidence = 0.5;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
                                       ///< trunks, and fewer that are none
+  double turning_evenness = 0.35;     ///< what must speak for a trunk where the camera has only turned and no parallax
+                                      ///< does: how evenly its borders run along their length, 0 to 1,
+  double turning_contrast = 0.008;    ///< and the mean of the weaker one [full scale/px], 0 to 0.5
   int doubt_observations = 8;         ///< views before a trunk may be given up for its evidence, 3 to 1000
   double doubt_candidate = -3;        ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;      ///< log odds below which a confirmed trunk is, -50 to 0
@@ -56,6 +59,7 @@ struct MapTrunk
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
   int found_again = 0;                           ///< times the detector came to the same reading later
   double contrast = 0;                           ///< running mean of the weaker border's
+  double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   double bearing_first = 0;                  ///< world bearing of the first view [rad]
@@ -74,8 +78,8 @@ struct TrunkView
 {
   double time_s = 0;
   double bearing = 0; ///< of the trunk from the camera, world [rad]
-  double range = 0;   ///< [m]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
+  double evenness = 0; ///< of the borders along their length, 0 to 1
   double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], less the
                           ///< wider the trunk stands in the image (its borders are rougher)
 };
@@ -112,6 +116,9 @@ public:
   /// \p has_ranges: false while the camera has only turned, so that a trunk earns its place by its bearing and width.
   std::vector<MapChange> review(bool has_ranges = true);
 
+  /// Gives up all that is active. Returns their ids.
+  std::vector<int> removeAll();
+
   /// Log odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
   /// often it was missed, how it moved against the background, its contrast, its radius and how well its place is
   /// known. A logistic regression on simulated flights: see trunk_evidence.cpp for its weights and what they rest on.
@@ -121,7 +128,7 @@ public:
   std::vector<TrunkRecord> records(double ground_z = 0) const;
 
 private:
-  bool isDisproved(const MapTrunk &trunk) const;
+  bool isDisproved(const MapTrunk &trunk, bool has_ranges) const;
   bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;
   double advantage(const MapTrunk &trunk, const MapTrunk &rival) const;

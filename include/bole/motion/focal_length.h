@@ -5,7 +5,7 @@
 ///
 /// Idea: under the right focal length one rotation carries all far points from one frame to another; under a wrong one
 /// those at the border of the image are left behind. So each pair of frames that the camera turned between is explained
-/// by a robust rotation under a grid of focal lengths, and the one with the smallest residuals wins. A flight does not
+/// by a robust rotation under a grid of focal lengths, and the one with the smallest residuals over all pairs wins. A flight does not
 /// qualify: its flow is no rotation under any focal length.
 ///
 /// Laws (each a test): points seen by a turning camera give its focal length from a guess that is off by a factor of two;
@@ -25,9 +25,10 @@ struct FocalOptions
   int frames_back = 8;         ///< between the frames of a pair, 1 to 31
   int every = 2;               ///< frames between two pairs, 1 to 100
   double min_flow = 0.04;      ///< median flow of a pair, of the width of the image, 0.005 to 1
-  double max_residual = 0.06;  ///< residual of a pair over its flow that is still a rotation, 0.001 to 1
-  int min_pairs = 5;           ///< that agree, 2 to 1000
-  double max_spread = 0.25;    ///< of the log of the focal lengths of the pairs, 0.01 to 1
+  double max_residual = 0.025; ///< residual of a pair over its flow that is still a rotation, 0.001 to 1; a real
+                               ///< video that pans leaves 0.01, flights through trees 0.02 to 0.1
+  int min_pairs = 5;           ///< that are rotations, and no fewer than half of those that moved, 2 to 1000
+  double max_sigma = 0.15;     ///< of the log of the focal length, by leaving parts of the video out, 0.01 to 1
 
   /// Throws vpException: "focal.name = value, must be ...".
   void validate() const;
@@ -54,7 +55,7 @@ public:
 private:
   PinholeCamera m_guess;
   FocalOptions m_options;
-  int m_frames = 0;
-  std::vector<double> m_log_factors; ///< of the pairs that are rotations
+  int m_frames = 0, m_moved = 0; ///< frames seen; pairs with flow enough
+  std::vector<std::vector<double>> m_curves; ///< log residual over the focal length, of the pairs that are rotations
 };
 } // namespace bole

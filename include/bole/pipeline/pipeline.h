@@ -38,7 +38,7 @@ struct TrackedTrunk
   TrackingStatus status = TrackingStatus::not_visible;
   RelativeTrunk relative; ///< the optimum where tracked, else the prediction
   ElevationRange range;   ///< the part looked at
-  double distance = 0;    ///< from the camera to the axis by the map [m]
+  double distance = 0;    ///< from the camera to the axis by the map [m]; 0 where no range is known
 };
 
 struct FrameResult
@@ -100,6 +100,7 @@ private:
   void addPose(const Frame &frame, const GyroBias &bias, FrameResult &result);
   MotionStep visualStep(const Frame &frame, const MotionStep &predicted, std::vector<VisualLink> &links);
   void learnGround(const Pose &wMb);
+  void forgetUnranged();
   bool isTurning() const { return m_visual && !m_visual->hasUnit(); } ///< without any parallax so far
   struct ScaleEstimate
   {
