@@ -10,6 +10,7 @@ namespace bole
 namespace
 {
 constexpr double kSweep_s = 9;     ///< one sidestep to and fro before a gap is chosen
+constexpr double kSearchAgain = 0.35; ///< amplitude of the sidestep once it has left its start [m]
 constexpr double kAcrossGain = 0.8; ///< [1/s]
 constexpr double kLinedUp = 0.2;   ///< across the axis, at the entry [m]
 constexpr double kInView = 1.2;    ///< nearer to the middle the trunks leave the image [m]
@@ -48,6 +49,7 @@ void GapTaskOptions::validate() const
   require("width_min", width_min, 0.3, 5);
   require("width_max", width_max, width_min, 20);
   require("range", range, 1, 20);
+  require("evidence", evidence, -20, 20);
   require("angle", angle, 0.05, 0.7);
   require("body_radius", body_radius, 0.05, 2);
   require("entry", entry, 0.3, 5);
@@ -74,13 +76,14 @@ Gap gapBetween(const Obstacle &one, const Obstacle &other, const Eigen::Vector2d
 }
 
 std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::Vector2d &from, double heading,
-                             const GapTaskOptions &options)
+                             double evidence, const GapTaskOptions &options)
 {
   std::optional<Gap> best;
   double best_angle = options.angle;
   for (const Obstacle &one : trunks)
     for (const Obstacle &other : trunks) {
-      if (one.id >= other.id || !one.is_confirmed || !other.is_confirmed)
+      if (one.id >= other.id || !one.is_confirmed || !other.is_confirmed ||
+          std::min(one.evidence, other.evidence) < evidence)
         continue;
       const Gap gap = gapBetween(one, other, from);
       const Eigen::Vector2d w = gap.middle - from;
@@ -126,7 +129,7 @@ TaskCommand GapTask::search(const FrameResult &result, const Pipeline &pipeline)
   }
   if (elapsed > kSweep_s)
     m_gap = chooseGap(obstacles(pipeline, result.wMb, 12, kViews), m_sidestep.start().t.head<2>(),
-                      yawOf(m_sidestep.start()), m_options);
+                      yawOf(m_sidestep.start()), elapsed > 2 * kSweep_s ? -100 : m_options.evidence, m_options);
   if (m_gap)
     enter(TaskPhase::servoing);
   return command;
@@ -166,6 +169,15 @@ TaskCommand GapTask::fly(const Pose &wMb)
   }
   return {false, towards(wMb, limited(velocity, 1.2 * m_options.speed), heading),
           m_is_lined_up ? "passes the gap" : "lines up"};
+}
+
+/// It may stand between trunks now, and the last search was straight behind: sweeps less.
+void GapTask::giveUpTarget()
+{
+  m_gap.reset();
+  m_is_lined_up = false;
+  m_sidestep.restart(kSearchAgain);
+  enter(TaskPhase::searching);
 }
 
 TaskCommand GapTask::act(const FrameResult &result, const Pipeline &pipeline)

@@ -29,7 +29,7 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
     const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
     const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
     near.push_back({trunk.id, is_confirmed, xy, trunk.trunk.radius(),
-                    across * n * n.transpose() + along * u * u.transpose()});
+                    across * n * n.transpose() + along * u * u.transpose(), pipeline.evidence(trunk)});
   }
   return near;
 }

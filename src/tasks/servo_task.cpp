@@ -29,12 +29,13 @@ const char *toString(TaskPhase phase)
 
 void SafetyOptions::validate() const
 {
-  const auto require = [](const char *name, int value) {
-    if (value < 1 || value > 100)
-      throw vpException(vpException::badValue, "%s = %d, must be in [1, 100]", name, value);
+  const auto require = [](const char *name, int value, int high) {
+    if (value < 1 || value > high)
+      throw vpException(vpException::badValue, "%s = %d, must be in [1, %d]", name, value, high);
   };
-  require("lost_frames", lost_frames);
-  require("sure_frames", sure_frames);
+  require("lost_frames", lost_frames, 100);
+  require("sure_frames", sure_frames, 100);
+  require("patience_frames", patience_frames, 10000);
 }
 
 ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
@@ -43,6 +44,12 @@ TaskCommand ServoTask::step(const FrameResult &result, const Pipeline &pipeline)
 {
   const bool is_ok = result.frame_status == FrameStatus::ok;
   const bool is_seen = is_ok && sees(result, pipeline);
+  if (is_ok)
+    m_missed = is_seen ? 0 : m_missed + 1;
+  if (m_missed > m_safety.patience_frames) {
+    giveUpTarget();
+    m_missed = 0;
+  }
   m_seen = is_seen ? m_seen + 1 : 0;
   m_unseen = is_seen ? 0 : m_unseen + 1;
   if (!is_ok || m_unseen >= m_safety.lost_frames)

@@ -156,6 +156,16 @@ RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk) 
   return seen;
 }
 
+void TrunkTask::giveUpTarget()
+{
+  m_target = -1;
+  m_has_feature = m_rests = false;
+  m_sway_start_s = -1;
+  m_ratio = 0;
+  m_sidestep.restart();
+  enter(TaskPhase::searching);
+}
+
 TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
 {
   const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
@@ -164,9 +174,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   const MapTrunk *trunk = liveTrunk(pipeline, m_target);
   if (!trunk) {
     if (phase() == TaskPhase::servoing)
-      m_sidestep.restart();
-    m_has_feature = false;
-    enter(TaskPhase::searching);
+      giveUpTarget();
     const TaskCommand command = search(result, pipeline, time_s);
     m_response.send(time_s, command.velocity);
     return command;

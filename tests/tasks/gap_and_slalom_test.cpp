@@ -42,14 +42,23 @@ TEST(Gap, MiddleIsThatOfTheFreeWidth)
   EXPECT_EQ(from_behind.left, 4);
 }
 
+TEST(Gap, IsOfNoUseWhereATrunkOfItIsDoubtful)
+{
+  std::vector<Obstacle> trunks = {trunkAt(0, 5, 1), trunkAt(1, 5, -1)};
+  trunks[0].evidence = 3;
+  trunks[1].evidence = 1;
+  EXPECT_FALSE(chooseGap(trunks, {0, 0}, 0, 1.5, {}));
+  EXPECT_TRUE(chooseGap(trunks, {0, 0}, 0, 0.5, {}));
+}
+
 TEST(Gap, ChoosesTheOneNearestToStraightAhead)
 {
   const std::vector<Obstacle> trunks{trunkAt(0, 5, 1), trunkAt(1, 5, -0.8), trunkAt(2, 5, -2.8)};
-  const auto gap = chooseGap(trunks, {0, 0}, 0, {});
+  const auto gap = chooseGap(trunks, {0, 0}, 0, 0, {});
   ASSERT_TRUE(gap);
   EXPECT_EQ(gap->left, 0);
   EXPECT_EQ(gap->right, 1);
-  const auto to_the_right = chooseGap(trunks, {0, 0}, -0.35, {});
+  const auto to_the_right = chooseGap(trunks, {0, 0}, -0.35, 0, {});
   ASSERT_TRUE(to_the_right);
   EXPECT_EQ(to_the_right->right, 2);
 }
@@ -57,16 +66,16 @@ TEST(Gap, ChoosesTheOneNearestToStraightAhead)
 TEST(Gap, IsNotChosenWhereItIsNarrowUnconfirmedOrBlocked)
 {
   const std::vector<Obstacle> open{trunkAt(0, 5, 0.8), trunkAt(1, 5, -0.8)};
-  ASSERT_TRUE(chooseGap(open, {0, 0}, 0, {}));
-  EXPECT_FALSE(chooseGap({trunkAt(0, 5, 0.6), trunkAt(1, 5, -0.6)}, {0, 0}, 0, {})); // 0.9 m
+  ASSERT_TRUE(chooseGap(open, {0, 0}, 0, 0, {}));
+  EXPECT_FALSE(chooseGap({trunkAt(0, 5, 0.6), trunkAt(1, 5, -0.6)}, {0, 0}, 0, 0, {})); // 0.9 m
   auto doubtful = open;
   doubtful[0].is_confirmed = false;
-  EXPECT_FALSE(chooseGap(doubtful, {0, 0}, 0, {}));
+  EXPECT_FALSE(chooseGap(doubtful, {0, 0}, 0, 0, {}));
   auto blocked = open;
   blocked.push_back(trunkAt(2, 6.2, 0.1));
-  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, {}));
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
   blocked.back().is_confirmed = false; // a candidate is in the way as well
-  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, {}));
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
 }
 
 /// Least distance hull to bark of a drone that follows chooseWay() with its lag.

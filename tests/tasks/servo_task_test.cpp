@@ -18,7 +18,10 @@ public:
   using ServoTask::ServoTask;
   bool is_in_view = true;
 
+  int given_up = 0;
+
 protected:
+  void giveUpTarget() override { ++given_up; }
   bool sees(const FrameResult &, const Pipeline &) const override { return is_in_view; }
   TaskCommand act(const FrameResult &, const Pipeline &) override { return {false, {1, 0, 0, 0}, "ahead"}; }
 };
@@ -58,6 +61,26 @@ TEST_F(Safety, HoversAfterTheTargetWasNotSeenForLostFrames)
   for (int k = 0; k < 3; ++k)
     EXPECT_FALSE(hovers(task)) << k;
   EXPECT_TRUE(hovers(task));
+}
+
+TEST_F(Safety, GivesATargetUpAfterGoodFramesWithoutItAndNotForBadOnes)
+{
+  SafetyOptions options;
+  options.patience_frames = 10;
+  Ahead task(options);
+  ASSERT_FALSE(hovers(task));
+  task.is_in_view = false;
+  for (int k = 0; k < 30; ++k)
+    hovers(task, FrameStatus::corrupt);
+  EXPECT_EQ(task.given_up, 0);
+  task.is_in_view = true;
+  hovers(task);
+  task.is_in_view = false;
+  for (int k = 0; k < 10; ++k)
+    hovers(task);
+  EXPECT_EQ(task.given_up, 0);
+  EXPECT_TRUE(hovers(task)) << "hovers until it has found another";
+  EXPECT_EQ(task.given_up, 1);
 }
 
 TEST_F(Safety, GoesOnOnlyAfterSureFramesInARow)

@@ -20,6 +20,7 @@ struct GapTaskOptions
   double width_min = 1.2;     ///< least free width, bark to bark [m], 0.3 to 5
   double width_max = 3.5;     ///< wider is no gap [m], more than width_min, to 20
   double range = 8;           ///< of the gap's middle [m], 1 to 20
+  double evidence = 1.5;      ///< of both its trunks, at first: lower log odds only after two sweeps, -20 to 20
   double angle = 0.5;         ///< of the gap's middle from straight ahead [rad], 0.05 to 0.7
   double body_radius = 0.28;  ///< of the drone with its hull [m], 0.05 to 2
   double entry = 1.5;         ///< lines up this far before the middle [m], 0.3 to 5
@@ -43,9 +44,10 @@ struct Gap
 /// The gap between two trunks as seen from \p from: the middle of the free width.
 Gap gapBetween(const Obstacle &one, const Obstacle &other, const Eigen::Vector2d &from);
 
-/// The gap nearest to straight ahead whose corridor, from the drone to beyond it, no other trunk narrows.
+/// The gap nearest to straight ahead, between trunks of at least \p evidence, whose corridor, from the drone to beyond
+/// it, no other trunk narrows.
 std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::Vector2d &from, double heading,
-                             const GapTaskOptions &options);
+                             double evidence, const GapTaskOptions &options);
 
 class GapTask : public ServoTask
 {
@@ -57,6 +59,7 @@ public:
 
 protected:
   bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
+  void giveUpTarget() override;
   TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
 
 private:

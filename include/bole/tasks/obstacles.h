@@ -19,6 +19,7 @@ struct Obstacle
   Eigen::Vector2d xy = Eigen::Vector2d::Zero(); ///< [m], world
   double radius = 0;                            ///< [m]
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< [m^2], world axes
+  double evidence = 0;                          ///< log odds to be a trunk (TrunkMap::evidence)
 
   /// Distance of \p p to the bark less \p sigmas standard deviations in that direction [m].
   double clearance(const Eigen::Vector2d &p, double sigmas) const;

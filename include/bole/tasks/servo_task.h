@@ -6,7 +6,7 @@
 /// Idea: a task sees only FrameResult and Pipeline, never a robot, so the same task flies vpRobotArDrone and
 /// vpSimulatorArDrone. What every task shares is when *not* to act: step() commands a hover at once where a frame is
 /// not ok, and where what the task hangs on was not found for lost_frames; it goes on after sure_frames in which it
-/// was. A drone that hovers holds its place by its floor camera and its height by its sonar, without this one.
+/// was, and looks for another after patience_frames in which it was not. A drone that hovers holds its place by its floor camera and its height by its sonar, without this one.
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
@@ -38,6 +38,7 @@ struct SafetyOptions
 {
   int lost_frames = 5; ///< frames without what the task hangs on before it hovers, 1 to 100
   int sure_frames = 3; ///< frames with it before it goes on, 1 to 100
+  int patience_frames = 40; ///< good frames without it before it looks for another, 1 to 10000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -63,6 +64,8 @@ public:
 protected:
   /// Whether this (ok) frame shows what the task hangs on.
   virtual bool sees(const FrameResult &result, const Pipeline &pipeline) const = 0;
+  /// What the task hangs on is gone for good: search anew.
+  virtual void giveUpTarget() {}
   virtual TaskCommand act(const FrameResult &result, const Pipeline &pipeline) = 0;
   void enter(TaskPhase phase) { m_phase = phase; }
 
@@ -71,6 +74,7 @@ private:
   TaskPhase m_phase = TaskPhase::searching;
   bool m_is_lost = false;
   int m_seen = 0, m_unseen = 0;
+  int m_missed = 0; ///< good frames in a row without it
 };
 
 /// Sidesteps about the place where it began, the heading kept: range needs parallax.
@@ -84,6 +88,11 @@ public:
   double elapsed(double time_s) const { return m_started ? time_s - m_start_s : 0; }
   const Pose &start() const { return m_start; }
   void restart() { m_started = false; }
+  void restart(double amplitude)
+  {
+    m_amplitude = amplitude;
+    m_started = false;
+  }
 
 private:
   double m_amplitude, m_period, m_start_s = 0;

@@ -77,6 +77,7 @@ public:
 
 protected:
   bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
+  void giveUpTarget() override;
   TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
 
 private:

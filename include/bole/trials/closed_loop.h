@@ -25,7 +25,7 @@ struct LoopSample
   Eigen::Vector4d command = Eigen::Vector4d::Zero();  ///< of the body
   double speed = 0;                                   ///< true, horizontal [m/s]
   double clearance = 0;                               ///< true, body's origin to bark [m]
-  double loop_ms = 0;                                 ///< tracker, health of the image and task
+  double loop_ms = 0;                                 ///< of processor time: tracker, health of the image and task
   ServoTask::Values believed, real;                   ///< errors by the task, by the truth
   std::string reason;
 };
