@@ -213,6 +213,8 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
     task->add_option("--ratio", trial.ratio, "Radius over distance to be kept (circle .07; hold: instead of --distance)")->check(CLI::Range(0.01, 0.5));
   if (kind != ServoKind::hold)
     task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1)")->check(CLI::Range(0.05, 2.0));
+  if (kind == ServoKind::circle)
+    trial.loop.duration_s = 70; // round a trunk of 0.25 m at r/d .07
   if (kind == ServoKind::slalom) {
     trial.loop.duration_s = 90;
     task->add_option("--length", trial.scenario.length, "[m]")->capture_default_str()->check(CLI::Range(1.0, 1000.0));

@@ -15,6 +15,7 @@ constexpr double kPause_s = 0.25;       ///< without a command it hovered: what 
 constexpr double kFirstDrift = 0.3;     ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
+constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
 } // namespace
 
@@ -34,6 +35,7 @@ void TrunkTaskOptions::validate() const
   require("unrest", unrest, 1e-3, 2);
   require("largest_speed", largest_speed, 0.05, 3);
   require("sway", sway, 0, 2);
+  require("sway_climb", sway_climb, 0, 1);
   require("sway_period", sway_period, 1, 60);
   require("sway_s", sway_s, 0, 600);
   require("radius_sigma", radius_sigma, 1e-3, 1);
@@ -138,9 +140,20 @@ void TrunkTask::desire(double radius)
 {
   if (m_options.ratio > 0)
     m_ratio = m_options.ratio;
-  else if (!m_rests || m_ratio <= 0)
-    m_ratio = std::min(0.5, radius / m_options.distance);
+  else
+    m_ratio = std::min(0.5, (m_rests ? std::exp(m_log_radius) : radius) / m_options.distance);
   m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
+}
+
+/// The trunk as seen from here may be wider or narrower than in the map, which has it from all sides.
+void TrunkTask::weighRadius(const FrameResult &result, const MapTrunk &trunk)
+{
+  const TrackedTrunk *tracked = trackedTrunk(result, m_target);
+  const RelativeTrunk by_map = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
+  if (!tracked || !tracked->relative.isFinite() || !by_map.isFinite() || m_rests)
+    return;
+  const double seen = trunk.trunk.log_radius + tracked->relative.log_ratio - by_map.log_ratio;
+  m_log_radius = m_has_feature ? m_log_radius + kRadiusWeight * (seen - m_log_radius) : seen;
 }
 
 /// As tracked in this image; where it was missed, and for the distance while it sways, as the map has it: pose and place
@@ -180,6 +193,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
     return command;
   }
   m_place = trunk->trunk.xy;
+  weighRadius(result, *trunk);
   const RelativeTrunk seen = look(result, *trunk);
   if (!seen.isFinite())
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
@@ -188,6 +202,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   const double sway = swayNow(*trunk, time_s);
   const double round = isFree(*trunk, pipeline, result.wMb, m_options.speed + sway) ? m_options.speed + m_options.sway * sway : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
+  command.velocity.z() = m_options.sway_climb * sway;
   if (sway != 0)
     command.reason = "sways to measure the range";
   else if (m_options.speed != 0)

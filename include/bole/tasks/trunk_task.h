@@ -10,9 +10,9 @@
 ///
 /// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
 /// has none. So `hold` by distance first sways sideways, features held, until the map knows the radius
-/// to radius_sigma. Then it rests, and keeps the r/d that the distance has become: that is an image's, and does not
-/// wander as poses do. What no parallax tells is the scale of the drone's odometry. (Swaying on a slant, so that the
-/// height, which has no such error, gives the metre, was tried: the borders then found were worse.)
+/// to radius_sigma. The way is a slant: the drone's height has no error of scale as its steps have, and the points tell
+/// the direction of flight, so that the metre of the height becomes the map's. Then it rests, and keeps the r/d that the
+/// distance has become: that is an image's, and does not wander as poses do.
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
 /// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
@@ -43,6 +43,7 @@ struct TrunkTaskOptions
   double unrest = 0.15;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
   double largest_speed = 0.9;  ///< [m/s], 0.05 to 3
   double sway = 0.8;           ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
+  double sway_climb = 0.4;     ///< largest rate of climb meanwhile [m/s], 0 to 1
   double sway_period = 6;      ///< [s], 1 to 60
   double sway_s = 25;          ///< sways no longer than this [s], 0 to 600
   double radius_sigma = 0.01;  ///< standard deviation of log r, without the scale, at which it rests, 1e-3 to 1
@@ -84,6 +85,7 @@ private:
   TaskCommand search(const FrameResult &result, const Pipeline &pipeline, double time_s);
   int choose(const Pipeline &pipeline, double elapsed_s) const;
   int successor(const Pipeline &pipeline) const;
+  void weighRadius(const FrameResult &result, const MapTrunk &trunk);
   RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk) const;
   void desire(double radius);
   double swayNow(const MapTrunk &trunk, double time_s);
@@ -102,6 +104,7 @@ private:
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
   double m_time_s = 0, m_ratio = 0;
+  double m_log_radius = 0; ///< distance in the map times r/d in the image, over the last second
   double m_sway_start_s = -1; ///< -1: has not begun
   bool m_rests = false;       ///< has swayed enough
   bool m_has_feature = false;
