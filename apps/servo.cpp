@@ -66,7 +66,8 @@ vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const L
   overlay.is_warning = sample.is_lost;
   overlay.text = fmt::format("{:.1f} s  {}", sample.time_s, sample.reason);
   for (const auto &[name, value] : sample.real)
-    overlay.text += fmt::format("  {} {:.1f}", name, value);
+    if (name.rfind("r/d", 0) != 0) // the line is as long as the picture is wide
+      overlay.text += fmt::format("  {} {:.1f}", name, value);
   return drawOverlay(frame.image, camera, overlay);
 }
 
