@@ -154,14 +154,16 @@ void GapTask::refresh(const Pipeline &pipeline, const Pose &wMb)
 
 TaskCommand GapTask::fly(const Pose &wMb)
 {
-  if (m_ahead > m_options.beyond) {
+  if (m_is_lined_up && m_ahead > m_options.beyond) {
     enter(TaskPhase::done);
     return {true, Eigen::Vector4d::Zero(), "through"};
   }
-  const double heading = std::atan2(m_gap->along.y(), m_gap->along.x());
   m_is_lined_up |= m_ahead > -m_options.entry - 0.3 && std::abs(m_across) < kLinedUp;
+  const Eigen::Vector2d to_middle = m_gap->middle - wMb.t.head<2>();
+  const Eigen::Vector2d ahead = m_is_lined_up ? m_gap->along : to_middle; // keeps both trunks in view
+  const double heading = std::atan2(ahead.y(), ahead.x());
   Eigen::Vector2d velocity;
-  if (m_is_lined_up || m_ahead > 0)
+  if (m_is_lined_up)
     velocity = m_options.speed * m_gap->along - kAcrossGain * m_across * leftOf(m_gap->along);
   else {
     const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
