@@ -191,8 +191,8 @@ private:
 
   // vpMbTrunkTrackerPose.cpp: the estimation
   Eigen::Vector3d alongTrunks() const;
-  Prediction predictAlone(const bole::RotationAligner::Reference &thumbnails);
-  Prediction predict(const bole::RotationAligner::Reference &thumbnails);
+  Prediction predictAlone();
+  Prediction predict(const vpImage<unsigned char> *I);
   Status estimate(const vpImage<unsigned char> &I, const Prediction &prediction);
   void predictTrunks(const vpImage<unsigned char> &I);
   void scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px);
@@ -219,7 +219,9 @@ private:
   std::vector<std::size_t> m_in_view; ///< indices of the trunks that the current scan uses
   bole::ImageHealth m_health;
   bole::RotationAligner m_aligner;
-  bole::RotationAligner::Reference m_reference; ///< of the last image that was tracked
+  bole::RotationAligner::Reference m_thumbnails; ///< of the present image, where they were needed
+  bole::RotationAligner::Reference m_reference;  ///< of the last image that was tracked; empty: not yet reduced
+  vpImage<unsigned char> m_reference_image;      ///< that image, where m_reference is empty
   bole::CameraMotion m_motion;          ///< since then, without a prior
   bole::Vote m_vote;          ///< of the first scan
   double m_agreement = kRightAgreement; ///< over the last frames

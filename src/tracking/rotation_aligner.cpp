@@ -14,7 +14,8 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr int kCoarse = 8, kFine = 4; ///< pixels of the image a pixel of the thumbnail
+/// Pixels of an image a pixel of its coarse thumbnail, which is about 40 pixels wide; the fine one has twice as many.
+int coarseFactor(int width) { return 8 * std::max(1, (width + 160) / 320); }
 
 Thumbnail shrink(const vpImage<unsigned char> &image, int factor)
 {
@@ -149,13 +150,14 @@ RotationAligner::RotationAligner(const Options &options) : m_options(options) {}
 
 RotationAligner::Reference RotationAligner::reduce(const vpImage<unsigned char> &image)
 {
-  return {shrink(image, kCoarse), shrink(image, kFine)};
+  const int factor = coarseFactor(int(image.getWidth()));
+  return {shrink(image, factor), shrink(image, factor / 2)};
 }
 
 double RotationAligner::correlation(const Reference &first, const Reference &second, const PinholeCamera &camera,
                                     const Matrix3d &c2Rc1)
 {
-  const PinholeCamera small = thumbnailCamera(camera, kCoarse);
+  const PinholeCamera small = thumbnailCamera(camera, coarseFactor(camera.width));
   Correlation sums;
   float grey, gu, gv;
   for (int v = 0; v < first.coarse.height; ++v)
@@ -176,8 +178,9 @@ RotationAlignment RotationAligner::align(const Reference &first, const Reference
   RotationAlignment result;
   if (first.empty() || second.empty() || first.fine.grey.size() != second.fine.grey.size())
     return result;
-  const int max_du = int(std::ceil(m_options.max_turn_px / kCoarse));
-  const int max_dv = int(std::ceil(m_options.max_tilt_px / kCoarse));
+  const int factor = coarseFactor(camera.width);
+  const int max_du = int(std::ceil(m_options.max_turn_px / factor));
+  const int max_dv = int(std::ceil(m_options.max_tilt_px / factor));
   int best_u = 0, best_v = 0;
   double best = -2;
   for (int dv = -max_dv; dv <= max_dv; ++dv)
@@ -186,7 +189,7 @@ RotationAlignment RotationAligner::align(const Reference &first, const Reference
       if (score > best)
         best = score, best_u = du, best_v = dv;
     }
-  const PinholeCamera coarse = thumbnailCamera(camera, kCoarse), fine = thumbnailCamera(camera, kFine);
+  const PinholeCamera coarse = thumbnailCamera(camera, factor), fine = thumbnailCamera(camera, factor / 2);
   result.c2Rc1 = expSo3({-std::atan(best_v / coarse.fy), std::atan(best_u / coarse.fx), 0});
   double step = 1;
   for (int i = 0; i < m_options.iterations && step > 1e-4; ++i) {

@@ -226,9 +226,8 @@ void vpMbTrunkTracker::setPose(const vpImage<unsigned char> &I, const vpHomogene
     throw vpException(vpException::badValue, "cMo: must be finite");
   m_cMo = cdMo;
   m_health.start(I);
-  if (&I != &m_I)
-    m_I = I;
-  m_reference = bole::RotationAligner::reduce(I);
+  m_reference = {};
+  m_reference_image = I;
   m_motion.start(Pose::fromVisp(m_cMo), m_posterior);
   m_frames_since_good = 0;
   m_status = Status::tracked;
@@ -296,7 +295,7 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
     throw vpException(vpException::notInitialized, "the trunk tracker has no pose to start from");
   const ImageFault fault = m_health.check(I);
   if (fault != ImageFault::none) {
-    const Prediction prediction = predict({});
+    const Prediction prediction = predict(nullptr);
     m_cMo = prediction.cMo;
     m_posterior = prediction.covariance;
     ++m_frames_since_good;
@@ -305,8 +304,7 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
     finish(statusOf(fault), fmt::format("image is {}: the pose is predicted", bole::toString(fault)));
     return;
   }
-  const bole::RotationAligner::Reference thumbnails = bole::RotationAligner::reduce(I);
-  const Prediction prediction = predict(thumbnails);
+  const Prediction prediction = predict(&I);
   const Status status = estimate(I, prediction);
   if (status != Status::tracked) {
     m_cMo = prediction.cMo;
@@ -324,7 +322,9 @@ void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
   m_frames_since_good = 0;
   for (std::size_t k : m_in_view)
     m_trunks[k].remember(m_options.memory_rate);
-  m_reference = thumbnails;
+  m_reference = m_thumbnails;
+  if (m_reference.empty())
+    m_reference_image = I;
   projectionError = computeProjError ? computeCurrentProjectionError(I, m_cMo, m_cam) : 90.0;
   if (const std::string why = doubt(); !why.empty())
     finish(Status::uncertain, why);

@@ -99,21 +99,27 @@ Vector3d vpMbTrunkTracker::alongTrunks() const
   return sum.normalized();
 }
 
-vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone(const bole::RotationAligner::Reference &thumbnails)
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone()
 {
   const int frames = m_frames_since_good + 1;
-  const bole::RotationAlignment turn = m_aligner.align(
-      m_reference, thumbnails, bole::PinholeCamera::fromVisp(m_cam, int(m_I.getWidth()), int(m_I.getHeight())));
+  const int width = int(m_reference_image.getWidth()), height = int(m_reference_image.getHeight());
+  if (m_reference.empty())
+    m_reference = bole::RotationAligner::reduce(m_reference_image);
+  const bole::RotationAlignment turn = m_aligner.align(m_reference, m_thumbnails, bole::PinholeCamera::fromVisp(m_cam, width, height));
   const auto expected = m_motion.predict(frames, turn.ok ? turn.c2Rc1 : Matrix3d::Identity(),
                                          turn.ok ? m_options.turn_sigma_rad : 0.05 * std::sqrt(double(frames)), alongTrunks());
   return {moved(m_cMo, estimated(twistBetween(m_cMo, expected.cMo.toVisp()))), expected.covariance};
 }
 
-vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const bole::RotationAligner::Reference &thumbnails)
+/// Before the image \p I is looked at for trunks; null: an image that is not to be believed.
+vpMbTrunkTracker::Prediction vpMbTrunkTracker::predict(const vpImage<unsigned char> *I)
 {
-  if (!m_prior)
-    return predictAlone(thumbnails);
-  return {moved(m_cMo, estimated(twistBetween(m_cMo, m_prior->cMo))), m_prior->covariance};
+  m_thumbnails = {};
+  if (m_prior)
+    return {moved(m_cMo, estimated(twistBetween(m_cMo, m_prior->cMo))), m_prior->covariance};
+  if (I)
+    m_thumbnails = bole::RotationAligner::reduce(*I);
+  return predictAlone();
 }
 
 void vpMbTrunkTracker::predictTrunks(const vpImage<unsigned char> &I)
