@@ -121,16 +121,19 @@ double imageCost(const Flight &flight, const Graph &graph)
   return sum;
 }
 
-/// Every view's quadratic anew from its image, at the point that \p at gives.
+/// Every view's quadratic anew from its image, at the point that \p at gives; where a border has left
+/// the image there is none, and the view keeps what it had.
 template <typename Point> Graph expanded(const Flight &flight, Graph graph, const Point &at)
 {
   graph.summary_loss.kind = LossKind::quadratic;
   for (std::size_t i = 0; i < flight.views.size(); ++i) {
-    SummaryFactor &summary = graph.observations[i].summary;
     const TrunkEnergy energy = energyOf(flight, flight.views[i]);
+    SummaryFactor summary;
     summary.optimum = at(i);
     summary.energy = energy.evaluate(summary.optimum, &summary.f);
     summary.F = energy.curvature(summary.optimum).F;
+    if (std::isfinite(summary.energy) && summary.f.allFinite() && summary.F.allFinite())
+      graph.observations[i].summary = summary;
   }
   return graph;
 }
