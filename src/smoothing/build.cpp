@@ -31,6 +31,14 @@ void Smoother::State::checkTrunk(std::size_t trunk) const
                       trunk, trunks.size());
 }
 
+/// From the estimate to the point; new points are shifted as those of their neighbours.
+Eigen::Vector3d Smoother::State::shiftOfPoint(int pose) const
+{
+  if (pose < 0 || !isOpen(poses[pose].variable))
+    return Eigen::Vector3d::Zero();
+  return poses[pose].point.t - estimate(poses[pose]).t;
+}
+
 std::size_t Smoother::State::newPose(const Pose &point)
 {
   if (!point.isFinite())
@@ -39,6 +47,9 @@ std::size_t Smoother::State::newPose(const Pose &point)
   variable.number = static_cast<int>(poses.size());
   PoseState pose;
   pose.point = point;
+  pose.point.t += shiftOfPoint(static_cast<int>(poses.size()) - 1);
+  variable.delta = point.minus(pose.point);
+  rememberProbe(variable);
   pose.variable = static_cast<int>(variables.size());
   variables.push_back(std::move(variable));
   poses.push_back(pose);
@@ -52,11 +63,14 @@ std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prio
       !prior.sigma.allFinite() || !(prior.sigma.array() > 0).all())
     throw vpException(vpException::badValue, "trunk, must be finite with sigmas above 0");
   TrunkState trunk;
-  trunk.point = point;
+  trunk.point = shifted(point, shiftOfPoint(static_cast<int>(poses.size()) - 1));
   trunk.prior = prior;
   trunk.last_pose = std::max<int>(0, static_cast<int>(poses.size()) - 1);
   trunks.push_back(trunk);
   reopenTrunk(static_cast<int>(trunks.size()) - 1);
+  Variable &variable = variables[trunks.back().variable];
+  variable.delta.head<5>() = point.minus(trunks.back().point);
+  rememberProbe(variable);
   return trunks.size() - 1;
 }
 

@@ -8,11 +8,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kWeightShare = 0.2;
-constexpr double kLargestShift = 8; ///< times the relinearisation thresholds
-constexpr std::size_t kFactorsProbed =
-    6; ///< of a trunk, newest to oldest, for their linearisation error
-
 template <int Rows, int Columns> using Block = Eigen::Map<Eigen::Matrix<double, Rows, Columns>>;
 
 /// Writes [J_a J_b -r] with the square root of the loss' weight; returns rho / 2.
@@ -40,6 +35,12 @@ double store1(const Eigen::Matrix<double, Rows, A> &J, const Eigen::Matrix<doubl
   return 0.5 * r.squaredNorm();
 }
 } // namespace
+
+Trunk shifted(Trunk trunk, const Eigen::Vector3d &shift)
+{
+  trunk.xy += shift.head<2>() - shift.z() * trunk.lean;
+  return trunk;
+}
 
 void Smoother::State::linearise(Factor &factor)
 {
@@ -190,111 +191,6 @@ Vector5d Smoother::State::limitedTrunkStep(const TrunkState &trunk, const Vector
   return step * std::min({1.0, limit / std::max(move, 1e-9), 0.7 / std::max(resize, 1e-9)});
 }
 
-/// Whitened residual that the linearisation predicts at the estimates.
-Vector6d Smoother::State::linearPrediction(const Factor &factor) const
-{
-  const int rows = rowCount(factor.kind);
-  Vector6d r = Vector6d::Zero();
-  const double *column = factor.linear;
-  for (const int v : {factor.a, factor.b}) {
-    if (v < 0)
-      continue;
-    for (int c = 0; c < variables[v].dim; ++c, column += rows)
-      for (int i = 0; i < rows; ++i)
-        r(i) += column[i] * variables[v].delta(c);
-  }
-  for (int i = 0; i < rows; ++i)
-    r(i) -= column[i];
-  return r;
-}
-
-namespace
-{
-/// Weight of a loss where it is \p rho.
-double weightAt(const Loss &loss, double rho)
-{
-  switch (loss.kind) {
-  case LossKind::quadratic:
-    return 1;
-  case LossKind::huber:
-    return loss.width / std::max(loss.width, 0.5 * (rho / loss.width + loss.width));
-  case LossKind::cauchy:
-    return std::exp(-rho / (loss.width * loss.width));
-  }
-  return 1;
-}
-
-/// Of a weighted residual: what the geometry's curvature makes, and a share of what the weight does
-/// that no longer fits. A wrong weight only makes the loss a little softer or harder.
-template <int N>
-double modelError(const Loss &loss, double cost, const Eigen::Matrix<double, N, 1> &r,
-                  const Eigen::Matrix<double, N, 1> &predicted)
-{
-  const double root = std::sqrt(weightAt(loss, 2 * cost));
-  const double now = std::sqrt(loss.weight(r.squaredNorm()));
-  return std::max((root * r - predicted).norm(), kWeightShare * std::abs(now - root) * r.norm());
-}
-} // namespace
-
-/// How far, in standard deviations, the true residual at the estimates is from its linear model.
-double Smoother::State::linearisationError(const Factor &factor) const
-{
-  if (factor.stale)
-    return 0;
-  if (factor.kind == FactorKind::observation) {
-    const Vector4d r = residual(observations[factor.data].root, options.bMc,
-                                estimate(poses[variables[factor.a].number]),
-                                estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
-    return modelError<4>(options.summary_loss, factor.cost, r, linearPrediction(factor).head<4>());
-  }
-  if (factor.kind == FactorKind::odometry) {
-    const OdometryData &data = odometry[factor.data];
-    const Vector6d r = residual(data.factor, data.S, estimate(poses[variables[factor.a].number]),
-                                estimate(poses[variables[factor.b].number]), nullptr, nullptr);
-    return (r - linearPrediction(factor)).norm();
-  }
-  if (factor.kind == FactorKind::relative_pose) {
-    const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r =
-        residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
-                 estimate(poses[variables[factor.b].number]), nullptr, nullptr);
-    return modelError<5>(options.direction_loss, factor.cost, r,
-                         linearPrediction(factor).head<5>());
-  }
-  return 0;
-}
-
-/// The largest part of \p step, in thresholds of relinearisation.
-double Smoother::State::inThresholds(const Variable &variable, const Vector6d &step) const
-{
-  const double position = step.head(variable.is_pose ? 3 : 2).cwiseAbs().maxCoeff();
-  const double rest =
-      variable.is_pose
-          ? step.tail<3>().cwiseAbs().maxCoeff() / options.relinearise_rotation
-          : std::max(std::abs(step(2)) / options.relinearise_log_radius,
-                     step.segment<2>(3).cwiseAbs().maxCoeff() / options.relinearise_lean);
-  return std::max(position / options.relinearise_position, rest);
-}
-
-/// Probes the factors only where the estimate has moved on since they were last found good. Pose
-/// priors are linear enough never to ask for more than their pose's own factors do.
-bool Smoother::State::movedTooFar(Variable &variable) const
-{
-  if (inThresholds(variable, variable.delta - variable.probed) <= 1)
-    return false;
-  // A common shift changes no view, but may not grow without bound: small errors of many add up.
-  if (variable.is_pose && inThresholds(variable, variable.delta) > kLargestShift)
-    return true;
-  const std::size_t count = variable.factors.size();
-  const std::size_t every = variable.is_pose ? 1 : std::max<std::size_t>(1, count / kFactorsProbed);
-  for (std::size_t i = 0; i < count; i += every)
-    if (linearisationError(factors[variable.factors[count - 1 - i]]) >
-        options.linearisation_tolerance)
-      return true;
-  variable.probed = variable.delta;
-  return false;
-}
-
 /// Are all neighbours by factors to be eliminated again anyway?
 bool Smoother::State::isInside(const Variable &variable) const
 {
@@ -305,20 +201,24 @@ bool Smoother::State::isInside(const Variable &variable) const
   });
 }
 
-void Smoother::State::relinearise(int v)
+/// Puts the point of \p v where its estimate is, but for \p shift; the estimate stays.
+void Smoother::State::relinearise(int v, const Eigen::Vector3d &shift)
 {
   Variable &variable = variables[v];
   if (variable.is_pose) {
     PoseState &pose = poses[variable.number];
-    pose.point = pose.point.plus(variable.delta);
+    pose.point = estimate(pose);
+    variable.delta << pose.point.R.transpose() * -shift, Eigen::Vector3d::Zero();
+    pose.point.t += shift;
   }
   else {
     TrunkState &trunk = trunks[variable.number];
-    trunk.point = trunk.point.plus(limitedTrunkStep(trunk, variable.delta.head<5>()));
+    const Trunk now = trunk.point.plus(limitedTrunkStep(trunk, variable.delta.head<5>()));
+    trunk.point = shifted(now, shift);
+    variable.delta.head<5>() = now.minus(trunk.point);
   }
-  variable.delta.setZero();
-  variable.probed.setZero();
-  touch(v);
+  rememberProbe(variable);
+  touchNeighbours(v);
   for (const int id : variable.factors) {
     Factor &factor = factors[id];
     if (!factor.stale) {
@@ -327,6 +227,14 @@ void Smoother::State::relinearise(int v)
       factor.stale = true;
       stale_factors.push_back(id);
     }
+  }
+}
+
+void Smoother::State::touchNeighbours(int v)
+{
+  touch(v);
+  for (const int id : variables[v].factors) {
+    const Factor &factor = factors[id];
     if (factor.kind == FactorKind::marginal) {
       for (const int other : marginals[factor.data].variables)
         touch(other);

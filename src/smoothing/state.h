@@ -44,9 +44,11 @@ struct Variable
   int number = 0; ///< of the pose or trunk
   int dim = 6;
   std::vector<int> factors;
-  Vector6d delta = Vector6d::Zero(); ///< estimate = linearisation point (+) delta
+  Vector6d delta = Vector6d::Zero();  ///< estimate = linearisation point (+) delta
   Vector6d probed = Vector6d::Zero(); ///< the delta at which the linearisation was last found good
-  int affected = 0;                   ///< stamp
+  Eigen::Vector3d probed_displacement = Eigen::Vector3d::Zero(); ///< against the parent, then
+  int affected = 0;                                              ///< stamp
+  unsigned visited = 0; ///< the back-substitution that last came by
 
   // node of the elimination tree
   bool eliminated = false;
@@ -135,6 +137,9 @@ struct TrunkState
   Matrix5d closed_covariance = Matrix5d::Zero();
 };
 
+/// The axis moved without a turn.
+Trunk shifted(Trunk trunk, const Eigen::Vector3d &shift);
+
 class Smoother::State
 {
 public:
@@ -152,6 +157,7 @@ public:
   std::size_t live_observations = 0;
 
   // build.cpp
+  Eigen::Vector3d shiftOfPoint(int pose) const;
   std::size_t newPose(const Pose &point);
   std::size_t newTrunk(const Trunk &point, const TrunkPrior &prior);
   void reopenTrunk(int trunk);
@@ -170,7 +176,12 @@ public:
   void linearise(Factor &factor);
   double costAtEstimate(const Factor &factor) const;
   double costAtEstimate() const;
-  void relinearise(int variable);
+  void relinearise(int variable, const Eigen::Vector3d &shift = Eigen::Vector3d::Zero());
+  void touchNeighbours(int variable);
+  Eigen::Vector3d displacement(const Variable &variable) const;
+  Eigen::Vector3d ownDisplacement(const Variable &variable) const;
+  Vector6d ownStep(const Variable &variable) const;
+  void rememberProbe(Variable &variable) const;
   bool movedTooFar(Variable &variable) const;
   double inThresholds(const Variable &variable, const Vector6d &step) const;
   bool isInside(const Variable &variable) const;
@@ -195,7 +206,12 @@ public:
   void reeliminate(UpdateResult &result);
   void backSubstitute(UpdateResult &result);
   int reach();
+  void visitBelow(int deepest, UpdateResult &result);
+  void fetchAhead(int pose) const;
+  void pushChildren(int id, int depth, int quiet);
+  void settle(Variable &v, int id, double *rhs, UpdateResult &result);
   void moveLinearisation(UpdateResult &result);
+  Eigen::Vector3d shiftBeyondAffected() const;
   void dropOldContributions();
 
   // lag.cpp

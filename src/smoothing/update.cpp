@@ -14,12 +14,11 @@ constexpr int kRecentPoses = 64; ///< behind the newest, all of them keep their 
 constexpr int kContributionEvery =
     8;                      ///< older poses that keep it; the rest is eliminated again if needed
 constexpr int kReach = 256; ///< variables below the eliminated ones that a pass visits
-constexpr unsigned kPassesBetween = 4; ///< until one goes twice as deep
-constexpr unsigned kDeepEvery = 512;   ///< passes until one may move points of any age
-constexpr int kDeepAge = 400;          ///< poses behind the newest: older points are left meanwhile
-constexpr int kQuietPoints = 4; ///< variables in a row near their point: the rest keeps its points
-constexpr double kWorthAligning = 0.1; ///< thresholds of relinearisation
-constexpr int kQuiet = 16; ///< variables in a row that are near their solution: the rest is left
+constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
+constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
+constexpr unsigned kDeepEvery = 512;              ///< passes until one may move points of any age
+constexpr int kDeepAge = 400; ///< poses behind the newest: older points are left meanwhile
+constexpr int kQuiet = 16;    ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
 void Smoother::State::touch(int variable) { touched.push_back(variable); }
@@ -108,59 +107,98 @@ void Smoother::State::reeliminate(UpdateResult &result)
   result.eliminated += affected.size();
 }
 
+/// Asks for the memory of poses that a visit of \p pose will soon come to: over a long flight most
+/// of its time is waiting for it.
+void Smoother::State::fetchAhead(int pose) const
+{
+  const auto fetch = [](const void *from, std::size_t bytes) {
+    for (std::size_t i = 0; i < bytes; i += 64)
+      __builtin_prefetch(static_cast<const char *>(from) + i);
+  };
+  if (pose >= kFetchNodes)
+    fetch(&variables[poses[pose - kFetchNodes].variable], sizeof(Variable));
+  if (pose < kFetchColumns)
+    return;
+  const Variable &v = variables[poses[pose - kFetchColumns].variable];
+  fetch(v.columns.data(), v.columns.size() * sizeof(double));
+  fetch(v.separator.data(), v.separator.size() * sizeof(int));
+  fetch(v.children.data(), v.children.size() * sizeof(int));
+}
+
+/// Visits what is below \p stack, no deeper than \p deepest, and settles whatever stands too far
+/// from its solution given those above it.
+void Smoother::State::visitBelow(int deepest, UpdateResult &result)
+{
+  double rhs[6];
+  while (!stack.empty()) {
+    const auto [id, depth, quiet] = stack.back();
+    stack.pop_back();
+    Variable &v = variables[id];
+    if (v.is_pose)
+      fetchAhead(v.number);
+    v.visited = passes;
+    const bool stale = staleness(v, rhs) > options.propagation_threshold;
+    if (stale)
+      settle(v, id, rhs, result);
+    const int still = stale ? 0 : quiet + 1;
+    if (still < kQuiet && depth < deepest)
+      pushChildren(id, depth + 1, still);
+  }
+}
+
+void Smoother::State::pushChildren(int id, int depth, int quiet)
+{
+  for (const int c : variables[id].children)
+    if (variables[c].affected != stamp)
+      stack.push_back({c, depth, quiet});
+}
+
+void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &result)
+{
+  solve(v, rhs);
+  if (!v.delta.allFinite()) {
+    v.delta.setZero();
+    ++held_directions;
+  }
+  if (!v.in_moved) {
+    v.in_moved = true;
+    moved.push_back(id);
+  }
+  ++result.resolved;
+}
+
 /// How deep below what was eliminated again this pass goes: now and then twice as far as the passes
-/// between, and so on, so that what lies far back is brought up to date, less often the farther.
+/// between, and so on, so that what lies far back is brought up to date, less often the farther. In
+/// one go: where a pass ends, views are bent until a deeper one comes by.
 int Smoother::State::reach()
 {
   if (options.propagation_threshold == 0)
     return std::numeric_limits<int>::max();
   int depth = kReach;
-  for (unsigned pass = ++passes; pass % kPassesBetween == 0 && depth < 1 << 28;
+  for (unsigned pass = passes; pass % kPassesBetween == 0 && depth < 1 << 28;
        pass /= kPassesBetween)
     depth *= 2;
   return depth;
 }
 
-/// From the roots down: all that was eliminated again, then whatever stands too far from its
-/// solution given those above it.
+/// From the roots down: all that was eliminated again, then some way below it.
 void Smoother::State::backSubstitute(UpdateResult &result)
 {
   double rhs[6];
-  const auto settle = [&](int id) {
-    Variable &v = variables[id];
-    solve(v, rhs);
-    if (!v.delta.allFinite()) {
-      v.delta.setZero();
-      ++held_directions;
-    }
-    if (!v.in_moved && movedTooFar(v)) {
-      v.in_moved = true;
-      moved.push_back(id);
-    }
-    ++result.resolved;
-  };
+  ++passes;
   stack.clear();
-  const auto descend = [&](int id, int depth, int quiet) {
-    for (const int c : variables[id].children)
-      if (variables[c].affected != stamp)
-        stack.push_back({c, depth, quiet});
-  };
   for (auto id = affected.rbegin(); id != affected.rend(); ++id) {
+    variables[*id].visited = passes;
     staleness(variables[*id], rhs);
-    settle(*id);
-    descend(*id, 1, 0);
+    settle(variables[*id], *id, rhs, result);
+    pushChildren(*id, 1, 0);
   }
-  const int deepest = reach();
-  while (!stack.empty()) {
-    const auto [id, depth, quiet] = stack.back();
-    stack.pop_back();
-    const bool stale = staleness(variables[id], rhs) > options.propagation_threshold;
-    if (stale)
-      settle(id);
-    const int still = stale ? 0 : quiet + 1;
-    if (still < kQuiet && depth < deepest)
-      descend(id, depth + 1, still);
-  }
+  visitBelow(reach(), result);
+  const auto isFine = [this](int id) {
+    variables[id].in_moved = variables[id].in_moved && movedTooFar(variables[id]);
+    return !variables[id].in_moved;
+  };
+  moved.erase(std::remove_if(moved.begin(), moved.end(), isFine), moved.end());
 }
 
 void Smoother::State::dropOldContributions()
@@ -180,11 +218,21 @@ void Smoother::State::dropOldContributions()
       drop(variables[id].number);
 }
 
-/// Linearises anew what moved too far. Points must fit together: where a relinearised variable
-/// meets one whose estimate has left its point, by however common a shift, the lever arms between
-/// them are wrong, the next one down moves too far in its turn, and so on down the whole flight. So
-/// everything between, which is eliminated again anyway, is relinearised too, and all below that
-/// has moved along.
+/// How far the points are shifted against the estimates just beyond what is eliminated again.
+Eigen::Vector3d Smoother::State::shiftBeyondAffected() const
+{
+  int seam = static_cast<int>(poses.size()) - 1;
+  while (seam >= 0 && variables[poses[seam].variable].affected == stamp)
+    --seam;
+  return seam < 0 ? Eigen::Vector3d::Zero() : shiftOfPoint(seam);
+}
+
+/// Linearises anew what moved too far, and what is eliminated again anyway. Points must fit
+/// together: where a relinearised variable meets one whose estimate has left its point, by however
+/// common a shift, the lever arms between them are wrong, the next one down moves too far in its
+/// turn, and so on down the whole flight. So the new points are the estimates shifted as one by
+/// what the points beyond the seam are shifted: positions fit together on both sides, and a common
+/// shift is exactly linear in all that is measured.
 ///
 /// Moving old points eliminates all since again: seldom, and what was found in between is found
 /// once more by the deep pass before.
@@ -195,47 +243,34 @@ void Smoother::State::moveLinearisation(UpdateResult &result)
   const auto mayMove = [&](const Variable &v) {
     return deep || newest - (v.is_pose ? v.number : trunks[v.number].last_pose) <= kDeepAge;
   };
+  const auto move = [&](int id) {
+    variables[id].in_moved = true;
+    touchNeighbours(id);
+  };
   bool any = false;
   for (const int id : moved) {
     Variable &v = variables[id];
     v.in_moved = false;
-    if (v.life == Life::open && mayMove(v) && movedTooFar(v)) {
-      relinearise(id);
-      ++result.relinearised;
-      any = true;
-    }
+    if (v.life != Life::open || !mayMove(v))
+      continue;
+    any = true;
+    move(id);
+    for (const int f : v.factors) // what is between two is not put right by moving one
+      if (v.is_pose && factors[f].kind == FactorKind::observation &&
+          linearisationError(factors[f]) > options.linearisation_tolerance)
+        move(factors[f].b);
   }
   moved.clear();
   if (!any)
     return;
   closeUpwards();
-  stack.clear();
-  const auto descend = [&](int id, int quiet) {
-    for (const int c : variables[id].children)
-      if (variables[c].affected != stamp && isOpen(c))
-        stack.push_back({c, 0, quiet});
-  };
-  for (const int id : affected)
-    descend(id, 0);
-  while (!stack.empty()) {
-    const auto [id, depth, quiet] = stack.back();
-    stack.pop_back();
-    const bool along =
-        mayMove(variables[id]) && inThresholds(variables[id], variables[id].delta) > 1;
-    if (along) {
-      relinearise(id);
-      ++result.relinearised;
-    }
-    if (along || quiet + 1 < kQuietPoints)
-      descend(id, along ? 0 : quiet + 1);
-  }
-  closeUpwards();
+  const Eigen::Vector3d shift = shiftBeyondAffected();
   for (const int id : affected) {
-    const Variable &v = variables[id];
-    if (inThresholds(v, v.delta) > kWorthAligning && isInside(v)) {
-      relinearise(id);
+    if (variables[id].in_moved || isInside(variables[id])) {
+      relinearise(id, shift);
       ++result.relinearised;
     }
+    variables[id].in_moved = false;
   }
 }
 

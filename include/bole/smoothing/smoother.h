@@ -53,8 +53,9 @@ struct SmootherOptions
   /// Camera in the body frame. Default: forward-looking (z of the camera along x of the body).
   Pose bMc = forwardCamera();
 
-  // Linearisation. A variable that moved less than this from the point of its linearisation is not
-  // looked at: > 0. Defaults: far below what curves a relative trunk, whose scale is the distance
+  // Linearisation. A variable that moved less than this (its position against its neighbour's, since
+  // a common shift bends nothing) from where its linearisation was last found good is not looked
+  // at: > 0. Defaults: far below what curves a relative trunk, whose scale is the distance
   // (metres) and a radian.
   double relinearise_position = 0.02;   ///< [m], poses and trunks
   double relinearise_rotation = 0.005;  ///< [rad]
