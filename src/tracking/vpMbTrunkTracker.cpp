@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The ViSP side of vpMbTrunkTracker; its estimation is in vpMbTrunkTrackerPose.cpp.
+// The ViSP side of vpMbTrunkTracker; its estimation is in vpMbTrunkTrackerPose.cpp and ...Servo.cpp, its display in ...Display.cpp.
 #include <bole/tracking/cao_reader.h>
 #include <bole/tracking/trunk_settings.h>
 #include <bole/vpMbTrunkTracker.h>
@@ -9,18 +9,14 @@
 
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpDisplay.h>
 #include <visp3/core/vpImageConvert.h>
 #include <visp3/core/vpTrackingException.h>
 
-using bole::Border;
 using bole::ImageFault;
 using bole::Pose;
 
 namespace
 {
-const std::array<Border, 2> kBorders{Border::left, Border::right};
-
 void check(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high))
@@ -345,82 +341,6 @@ void vpMbTrunkTracker::testTracking()
   if (m_status == Status::tracked || m_status == Status::partly_on_prior)
     return;
   throw vpTrackingException(vpTrackingException::fatalError, fmt::format("{}: {}", toString(m_status), m_message));
-}
-
-void vpMbTrunkTracker::drawBorders(const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam, unsigned int width,
-                                   unsigned int height, bool all, std::vector<std::vector<double>> &lines) const
-{
-  vpMbtDistanceTrunk::Options options = m_options.trunk;
-  options.margin_px = 0;
-  if (all)
-    options.min_length_px = 4, options.min_width_px = 1;
-  for (const vpMbtDistanceTrunk &own : m_trunks) {
-    vpMbtDistanceTrunk trunk(options);
-    trunk.buildFrom(own.object());
-    trunk.setCameraParameters(cam);
-    trunk.predict(cMo, width, height);
-    for (Border side : kBorders)
-      if (trunk.border(side).visible) {
-        const bole::VisibleBorder &line = trunk.border(side).line;
-        lines.push_back({0, line.foot_px.y(), line.foot_px.x(), line.top_px.y(), line.top_px.x()});
-      }
-  }
-}
-
-std::vector<std::vector<double>> vpMbTrunkTracker::getModelForDisplay(unsigned int width, unsigned int height,
-                                                                      const vpHomogeneousMatrix &cMo,
-                                                                      const vpCameraParameters &cam,
-                                                                      bool displayFullModel)
-{
-  std::vector<std::vector<double>> lines;
-  drawBorders(cMo, cam, width, height, displayFullModel, lines);
-  return lines;
-}
-
-std::vector<std::vector<double>> vpMbTrunkTracker::getFeaturesForDisplay()
-{
-  std::vector<std::vector<double>> features;
-  unsigned int at = 0;
-  for (std::size_t k : m_in_view)
-    for (Border side : kBorders) {
-      const auto &state = m_trunks[k].border(side);
-      if (!state.visible)
-        continue;
-      for (const auto &piece : state.pieces)
-        if (piece.used) {
-          features.push_back({0, piece.found_px.y(), piece.found_px.x(), m_w[at] > 0.3 ? 0.0 : 3.0});
-          ++at;
-        }
-    }
-  return features;
-}
-
-namespace
-{
-template <class Image>
-void draw(const Image &I, const std::vector<std::vector<double>> &lines, const std::vector<std::vector<double>> &features,
-          const vpColor &colour, unsigned int thickness)
-{
-  for (const auto &l : lines)
-    vpDisplay::displayLine(I, vpImagePoint(l[1], l[2]), vpImagePoint(l[3], l[4]), colour, thickness);
-  for (const auto &f : features)
-    vpDisplay::displayCross(I, vpImagePoint(f[1], f[2]), 5, f[3] > 0 ? vpColor::red : vpColor::green, 1);
-}
-} // namespace
-
-void vpMbTrunkTracker::display(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cMo,
-                               const vpCameraParameters &cam, const vpColor &col, unsigned int thickness,
-                               bool displayFullModel)
-{
-  draw(I, getModelForDisplay(I.getWidth(), I.getHeight(), cMo, cam, displayFullModel),
-       displayFeatures ? getFeaturesForDisplay() : std::vector<std::vector<double>>(), col, thickness);
-}
-
-void vpMbTrunkTracker::display(const vpImage<vpRGBa> &I, const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam,
-                               const vpColor &col, unsigned int thickness, bool displayFullModel)
-{
-  draw(I, getModelForDisplay(I.getWidth(), I.getHeight(), cMo, cam, displayFullModel),
-       displayFeatures ? getFeaturesForDisplay() : std::vector<std::vector<double>>(), col, thickness);
 }
 
 void vpMbTrunkTracker::initCylinder(const vpPoint &p1, const vpPoint &p2, double radius, int, const std::string &name)
