@@ -179,6 +179,7 @@ bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
     const MapTrunk &rival = m_trunks[i];
     return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
            rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
+           (margin > 0 || evidence(rival) >= m_options.confirm_evidence) &&
            advantage(rival, trunk) > margin;
   });
 }

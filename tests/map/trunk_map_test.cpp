@@ -58,6 +58,22 @@ protected:
 };
 } // namespace
 
+TEST_F(Life, AReadingThatCouldNotBeConfirmedItselfKeepsNoOtherBack)
+{
+  const auto seenWith = [this](MapTrunk &trunk, double least) { // the worst innovation that leaves so much evidence
+    see(trunk, 20);
+    for (trunk.innovation2 = 9; m_map.evidence(trunk) < least && trunk.innovation2 > 0;)
+      trunk.innovation2 -= 0.005;
+    EXPECT_GT(trunk.innovation2, 0);
+  };
+  MapTrunk &narrow = add(trunkAt(3, 1, 0.15)), &wide = add(trunkAt(3, 1, 0.22));
+  seenWith(narrow, m_options.confirm_evidence + 0.2);
+  seenWith(wide, m_options.confirm_evidence - 0.2); // and holds the other, which speaks for it by 1
+  m_map.review();
+  EXPECT_EQ(narrow.status, TrunkStatus::confirmed);
+  EXPECT_NE(wide.status, TrunkStatus::confirmed);
+}
+
 TEST_F(Life, WithoutParallaxATrunkEarnsItsPlaceByEvenBordersAlone)
 {
   MapTrunk &even = add(trunkAt(5, 0)), &uneven = add(trunkAt(5, 3)), &faint = add(trunkAt(5, -3));
