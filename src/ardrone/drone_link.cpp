@@ -144,11 +144,15 @@ struct DroneLink::State
   /// A picture that stays while the body moves is no picture of now.
   void checkFrozen(LiveFrame &frame) const
   {
-    if (frame.status != FrameStatus::ok || !frame.unchanged_since_ns || !frame.body)
+    if (frame.status != FrameStatus::ok || !frame.unchanged_since_ns ||
+        counters.navdata_packets == 0)
       return;
     const auto then = odometry.at(videoToNavdata(*frame.unchanged_since_ns));
-    if (!then)
+    if (!frame.body || !then) {
+      frame.status = FrameStatus::stale;
+      frame.message = "the picture stays, and no navdata say whether the body does";
       return;
+    }
     const Vector6d moved = frame.body->wMb.minus(then->wMb);
     if (moved.head<3>().norm() > options.frozen_m || moved.tail<3>().norm() > options.frozen_rad) {
       frame.status = FrameStatus::stale;
