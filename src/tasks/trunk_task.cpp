@@ -16,6 +16,9 @@ constexpr double kFirstDrift = 0.3;     ///< standard deviation of the velocity 
 constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
 constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
+constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
+constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
+constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
 } // namespace
 
@@ -145,27 +148,25 @@ void TrunkTask::desire(double radius)
   m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
 }
 
-/// The trunk as seen from here may be wider or narrower than in the map, which has it from all sides.
-void TrunkTask::weighRadius(const FrameResult &result, const MapTrunk &trunk)
-{
-  const TrackedTrunk *tracked = trackedTrunk(result, m_target);
-  const RelativeTrunk by_map = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
-  if (!tracked || !tracked->relative.isFinite() || !by_map.isFinite() || m_rests)
-    return;
-  const double seen = trunk.trunk.log_radius + tracked->relative.log_ratio - by_map.log_ratio;
-  m_log_radius = m_has_feature ? m_log_radius + kRadiusWeight * (seen - m_log_radius) : seen;
-}
-
-/// As tracked in this image; where it was missed, and for the distance while it sways, as the map has it: pose and place
-/// in it rest on all images.
-RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk) const
+/// As tracked in this image; where it was missed or its width misread, and for the distance while it sways, as the map
+/// has it: pose and place in it rest on all images. The trunk as seen from here may be wider or narrower than in the
+/// map, which has it from all sides: m_log_radius.
+RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
 {
   RelativeTrunk seen = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
-  if (const TrackedTrunk *tracked = trackedTrunk(result, m_target)) {
-    seen.cRt = tracked->relative.cRt;
-    if (m_options.ratio > 0 || m_rests)
-      seen.log_ratio = tracked->relative.log_ratio;
-  }
+  const TrackedTrunk *tracked = trackedTrunk(result, m_target);
+  if (!tracked || !seen.isFinite() || !tracked->relative.isFinite())
+    return seen;
+  seen.cRt = tracked->relative.cRt;
+  const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
+  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisread;
+  m_misread = is_misread ? m_misread + 1 : 0;
+  if (!m_has_feature || (m_misread > kBelieved && !m_rests)) // it does look like that from here
+    m_log_radius = radius;
+  else if (!is_misread && !m_rests)
+    m_log_radius += kRadiusWeight * (radius - m_log_radius);
+  if (m_options.ratio > 0 || m_rests)
+    seen.log_ratio = is_misread ? seen.log_ratio + m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
   return seen;
 }
 
@@ -193,7 +194,6 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
     return command;
   }
   m_place = trunk->trunk.xy;
-  weighRadius(result, *trunk);
   const RelativeTrunk seen = look(result, *trunk);
   if (!seen.isFinite())
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
@@ -298,7 +298,7 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   against[1] = -besides(1);
   v += m_servo.getTaskJacobianPseudoInverse() * against;
   const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
-  const Eigen::Vector4d velocity(flat.x(), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
+  const Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
   m_response.send(time_s, velocity);
   return velocity;
 }

@@ -85,8 +85,7 @@ private:
   TaskCommand search(const FrameResult &result, const Pipeline &pipeline, double time_s);
   int choose(const Pipeline &pipeline, double elapsed_s) const;
   int successor(const Pipeline &pipeline) const;
-  void weighRadius(const FrameResult &result, const MapTrunk &trunk);
-  RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk) const;
+  RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk);
   void desire(double radius);
   double swayNow(const MapTrunk &trunk, double time_s);
   bool isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const;
@@ -104,7 +103,8 @@ private:
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
   double m_time_s = 0, m_ratio = 0;
-  double m_log_radius = 0; ///< distance in the map times r/d in the image, over the last second
+  double m_log_radius = 0; ///< as seen from here: of distance by the map times r/d in the image, over a second
+  int m_misread = 0;       ///< frames in a row
   double m_sway_start_s = -1; ///< -1: has not begun
   bool m_rests = false;       ///< has swayed enough
   bool m_has_feature = false;
