@@ -17,6 +17,7 @@ constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
 constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
 constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
+constexpr double kMisreadAtRest = 0.05; ///< the same, while nothing moves
 constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
@@ -159,7 +160,7 @@ RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
     return seen;
   seen.cRt = tracked->relative.cRt;
   const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
-  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisread;
+  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > (m_rests ? kMisreadAtRest : kMisread);
   m_misread = is_misread ? m_misread + 1 : 0;
   if (!m_has_feature || (m_misread > kBelieved && !m_rests)) // it does look like that from here
     m_log_radius = radius;
@@ -218,7 +219,7 @@ double TrunkTask::swayNow(const MapTrunk &trunk, double time_s)
   if (m_sway_start_s < 0)
     m_sway_start_s = time_s;
   const double t = time_s - m_sway_start_s, turns = t / m_options.sway_period;
-  const bool is_central = std::abs(std::remainder(turns - 0.25, 0.5)) < 0.03; // comes to rest where it turns
+  const bool is_central = std::abs(std::remainder(turns, 0.5)) < 0.03; // at the height it had, from which it sees best
   m_rests = is_central && (std::sqrt(trunk.covariance(2, 2)) < m_options.radius_sigma || t > m_options.sway_s);
   return m_rests ? 0 : std::cos(2 * M_PI * turns);
 }
