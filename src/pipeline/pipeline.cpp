@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -83,7 +84,7 @@ FrameResult Pipeline::process(const Frame &frame)
     keepView(frame, std::move(gradient));
     detectNew(result);
     lap("detection");
-    reviewMap();
+    reviewMap(time_s);
     reviewScale(0.1, false);
     lap("map");
   }
@@ -430,9 +431,10 @@ void Pipeline::adopt(const Detection &detection)
   trunk.innovation2 = seen.empty() ? 9 : sum / static_cast<double>(seen.size());
 }
 
-void Pipeline::reviewMap()
+void Pipeline::reviewMap(double time_s)
 {
-  refreshMap();
+  constexpr double kLately_s = 1;
+  refreshMap(time_s - kLately_s);
   for (const MapChange &change : m_map.review(!isTurning())) {
     const MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(change.id)];
     if (trunk.removed && m_smoother.hasTrunk(trunk.smoother_id))
@@ -440,12 +442,15 @@ void Pipeline::reviewMap()
   }
 }
 
-void Pipeline::refreshMap()
+/// Covariances are asked for where something was seen lately: that of a trunk left behind hardly changes, and costs a walk
+/// back to where it stood.
+void Pipeline::refreshMap(double seen_since_s)
 {
   for (const std::size_t i : m_map.active()) {
     MapTrunk &trunk = m_map.trunks()[i];
     trunk.trunk = m_smoother.trunk(trunk.smoother_id);
-    trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+    if (trunk.last_seen_s >= seen_since_s)
+      trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
   }
 }
 
@@ -470,7 +475,7 @@ void Pipeline::finish()
   if (m_smoother.poseCount() == 0)
     return;
   m_smoother.optimize();
-  refreshMap();
+  refreshMap(-std::numeric_limits<double>::infinity());
   reviewScale(0, true);
 }
 

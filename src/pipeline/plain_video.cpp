@@ -3,6 +3,7 @@
 #include <bole/pipeline/pipeline.h>
 
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -94,7 +95,7 @@ void Pipeline::rescale(double factor)
       trunk.covariance.leftCols<2>() *= factor;
     }
   }
-  refreshMap();
+  refreshMap(-std::numeric_limits<double>::infinity());
   for (StampedPose &pose : m_online)
     pose.wMb.t *= factor;
   if (m_ground_z)

@@ -85,7 +85,7 @@ public:
   Graph graph() const { return m_smoother.graph(); }
   const Smoother &smoother() const { return m_smoother; }
   /// Trunk record fields that need the smoother are refreshed from it; called by process() and finish().
-  void refreshMap();
+  void refreshMap(double seen_since_s);
 
 private:
   struct View ///< a frame of the detector's window
@@ -129,7 +129,7 @@ private:
   void adopt(const Detection &detection);
   void adopt(const LineDetection &detection);
   std::vector<InhibitedRange> inhibited(bool by_candidates) const;
-  void reviewMap();
+  void reviewMap(double time_s);
   Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }
 
   PinholeCamera m_camera;
