@@ -49,10 +49,10 @@ std::size_t Smoother::State::newPose(const Pose &point)
   pose.point = point;
   pose.point.t += shiftOfPoint(static_cast<int>(poses.size()) - 1);
   variable.delta = point.minus(pose.point);
-  rememberProbe(variable);
   pose.variable = static_cast<int>(variables.size());
   variables.push_back(std::move(variable));
   poses.push_back(pose);
+  rememberProbe(variables[pose.variable]);
   touch(pose.variable);
   return poses.size() - 1;
 }
@@ -70,7 +70,8 @@ std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prio
   reopenTrunk(static_cast<int>(trunks.size()) - 1);
   Variable &variable = variables[trunks.back().variable];
   variable.delta.head<5>() = point.minus(trunks.back().point);
-  rememberProbe(variable);
+  if (!poses.empty())
+    rememberProbe(variable);
   return trunks.size() - 1;
 }
 
