@@ -23,6 +23,15 @@ inline PointMotionOptions withoutOdometry()
   return options;
 }
 
+/// More iterations a frame than the smoother takes by itself: what the detector and the map choose rests on where the
+/// trunks stand now, and a flight has few poses against those the smoother is made for.
+inline SmootherOptions closeToTheOptimum()
+{
+  SmootherOptions options;
+  options.max_iterations = 4;
+  return options;
+}
+
 /// What belongs to no single stage.
 struct FlowOptions
 {
@@ -55,7 +64,7 @@ struct PipelineOptions
   DetectorOptions detection;
   LineDetectorOptions lines;
   TrackingOptions tracking;
-  SmootherOptions smoothing;
+  SmootherOptions smoothing = closeToTheOptimum();
   MapOptions map;
 
   void validate() const;
