@@ -131,7 +131,7 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
   std::sort(pairs.begin(), pairs.end(), [&](const auto &a, const auto &b) { return score(a) > score(b); });
   std::vector<LineDetection> found;
   std::vector<InhibitedRange> taken;
-  const double margin = 2 / camera.fx;
+  const double margin = is_split ? 0 : 2 / camera.fx;
   for (const auto &[left, right] : pairs) {
     if (std::any_of(taken.begin(), taken.end(), [&, l = left, r = right](const InhibitedRange &range) {
           return l.q > range.q_right - margin && r.q < range.q_left + margin; // a border belongs to one trunk
