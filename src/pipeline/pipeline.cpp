@@ -99,8 +99,13 @@ void Pipeline::addPose(const Frame &frame, const GyroBias &bias, FrameResult &re
   if (m_smoother.poseCount() == 0) {
     if (frame.wMb_odometry)
       m_ground_z = 0;
-    else if (m_options.flow.use_points)
+    else if (m_options.flow.use_points) {
       m_visual.emplace(m_camera, m_bMc, m_options.visual);
+      // no pose filter holds the path: what a false trunk pulls before it is given up is kept short
+      SmootherOptions options = m_smoother.options();
+      options.max_iterations = std::min(options.max_iterations, SmootherOptions().max_iterations);
+      m_smoother = Smoother(options);
+    }
     const PosePrior first = m_visual ? m_visual->first(frame, m_points.tracker()) : m_motion.first(frame);
     m_smoother.addFirstPose(first.mean, first.covariance);
     m_smoother.update();
