@@ -197,6 +197,7 @@ private:
   void predictTrunks(const vpImage<unsigned char> &I);
   void scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px);
   static std::vector<float> response(const vpMbtDistanceTrunk::BorderState &state);
+  Eigen::Matrix<double, 1, 6> rowAtMiddle(const vpMbtDistanceTrunk &trunk, bole::Border side) const;
   Vector6d agree(const Matrix6d &covariance);
   Matrix6d estimatedInObject() const;
   Vector6d estimated(const Vector6d &xi) const;

@@ -95,14 +95,21 @@ void vpMbTrunkTracker::predictTrunks(const vpImage<unsigned char> &I)
   m_in_view.erase(std::remove_if(m_in_view.begin(), m_in_view.end(), gone), m_in_view.end());
 }
 
-double vpMbTrunkTracker::expectedSigma(const vpMbtDistanceTrunk &trunk, Border side, const Matrix6d &covariance) const
+/// How far [px] a twist of the camera moves a border sideways at its middle.
+Eigen::Matrix<double, 1, 6> vpMbTrunkTracker::rowAtMiddle(const vpMbtDistanceTrunk &trunk, Border side) const
 {
   const Eigen::Vector2d middle = trunk.border(side).line.at(0.5);
-  const Vector3d m((middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1);
   Eigen::Matrix<double, 1, 6> row;
-  vpMbtDistanceTrunk::residual(trunk.inCamera(), side, m, &row);
-  const double pose = focal() * focal() * (row * covariance * row.transpose())(0);
-  return std::sqrt(pose + m_options.border_sigma_px * m_options.border_sigma_px);
+  vpMbtDistanceTrunk::residual(
+      trunk.inCamera(), side,
+      {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
+  return -focal() * row;
+}
+
+double vpMbTrunkTracker::expectedSigma(const vpMbtDistanceTrunk &trunk, Border side, const Matrix6d &covariance) const
+{
+  const Eigen::Matrix<double, 1, 6> row = rowAtMiddle(trunk, side);
+  return std::sqrt((row * covariance * row.transpose())(0) + m_options.border_sigma_px * m_options.border_sigma_px);
 }
 
 void vpMbTrunkTracker::scanTrunks(const vpImage<unsigned char> &I, const Matrix6d &covariance, double max_half_px)
@@ -142,17 +149,12 @@ std::vector<float> vpMbTrunkTracker::response(const vpMbtDistanceTrunk::BorderSt
 Vector6d vpMbTrunkTracker::agree(const Matrix6d &covariance)
 {
   std::vector<bole::BallotBorder> borders;
-  Eigen::Matrix<double, 1, 6> row;
   for (std::size_t k : m_in_view)
     for (Border side : kBorders) {
       const auto &state = m_trunks[k].border(side);
       if (!state.visible)
         continue;
-      const Eigen::Vector2d middle = state.line.at(0.5);
-      vpMbtDistanceTrunk::residual(
-          m_trunks[k].inCamera(), side,
-          {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
-      borders.push_back({-focal() * row, response(state)});
+      borders.push_back({rowAtMiddle(m_trunks[k], side), response(state)});
     }
   m_vote = bole::vote(borders, covariance, m_options.vote);
   return estimated(m_vote.twist);
@@ -160,17 +162,12 @@ Vector6d vpMbTrunkTracker::agree(const Matrix6d &covariance)
 
 void vpMbTrunkTracker::choosePeaks(const Vector6d &twist, double sigma_px, double reach_px)
 {
-  Eigen::Matrix<double, 1, 6> row;
   for (std::size_t k : m_in_view)
     for (Border side : kBorders) {
       const auto &state = m_trunks[k].border(side);
       if (!state.visible)
         continue;
-      const Eigen::Vector2d middle = state.line.at(0.5);
-      vpMbtDistanceTrunk::residual(
-          m_trunks[k].inCamera(), side,
-          {(middle.x() - m_cam.get_u0()) / m_cam.get_px(), (middle.y() - m_cam.get_v0()) / m_cam.get_py(), 1}, &row);
-      const double expected = -focal() * (row * twist)(0);
+      const double expected = (rowAtMiddle(m_trunks[k], side) * twist)(0);
       const bool signs = state.remembered_frames >= 2;
       double reference = state.remembered_contrast;
       if (!signs)
