@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What each step of the pipeline gives: a Markdown table of recall, precision and errors with one step taken away at a
 // time. Usage: benchmark_ablation SEQUENCE... (folders with truth; the rendered flights where none is given).
+#include "support/rendered_flights.h"
+
 #include <bole/input/asl_source.h>
 #include <bole/output/evaluation.h>
 #include <bole/output/trajectory_writer.h>
@@ -85,12 +87,8 @@ void print(const std::string &sequence)
 
 int main(int argc, char **argv)
 {
-  std::vector<std::string> sequences(argv + 1, argv + argc);
-  if (sequences.empty())
-    for (const char *name : {"park-forward", "winter-weave", "pine-arc"})
-      sequences.push_back(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
   try {
-    for (const std::string &sequence : sequences)
+    for (const std::string &sequence : bole::test::flightsOf(argc, argv))
       print(sequence);
   }
   catch (const std::exception &error) {

@@ -2,6 +2,8 @@
 // Does a trunk that was hidden for 3 s come back under its old id? Each confirmed trunk that is in view for longer than
 // that is painted over, row by row from its left side to its right, as if a bush had come before it, from three frames
 // after its confirmation on. Usage: benchmark_reidentification SEQUENCE... (the rendered flights where none is given).
+#include "support/rendered_flights.h"
+
 #include <bole/geometry/relative_trunk.h>
 #include <bole/input/asl_source.h>
 #include <bole/input/truth.h>
@@ -181,13 +183,9 @@ Counts measure(const std::string &sequence)
 
 int main(int argc, char **argv)
 {
-  std::vector<std::string> sequences(argv + 1, argv + argc);
-  if (sequences.empty())
-    for (const char *name : {"park-forward", "winter-weave", "pine-arc"})
-      sequences.push_back(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
   try {
     Counts all;
-    for (const std::string &sequence : sequences) {
+    for (const std::string &sequence : bole::test::flightsOf(argc, argv)) {
       const Counts counts = measure(sequence);
       all.trials += counts.trials;
       all.same_id += counts.same_id;

@@ -37,3 +37,5 @@ BENCHMARK(renderFrame)
     ->Args({16, 50})
     ->Unit(benchmark::kMillisecond);
 } // namespace
+
+BENCHMARK_MAIN();

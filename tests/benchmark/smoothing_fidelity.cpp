@@ -4,6 +4,8 @@
 // made anew at the same optima from the kept images; and with the images themselves, whose energy,
 // gradient and Hessian are taken again at every view's present relative trunk in each iteration.
 // benchmark_smoothing_fidelity [sequence ...]
+#include "support/rendered_flights.h"
+
 #include <bole/input/open_source.h>
 #include <bole/input/truth.h>
 #include <bole/output/trajectory_metrics.h>
@@ -279,11 +281,7 @@ void printCosts(const Flight &flight)
 
 int main(int argc, char **argv)
 {
-  std::vector<std::string> sequences(argv + 1, argv + argc);
-  if (sequences.empty())
-    for (const char *name : {"park-forward", "winter-weave", "pine-arc"})
-      sequences.push_back(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
-  for (const std::string &sequence : sequences) {
+  for (const std::string &sequence : bole::test::flightsOf(argc, argv)) {
     const Flight flight = fly(sequence);
     const Graph &summaries = flight.graph;
     const Graph anew = optimum(expanded(flight, summaries, [&](std::size_t i) {
