@@ -97,7 +97,8 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
   const Pose wMc = cameraAt(pose);
   for (const std::size_t i : m_map.active()) {
     MapTrunk &trunk = m_map.trunks()[i];
-    if (!isTurning() && (trunk.trunk.xy - wMc.t.head<2>()).norm() > m_options.flow.track_range)
+    const double range = (trunk.trunk.xy - wMc.t.head<2>()).norm();
+    if (!isTurning() && range > m_options.flow.track_range)
       continue;
     const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
@@ -117,11 +118,11 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
       const double foreground =
           foregroundBetween(result.saliency->p_background, m_camera, tracked.optimum, prediction.range);
       if (foreground >= 0)
-        m_map.recordForeground(trunk, (trunk.trunk.xy - wMc.t.head<2>()).norm(), foreground);
+        m_map.recordForeground(trunk, range, foreground);
     }
     result.trunks.push_back({trunk.id, trunk.status, tracked.status,
                              tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
-                             isTurning() ? 0 : (trunk.trunk.xy - wMc.t.head<2>()).norm()});
+                             isTurning() ? 0 : range});
   }
 }
 

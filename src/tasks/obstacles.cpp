@@ -21,9 +21,11 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
   for (const MapTrunk &trunk : pipeline.mapTrunks()) {
     const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
     const bool counts = is_confirmed || (trunk.status == TrunkStatus::candidate && trunk.observations >= observations);
+    if (trunk.removed || !counts) // most of a long flight's
+      continue;
     const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
     const double d = w.norm();
-    if (trunk.removed || !counts || d > range || d < 1e-6)
+    if (d > range || d < 1e-6)
       continue;
     const Matrix4d relative = pipeline.smoother().relativeCovariance(trunk.smoother_id);
     const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
