@@ -123,6 +123,7 @@ void addVisual(std::vector<OptionEntry> &entries, VisualOdometryOptions &o)
                                  {"visual.step_scale_sigma", &o.step_scale_sigma},
                                  {"visual.turn_sigma", &o.turn_sigma},
                                  {"visual.still_sigma", &o.still_sigma},
+                                 {"visual.max_iterations", &o.max_iterations},
                                  {"visual.focal_known", &o.focal_known}});
 }
 

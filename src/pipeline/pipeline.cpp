@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/pipeline/pipeline.h>
 
-#include <bole/geometry/so3.h>
-
-#include <Eigen/LU>
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <limits>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -101,9 +96,8 @@ void Pipeline::addPose(const Frame &frame, const GyroBias &bias, FrameResult &re
       m_ground_z = 0;
     else if (m_options.flow.use_points) {
       m_visual.emplace(m_camera, m_bMc, m_options.visual);
-      // no pose filter holds the path: what a false trunk pulls before it is given up is kept short
       SmootherOptions options = m_smoother.options();
-      options.max_iterations = std::min(options.max_iterations, SmootherOptions().max_iterations);
+      options.max_iterations = std::min(options.max_iterations, m_options.visual.max_iterations);
       m_smoother = Smoother(options);
     }
     const PosePrior first = m_visual ? m_visual->first(frame, m_points.tracker()) : m_motion.first(frame);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/pipeline/visual_odometry.h>
 
+#include <bole/geometry/median.h>
+#include <bole/geometry/require_range.h>
 #include <bole/geometry/so3.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -15,19 +16,16 @@ using Eigen::Vector3d;
 
 void VisualOdometryOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("visual.camera_height", camera_height, 0, 100);
-  require("visual.camera_height_sigma", camera_height_sigma, 1e-3, 1);
-  require("visual.start_height", start_height, 0.1, 100);
-  require("visual.start_depth", start_depth, 0.5, 1000);
-  require("visual.start_sigma", start_sigma, 0.05, 5);
-  require("visual.step_sigma", step_sigma, 1e-5, 1);
-  require("visual.step_scale_sigma", step_scale_sigma, 0, 1);
-  require("visual.turn_sigma", turn_sigma, 1e-6, 1);
-  require("visual.still_sigma", still_sigma, 1e-4, 10);
+  requireRange("visual.camera_height", camera_height, 0, 100);
+  requireRange("visual.camera_height_sigma", camera_height_sigma, 1e-3, 1);
+  requireRange("visual.start_height", start_height, 0.1, 100);
+  requireRange("visual.start_depth", start_depth, 0.5, 1000);
+  requireRange("visual.start_sigma", start_sigma, 0.05, 5);
+  requireRange("visual.step_sigma", step_sigma, 1e-5, 1);
+  requireRange("visual.step_scale_sigma", step_scale_sigma, 0, 1);
+  requireRange("visual.turn_sigma", turn_sigma, 1e-6, 1);
+  requireRange("visual.still_sigma", still_sigma, 1e-4, 10);
+  requireRange("visual.max_iterations", max_iterations, 1, 100);
 }
 
 namespace
@@ -58,11 +56,6 @@ PosePrior tiltPrior(const Pose &wMb, const Vector3d &bup, double sigma)
   return prior;
 }
 
-double medianOf(std::vector<double> values)
-{
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 } // namespace
 
 VisualOdometry::VisualOdometry(const PinholeCamera &camera, const Pose &bMc, const VisualOdometryOptions &options)

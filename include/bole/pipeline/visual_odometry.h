@@ -29,6 +29,8 @@ struct VisualOdometryOptions
   double step_scale_sigma = 0.02;   ///< error of a step in proportion to its length, 0 to 1
   double turn_sigma = 0.0004;       ///< least noise of a turn [rad], 1e-6 to 1
   double still_sigma = 0.03;        ///< of a step before any parallax was seen [m], 1e-4 to 10
+  int max_iterations = 2;           ///< of the smoother a frame, at most: no pose filter holds the path, so what a false
+                                    ///< trunk pulls before it is given up is kept short, 1 to 100
   bool focal_known = true;          ///< false: a guess, so a sideways flight needs better proof against a pan
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
