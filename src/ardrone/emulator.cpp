@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/ardrone/emulator.h>
 
+#include <bole/geometry/require_range.h>
+
 #include "emulator_packets.h"
 #include "emulator_wire.h"
 
@@ -10,7 +12,6 @@
 #include <mutex>
 #include <random>
 #include <thread>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -272,20 +273,15 @@ struct ArDroneEmulator::State
 
 void ArDroneEmulator::Options::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low,
-                        high);
-  };
-  require("speed", speed, 1, 20);
-  require("bit_rate", bit_rate, 1e4, 1e8);
-  require("key_interval", key_interval, 1, 300);
-  require("loss", loss, 0, 0.99);
-  require("jitter_s", jitter_s, 0, 1);
-  require("corrupt", corrupt, 0, 0.99);
-  require("reboot_for_s", reboot_for_s, 0, 60);
-  require("freeze_for_s", freeze_for_s, 0, 3600);
-  require("stall_for_s", stall_for_s, 0, 3600);
+  requireRange("speed", speed, 1, 20);
+  requireRange("bit_rate", bit_rate, 1e4, 1e8);
+  requireRange("key_interval", key_interval, 1, 300);
+  requireRange("loss", loss, 0, 0.99);
+  requireRange("jitter_s", jitter_s, 0, 1);
+  requireRange("corrupt", corrupt, 0, 0.99);
+  requireRange("reboot_for_s", reboot_for_s, 0, 60);
+  requireRange("freeze_for_s", freeze_for_s, 0, 3600);
+  requireRange("stall_for_s", stall_for_s, 0, 3600);
 }
 
 ArDroneEmulator::ArDroneEmulator(std::unique_ptr<PacketFeed> feed, const Options &options)

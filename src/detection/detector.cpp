@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/detection/detector.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -16,24 +17,20 @@ using Eigen::Vector3d;
 
 void DetectorOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("detection.window", window, 4, 100);
-  require("detection.range_min", range_min, 0.3, 5);
-  require("detection.range_max", range_max, 2, 50);
-  require("detection.radius_min", radius_min, 0.005, 2);
-  require("detection.radius_max", radius_max, radius_min, 5);
-  require("detection.agreement_min", agreement_min, 0, 1);
-  require("detection.inliers_min", inliers_min, 0, 1);
-  require("detection.inlier_px", inlier_px, 0.5, 20);
-  require("detection.rms_max_px", rms_max_px, 0.1, 20);
-  require("detection.parallax_min", parallax_min, 0, 1);
-  require("detection.range_sigma_max", range_sigma_max, 0.01, 1);
-  require("detection.views_min", views_min, 2, 100);
-  require("detection.near_range", near_range, 0, 100);
-  require("detection.foreground_min", foreground_min, 0, 1);
+  requireRange("detection.window", window, 4, 100);
+  requireRange("detection.range_min", range_min, 0.3, 5);
+  requireRange("detection.range_max", range_max, 2, 50);
+  requireRange("detection.radius_min", radius_min, 0.005, 2);
+  requireRange("detection.radius_max", radius_max, radius_min, 5);
+  requireRange("detection.agreement_min", agreement_min, 0, 1);
+  requireRange("detection.inliers_min", inliers_min, 0, 1);
+  requireRange("detection.inlier_px", inlier_px, 0.5, 20);
+  requireRange("detection.rms_max_px", rms_max_px, 0.1, 20);
+  requireRange("detection.parallax_min", parallax_min, 0, 1);
+  requireRange("detection.range_sigma_max", range_sigma_max, 0.01, 1);
+  requireRange("detection.views_min", views_min, 2, 100);
+  requireRange("detection.near_range", near_range, 0, 100);
+  requireRange("detection.foreground_min", foreground_min, 0, 1);
 }
 
 namespace

@@ -1,29 +1,26 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/detection/line_detector.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 void LineDetectorOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("lines.border_a", border_a, -1e4, 0);
-  require("lines.border_b", border_b, -100, 100);
-  require("lines.foreground_a", foreground_a, -1e3, 0);
-  require("lines.foreground_b", foreground_b, -100, 100);
-  require("lines.inhibition_px", inhibition_px, 0.5, 100);
-  require("lines.threshold", threshold, 0, 1);
-  require("lines.turning_threshold", turning_threshold, 0, 1);
-  require("lines.width_min_px", width_min_px, 2, 1000);
-  require("lines.width_max_px", width_max_px, width_min_px, 5000);
+  requireRange("lines.border_a", border_a, -1e4, 0);
+  requireRange("lines.border_b", border_b, -100, 100);
+  requireRange("lines.foreground_a", foreground_a, -1e3, 0);
+  requireRange("lines.foreground_b", foreground_b, -100, 100);
+  requireRange("lines.inhibition_px", inhibition_px, 0.5, 100);
+  requireRange("lines.threshold", threshold, 0, 1);
+  requireRange("lines.turning_threshold", turning_threshold, 0, 1);
+  requireRange("lines.width_min_px", width_min_px, 2, 1000);
+  requireRange("lines.width_max_px", width_max_px, width_min_px, 5000);
 }
 
 namespace

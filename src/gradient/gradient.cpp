@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/gradient/gradient.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <opencv2/imgproc.hpp>
 #include <string>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -27,11 +28,6 @@ cv::Mat derivativeKernel(double sigma, int radius)
   return kernel / ramp;
 }
 
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-}
 } // namespace
 
 void GradientOptions::validate() const

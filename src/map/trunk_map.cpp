@@ -1,35 +1,32 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/map/trunk_map.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 void MapOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("map.confirm_observations", confirm_observations, 2, 1000);
-  require("map.confirm_predicted", confirm_predicted, 0, 1000);
-  require("map.confirm_parallax", confirm_parallax, 0, 1);
-  require("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
-  require("map.confirm_evidence", confirm_evidence, -20, 20);
-  require("map.turning_evenness", turning_evenness, 0, 1);
-  require("map.turning_contrast", turning_contrast, 0, 0.5);
-  require("map.doubt_observations", doubt_observations, 3, 1000);
-  require("map.doubt_candidate", doubt_candidate, -50, 0);
-  require("map.doubt_confirmed", doubt_confirmed, -50, 0);
-  require("map.doubt_rival", doubt_rival, 0, 50);
-  require("map.near_range", near_range, 0, 100);
-  require("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
-  require("map.usual_radius", usual_radius, 0.001, 10);
-  require("map.lost_misses", lost_misses, 1, 1000);
-  require("map.radius_min", radius_min, 0.001, 10);
-  require("map.radius_max", radius_max, radius_min, 10);
+  requireRange("map.confirm_observations", confirm_observations, 2, 1000);
+  requireRange("map.confirm_predicted", confirm_predicted, 0, 1000);
+  requireRange("map.confirm_parallax", confirm_parallax, 0, 1);
+  requireRange("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
+  requireRange("map.confirm_evidence", confirm_evidence, -20, 20);
+  requireRange("map.turning_evenness", turning_evenness, 0, 1);
+  requireRange("map.turning_contrast", turning_contrast, 0, 0.5);
+  requireRange("map.doubt_observations", doubt_observations, 3, 1000);
+  requireRange("map.doubt_candidate", doubt_candidate, -50, 0);
+  requireRange("map.doubt_confirmed", doubt_confirmed, -50, 0);
+  requireRange("map.doubt_rival", doubt_rival, 0, 50);
+  requireRange("map.near_range", near_range, 0, 100);
+  requireRange("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
+  requireRange("map.usual_radius", usual_radius, 0.001, 10);
+  requireRange("map.lost_misses", lost_misses, 1, 1000);
+  requireRange("map.radius_min", radius_min, 0.001, 10);
+  requireRange("map.radius_max", radius_max, radius_min, 10);
 }
 
 TrunkMap::TrunkMap(const MapOptions &options) : m_options(options) { m_options.validate(); }

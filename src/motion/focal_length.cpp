@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/motion/focal_length.h>
 
+#include <bole/geometry/median.h>
+
 #include "epipolar.h"
 #include "require.h"
 
@@ -16,13 +18,6 @@ constexpr double kRange = 1.5, kStep = 0.1; // of the log of the factor
 constexpr int kSteps = 31;
 
 double logFactor(double step) { return -kRange + kStep * step; }
-
-double medianOf(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double medianFlow_px(const std::vector<PointMatch> &matches)
 {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/motion/point_odometry.h>
 
+#include <bole/geometry/median.h>
+
 #include "bundle.h"
 #include "epipolar.h"
 #include "require.h"
@@ -56,16 +58,6 @@ constexpr double kHeldSigma =
 // points nearer and the unit of length drifted by 40 % over pine-arc, at ten times by 2 %.
 constexpr double kDepthPrior = 10;
 constexpr double kRestSigma = 1e-2;
-
-double medianOf(std::vector<double> values)
-{
-  if (values.empty()) {
-    return 0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 } // namespace
 
 struct PointOdometry::State

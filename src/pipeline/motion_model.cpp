@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/pipeline/motion_model.h>
 
+#include <bole/geometry/require_range.h>
 #include <bole/geometry/so3.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -14,20 +14,16 @@ using Eigen::Vector3d;
 
 void MotionModelOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("motion.step_sigma", step_sigma, 1e-4, 1);
-  require("motion.step_scale_sigma", step_scale_sigma, 0, 1);
-  require("motion.scale_sigma", scale_sigma, 0, 1);
-  require("motion.step_sigma_vertical", step_sigma_vertical, 1e-4, 1);
-  require("motion.height_sigma", height_sigma, 1e-3, 10);
-  require("motion.tilt_sigma", tilt_sigma, 1e-4, 1);
-  require("motion.turn_sigma", turn_sigma, 1e-5, 1);
-  require("motion.gyro_turn_sigma", gyro_turn_sigma, 1e-6, 1);
-  require("motion.free_step_sigma", free_step_sigma, 1e-3, 10);
-  require("motion.free_turn_sigma", free_turn_sigma, 1e-4, 1);
+  requireRange("motion.step_sigma", step_sigma, 1e-4, 1);
+  requireRange("motion.step_scale_sigma", step_scale_sigma, 0, 1);
+  requireRange("motion.scale_sigma", scale_sigma, 0, 1);
+  requireRange("motion.step_sigma_vertical", step_sigma_vertical, 1e-4, 1);
+  requireRange("motion.height_sigma", height_sigma, 1e-3, 10);
+  requireRange("motion.tilt_sigma", tilt_sigma, 1e-4, 1);
+  requireRange("motion.turn_sigma", turn_sigma, 1e-5, 1);
+  requireRange("motion.gyro_turn_sigma", gyro_turn_sigma, 1e-6, 1);
+  requireRange("motion.free_step_sigma", free_step_sigma, 1e-3, 10);
+  requireRange("motion.free_turn_sigma", free_turn_sigma, 1e-4, 1);
 }
 
 namespace

@@ -1,25 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/pipeline/options.h>
 
-#include <visp3/core/vpException.h>
+#include <bole/geometry/require_range.h>
+
 
 namespace bole
 {
 void FlowOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("flow.adopt_most", adopt_most, 1, 100);
-  require("flow.detect_every", detect_every, 1, 100);
-  require("flow.view_spacing", view_spacing, 0, 1);
-  require("flow.trunk_low", trunk_low, 0, 5);
-  require("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
-  require("flow.track_range", track_range, 1, 100);
-  require("flow.gate", gate, 1, 100);
-  require("flow.contrast_noise", contrast_noise, 0, 0.5);
-  require("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
+  requireRange("flow.adopt_most", adopt_most, 1, 100);
+  requireRange("flow.detect_every", detect_every, 1, 100);
+  requireRange("flow.view_spacing", view_spacing, 0, 1);
+  requireRange("flow.trunk_low", trunk_low, 0, 5);
+  requireRange("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
+  requireRange("flow.track_range", track_range, 1, 100);
+  requireRange("flow.gate", gate, 1, 100);
+  requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
+  requireRange("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
 }
 
 void PipelineOptions::validate() const

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/geometry/body_velocity.h>
+#include <bole/geometry/require_range.h>
 #include <bole/geometry/so3.h>
 #include <bole/input/camera_file.h>
 #include <bole/simulation/h264_link.h>
@@ -15,12 +16,6 @@ namespace
 {
 constexpr double kTick = 0.005;        ///< of the gyro and of the motion [s]
 constexpr int kTicksPerCommand = 6;    ///< the velocity loop, as vpRobotArDrone's
-
-void require(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-}
 
 std::int64_t nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
 } // namespace
@@ -135,16 +130,16 @@ void vpSimulatorArDrone::Options::setSeed(std::uint64_t seed)
 
 void vpSimulatorArDrone::Options::validate() const
 {
-  require("hover_after_s", hover_after_s, 0.05, 2);
-  require("land_after_s", land_after_s, hover_after_s, 60);
-  require("gain", gain, 1e-3, 2);
-  require("largest_share", largest_share, 1e-3, 1);
-  require("largest_climb", largest_climb, 1e-3, 5);
-  require("largest_turn", largest_turn, 1e-3, 7);
-  require("rate_hz", rate_hz, 1, 60);
-  require("exposure_s", exposure_s, 0, 0.1);
-  require("video_delay_s", video_delay_s, 0, 1);
-  require("h264_kbps", h264_kbps, 0, 20000);
+  bole::requireRange("hover_after_s", hover_after_s, 0.05, 2);
+  bole::requireRange("land_after_s", land_after_s, hover_after_s, 60);
+  bole::requireRange("gain", gain, 1e-3, 2);
+  bole::requireRange("largest_share", largest_share, 1e-3, 1);
+  bole::requireRange("largest_climb", largest_climb, 1e-3, 5);
+  bole::requireRange("largest_turn", largest_turn, 1e-3, 7);
+  bole::requireRange("rate_hz", rate_hz, 1, 60);
+  bole::requireRange("exposure_s", exposure_s, 0, 0.1);
+  bole::requireRange("video_delay_s", video_delay_s, 0, 1);
+  bole::requireRange("h264_kbps", h264_kbps, 0, 20000);
   if (renderer.camera.distortion != bole::Distortion::none)
     throw vpException(vpException::badValue, "distortion, must be none: frames are taken as a pinhole's");
   body.validate();
@@ -284,7 +279,7 @@ bole::Pose vpSimulatorArDrone::bMc() const { return m_state->bMc; }
 
 void vpSimulatorArDrone::advance(double seconds)
 {
-  require("seconds", seconds, 0, 3600);
+  bole::requireRange("seconds", seconds, 0, 3600);
   m_state->poseAt(m_state->time() + seconds);
 }
 

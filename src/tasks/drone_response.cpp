@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/drone_response.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 void ResponseOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double high) {
-    if (!(value >= 0 && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [0, %g]", name, value, high);
-  };
-  require("delay", delay, 1);
-  require("speed_lag", speed_lag, 3);
-  require("turn_lag", turn_lag, 3);
+  requireRange("delay", delay, 0, 1);
+  requireRange("speed_lag", speed_lag, 0, 3);
+  requireRange("turn_lag", turn_lag, 0, 3);
 }
 
 DroneResponse::DroneResponse(const ResponseOptions &options) : m_options(options) { m_options.validate(); }

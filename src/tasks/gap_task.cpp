@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/gap_task.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -42,20 +43,16 @@ bool isFree(const Gap &gap, const std::vector<Obstacle> &trunks, const Eigen::Ve
 
 void GapTaskOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("width_min", width_min, 0.3, 5);
-  require("width_max", width_max, width_min, 20);
-  require("range", range, 1, 20);
-  require("evidence", evidence, -20, 20);
-  require("angle", angle, 0.05, 0.7);
-  require("body_radius", body_radius, 0.05, 2);
-  require("entry", entry, 0.3, 5);
-  require("beyond", beyond, 0.3, 5);
-  require("speed", speed, 0.05, 3);
-  require("search_s", search_s, 1, 600);
+  requireRange("width_min", width_min, 0.3, 5);
+  requireRange("width_max", width_max, width_min, 20);
+  requireRange("range", range, 1, 20);
+  requireRange("evidence", evidence, -20, 20);
+  requireRange("angle", angle, 0.05, 0.7);
+  requireRange("body_radius", body_radius, 0.05, 2);
+  requireRange("entry", entry, 0.3, 5);
+  requireRange("beyond", beyond, 0.3, 5);
+  requireRange("speed", speed, 0.05, 3);
+  requireRange("search_s", search_s, 1, 600);
   safety.validate();
 }
 

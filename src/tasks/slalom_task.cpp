@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/slalom_task.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -58,22 +59,18 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState sta
 
 void SlalomTaskOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("length", length, 1, 1000);
-  require("speed", speed, 0.1, 3);
-  require("sideways", sideways, 0.1, 3);
-  require("swing", swing, 0, 3);
-  require("wave_length", wave_length, 2, 50);
-  require("reach", reach, 0.5, 10);
-  require("body_radius", body_radius, 0.05, 2);
-  require("margin", margin, 0, 3);
-  require("sigmas", sigmas, 0, 5);
-  require("views", views, 1, 1000);
-  require("horizon", horizon, 1, 20);
-  require("lag", lag, 0.05, 3);
+  requireRange("length", length, 1, 1000);
+  requireRange("speed", speed, 0.1, 3);
+  requireRange("sideways", sideways, 0.1, 3);
+  requireRange("swing", swing, 0, 3);
+  requireRange("wave_length", wave_length, 2, 50);
+  requireRange("reach", reach, 0.5, 10);
+  requireRange("body_radius", body_radius, 0.05, 2);
+  requireRange("margin", margin, 0, 3);
+  requireRange("sigmas", sigmas, 0, 5);
+  requireRange("views", views, 1, 1000);
+  requireRange("horizon", horizon, 1, 20);
+  requireRange("lag", lag, 0.05, 3);
   safety.validate();
 }
 

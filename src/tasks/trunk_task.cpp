@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/obstacles.h>
+#include <bole/geometry/require_range.h>
 #include <bole/tasks/trunk_task.h>
 
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -25,30 +25,26 @@ constexpr double kLargestTurn = 0.8;    ///< [rad/s]
 
 void TrunkTaskOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("ratio", ratio, 0, 0.5);
-  require("distance", distance, 0.5, 20);
-  require("bearing", bearing, -0.5, 0.5);
-  require("speed", speed, -2, 2);
-  require("gain", gain, 0.05, 3);
-  require("bearing_noise", bearing_noise, 1e-5, 0.1);
-  require("ratio_noise", ratio_noise, 1e-5, 0.5);
-  require("unrest", unrest, 1e-3, 2);
-  require("largest_speed", largest_speed, 0.05, 3);
-  require("sway", sway, 0, 2);
-  require("sway_climb", sway_climb, 0, 1);
-  require("sway_period", sway_period, 1, 60);
-  require("sway_s", sway_s, 0, 600);
-  require("radius_sigma", radius_sigma, 1e-3, 1);
-  require("free_way", free_way, 0, 5);
-  require("choice_evidence", choice_evidence, -20, 20);
-  require("choice_angle", choice_angle, 0.02, 0.6);
-  require("choice_range", choice_range, 1, 20);
-  require("choice_views", choice_views, 1, 1000);
-  require("search_s", search_s, 1, 600);
+  requireRange("ratio", ratio, 0, 0.5);
+  requireRange("distance", distance, 0.5, 20);
+  requireRange("bearing", bearing, -0.5, 0.5);
+  requireRange("speed", speed, -2, 2);
+  requireRange("gain", gain, 0.05, 3);
+  requireRange("bearing_noise", bearing_noise, 1e-5, 0.1);
+  requireRange("ratio_noise", ratio_noise, 1e-5, 0.5);
+  requireRange("unrest", unrest, 1e-3, 2);
+  requireRange("largest_speed", largest_speed, 0.05, 3);
+  requireRange("sway", sway, 0, 2);
+  requireRange("sway_climb", sway_climb, 0, 1);
+  requireRange("sway_period", sway_period, 1, 60);
+  requireRange("sway_s", sway_s, 0, 600);
+  requireRange("radius_sigma", radius_sigma, 1e-3, 1);
+  requireRange("free_way", free_way, 0, 5);
+  requireRange("choice_evidence", choice_evidence, -20, 20);
+  requireRange("choice_angle", choice_angle, 0.02, 0.6);
+  requireRange("choice_range", choice_range, 1, 20);
+  requireRange("choice_views", choice_views, 1, 1000);
+  requireRange("search_s", search_s, 1, 600);
   response.validate();
   safety.validate();
 }

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tracking/border_energy.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-}
-
 constexpr Border kBorders[] = {Border::left, Border::right};
 } // namespace
 

@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tracking/trunk_tracker.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <nlopt.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-}
-
 /// Step in each direction of the tangent that moves a border by about a pixel.
 Vector4d pixelScale(const PinholeCamera &camera, const RelativeTrunk &relative, int rows)
 {

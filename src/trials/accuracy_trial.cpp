@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/median.h>
 #include <bole/simulation/h264_link.h>
 #include <bole/trials/accuracy_trial.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -70,12 +70,6 @@ TrajectoryErrors errorsUnder(const Trajectory &estimate, const Trajectory &truth
 {
   const std::vector<PosePair> pairs = pairPoses(estimate, truth);
   return absoluteErrors(pairs, align(pairs, alignment));
-}
-
-double medianOf(std::vector<double> values)
-{
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 void compare(AccuracyTrialResult &result, const Pipeline &pipeline, const Recorded &recorded, const Forest &forest,

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tracking/image_health.h>
+#include <bole/geometry/require_range.h>
 #include <bole/trials/closed_loop.h>
 
 #include <algorithm>
 #include <ctime>
 #include <limits>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -71,15 +71,11 @@ void give(vpSimulatorArDrone &robot, const TaskCommand &command)
 
 void LoopOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("duration_s", duration_s, 1, 3600);
-  require("search_most_s", search_most_s, 1, 3600);
-  require("contact", contact, 0.05, 2);
-  require("translation_max", translation_max, 0.05, 5);
-  require("rotation_max", rotation_max, 0.05, 5);
+  requireRange("duration_s", duration_s, 1, 3600);
+  requireRange("search_most_s", search_most_s, 1, 3600);
+  requireRange("contact", contact, 0.05, 2);
+  requireRange("translation_max", translation_max, 0.05, 5);
+  requireRange("rotation_max", rotation_max, 0.05, 5);
   fault.validate();
 }
 

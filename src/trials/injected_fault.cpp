@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/trials/injected_fault.h>
 
+#include <bole/geometry/require_range.h>
+
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -26,12 +28,8 @@ FaultKind faultKindFromString(const std::string &word)
 
 void FaultOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("fault start_s", start_s, 0, 3600);
-  require("fault duration_s", duration_s, 0.05, 3600);
+  requireRange("fault start_s", start_s, 0, 3600);
+  requireRange("fault duration_s", duration_s, 0.05, 3600);
 }
 
 FaultInjector::FaultInjector(const FaultOptions &options, std::uint64_t seed) : m_options(options), m_random(seed, 601)

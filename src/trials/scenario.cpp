@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/simulation/random.h>
+#include <bole/geometry/require_range.h>
 #include <bole/trials/scenario.h>
 
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -116,13 +116,9 @@ const char *toString(ServoKind kind)
 
 void ScenarioOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be in [%g, %g]", name, value, low, high);
-  };
-  require("density", density, 0, 0.3);
-  require("ratio", ratio, 0.01, 0.5);
-  require("length", length, 1, 1000);
+  requireRange("density", density, 0, 0.3);
+  requireRange("ratio", ratio, 0.01, 0.5);
+  requireRange("length", length, 1, 1000);
 }
 
 Scenario makeScenario(const ScenarioOptions &options)
