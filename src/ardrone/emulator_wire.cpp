@@ -29,7 +29,8 @@ void DroneWire::comeUp()
     return;
   m_video = m_generation == 2 ? Socket::listenTcp(m_host, m_video_port)
                               : Socket::bindUdp(m_host, m_video_port);
-  m_video_port = m_video.localPort(); // the same again after a reboot
+  if (m_video_port == 0) // chosen once: other threads ask for it, and it stays over a reboot
+    m_video_port = m_video.localPort();
 }
 
 void DroneWire::goDown()
