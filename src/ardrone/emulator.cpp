@@ -89,7 +89,7 @@ struct ArDroneEmulator::State
       }
       const std::int64_t now_ns = steadyNowNs();
       if (start_ns < 0 && readyToStart(now_ns))
-        start_ns = now_ns;
+        begin(now_ns);
       if (has_packet && start_ns >= 0 && flightTime(now_ns) >= packet.sent_ns) {
         launch(packet);
         has_packet = false;
@@ -101,6 +101,13 @@ struct ArDroneEmulator::State
     const std::lock_guard<std::mutex> lock(mutex);
     finished = true;
     ended.notify_all();
+  }
+
+  void begin(std::int64_t now_ns)
+  {
+    start_ns = now_ns;
+    const std::lock_guard<std::mutex> lock(mutex);
+    counters.started_ns = now_ns;
   }
 
   bool readyToStart(std::int64_t now_ns) const

@@ -105,6 +105,7 @@ public:
     std::size_t refused = 0;         ///< frames dropped since the client did not read
     std::size_t out_of_sequence = 0; ///< commands refused for their number
     double flight_s = 0;
+    std::int64_t started_ns = -1;    ///< host's steady clock at flight time zero; -1 before
   };
 
   ArDroneEmulator(std::unique_ptr<PacketFeed> feed, const Options &options);
