@@ -25,6 +25,7 @@ void MapOptions::validate() const
   requireRange("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
   requireRange("map.usual_radius", usual_radius, 0.001, 10);
   requireRange("map.lost_misses", lost_misses, 1, 1000);
+  requireRange("map.candidate_memory_s", candidate_memory_s, 0.1, 1e6);
   requireRange("map.radius_min", radius_min, 0.001, 10);
   requireRange("map.radius_max", radius_max, radius_min, 10);
 }
@@ -231,6 +232,14 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(), [this](std::size_t i) { return m_trunks[i].removed; }),
                  m_active.end());
   return changes;
+}
+
+void TrunkMap::leaveBehind(double now_s)
+{
+  const auto is_left_behind = [&](std::size_t i) {
+    return m_trunks[i].status == TrunkStatus::candidate && now_s - m_trunks[i].last_seen_s > m_options.candidate_memory_s;
+  };
+  m_active.erase(std::remove_if(m_active.begin(), m_active.end(), is_left_behind), m_active.end());
 }
 
 std::vector<int> TrunkMap::removeAll()

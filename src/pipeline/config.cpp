@@ -283,6 +283,7 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
                                  {"map.innovation_unit_px", &o.innovation_unit_px},
                                  {"map.usual_radius", &o.usual_radius},
                                  {"map.lost_misses", &o.lost_misses},
+                                 {"map.candidate_memory_s", &o.candidate_memory_s},
                                  {"map.merge_distance", &o.merge_distance},
                                  {"map.radius_min", &o.radius_min},
                                  {"map.radius_max", &o.radius_max}});

@@ -183,6 +183,7 @@ void Pipeline::reviewMap(double time_s)
     if (trunk.removed && m_smoother.hasTrunk(trunk.smoother_id))
       m_smoother.removeTrunk(trunk.smoother_id);
   }
+  m_map.leaveBehind(time_s);
 }
 
 /// Covariances are asked for where something was seen lately: that of a trunk left behind hardly changes, and costs a walk

@@ -210,6 +210,8 @@ public:
   void fetchAhead(int pose) const;
   void pushChildren(int id, int depth, int quiet);
   void settle(Variable &v, int id, double *rhs, UpdateResult &result);
+  int movableAge() const;
+  int oldestPose(const Variable &variable) const;
   void moveLinearisation(UpdateResult &result);
   Eigen::Vector3d shiftBeyondAffected() const;
   void dropOldContributions();

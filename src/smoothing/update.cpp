@@ -16,8 +16,8 @@ constexpr int kContributionEvery =
 constexpr int kReach = 256; ///< variables below the eliminated ones that a pass visits
 constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
 constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
-constexpr unsigned kDeepEvery = 512;              ///< passes until one may move points of any age
-constexpr int kDeepAge = 400; ///< poses behind the newest: older points are left meanwhile
+constexpr int kNearAge = 400; ///< poses behind the newest: points that reach no farther may always move
+constexpr unsigned kFartherEvery = 64; ///< passes until some may reach twice as far, and so on
 constexpr int kQuiet = 16;    ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
@@ -203,6 +203,8 @@ void Smoother::State::backSubstitute(UpdateResult &result)
 
 void Smoother::State::dropOldContributions()
 {
+  if (options.fixed_lag > 0) // bounds the memory by itself, and closes a pose by its contribution
+    return;
   const int newest = static_cast<int>(poses.size()) - 1;
   const auto drop = [&](int number) {
     Variable &v = variables[poses[number].variable];
@@ -227,6 +229,29 @@ Eigen::Vector3d Smoother::State::shiftBeyondAffected() const
   return seam < 0 ? Eigen::Vector3d::Zero() : shiftOfPoint(seam);
 }
 
+/// How many poses behind the newest this pass may move points of linearisation.
+int Smoother::State::movableAge() const
+{
+  if (options.propagation_threshold == 0)
+    return std::numeric_limits<int>::max();
+  int age = kNearAge;
+  for (unsigned every = kFartherEvery; passes % every == 0 && age < 1 << 28; every *= 2)
+    age *= 2;
+  return age;
+}
+
+/// The oldest pose that is eliminated again when \p variable is linearised again.
+int Smoother::State::oldestPose(const Variable &variable) const
+{
+  if (variable.is_pose)
+    return variable.number;
+  int oldest = trunks[variable.number].last_pose;
+  for (const int f : variable.factors)
+    if (factors[f].kind == FactorKind::observation)
+      oldest = std::min(oldest, variables[factors[f].a].number);
+  return oldest;
+}
+
 /// Linearises anew what moved too far, and what is eliminated again anyway. Points must fit
 /// together: where a relinearised variable meets one whose estimate has left its point, by however
 /// common a shift, the lever arms between them are wrong, the next one down moves too far in its
@@ -234,15 +259,12 @@ Eigen::Vector3d Smoother::State::shiftBeyondAffected() const
 /// what the points beyond the seam are shifted: positions fit together on both sides, and a common
 /// shift is exactly linear in all that is measured.
 ///
-/// Moving old points eliminates all since again: seldom, and what was found in between is found
-/// once more by the deep pass before.
+/// Moving old points, or a trunk that was seen long ago, eliminates all since again: the farther back, the seldomer. What
+/// must wait is found once more by a later pass.
 void Smoother::State::moveLinearisation(UpdateResult &result)
 {
-  const bool deep = options.propagation_threshold == 0 || passes % kDeepEvery == 0;
-  const int newest = static_cast<int>(poses.size()) - 1;
-  const auto mayMove = [&](const Variable &v) {
-    return deep || newest - (v.is_pose ? v.number : trunks[v.number].last_pose) <= kDeepAge;
-  };
+  const int newest = static_cast<int>(poses.size()) - 1, oldest = newest - movableAge();
+  const auto mayMove = [&](const Variable &v) { return oldestPose(v) >= oldest; };
   const auto move = [&](int id) {
     variables[id].in_moved = true;
     touchNeighbours(id);
@@ -257,7 +279,8 @@ void Smoother::State::moveLinearisation(UpdateResult &result)
     move(id);
     for (const int f : v.factors) // what is between two is not put right by moving one
       if (v.is_pose && factors[f].kind == FactorKind::observation &&
-          linearisationError(factors[f]) > options.linearisation_tolerance)
+          linearisationError(factors[f]) > options.linearisation_tolerance &&
+          mayMove(variables[factors[f].b]))
         move(factors[f].b);
   }
   moved.clear();

@@ -239,6 +239,27 @@ TEST_F(Life, AConfirmedTrunkThatIsLostKeepsItsPlaceAndComesBackUnderItsId)
   EXPECT_EQ(trunk.id, id);
 }
 
+TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeenOfIt)
+{
+  MapTrunk &candidate = m_map.add(0, trunkAt(3, 1));
+  m_map.recordView(candidate, {10.0, 0.3, 0.2, 0.2, 1, 0});
+  m_map.leaveBehind(10.0 + 0.99 * m_options.candidate_memory_s);
+  EXPECT_EQ(m_map.active().size(), 1u);
+
+  m_map.leaveBehind(10.0 + 1.01 * m_options.candidate_memory_s);
+
+  EXPECT_TRUE(m_map.active().empty());
+  EXPECT_FALSE(m_map.trunks().front().removed);
+  EXPECT_EQ(m_map.records().size(), 1u);
+}
+
+TEST_F(Life, AConfirmedTrunkIsNeverLeftBehind)
+{
+  confirmed(trunkAt(3, 1), 200);
+  m_map.leaveBehind(1e6);
+  EXPECT_EQ(m_map.active().size(), 1u);
+}
+
 TEST_F(Life, AViewEndsARowOfMisses)
 {
   MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);

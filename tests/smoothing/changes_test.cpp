@@ -115,6 +115,37 @@ TEST(Changes, TheLagClosesOldPosesAndStaysNearTheFullSmoother)
   EXPECT_NEAR(std::sqrt(window.smoother.currentPoseCovariance()(0, 0) / C(0, 0)), 1, 0.1);
 }
 
+TEST(Changes, ALongLagClosesPosesAlsoWhereOldTrunksReturn)
+{
+  FlightOptions o;
+  o.poses = 600;
+  o.lap = 120;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions lagged = smootherFor(o);
+  lagged.fixed_lag = 200;
+  Replay window(flight, lagged);
+  window.run();
+  EXPECT_LE(window.smoother.graph().poses.size(), 202u);
+}
+
+TEST(Changes, WorkAFrameDoesNotGrowWithRoundsPastTheSameTrunks)
+{
+  FlightOptions o;
+  o.lap = 120;
+  o.poses = 20 * o.lap;
+  const Flight flight = simulateFlight(o);
+  Replay replay(flight, smootherFor(o));
+  std::vector<double> eliminated(20, 0.0); // a round
+  for (int i = 0; i < o.poses; ++i)
+    eliminated[static_cast<std::size_t>(i / o.lap)] += static_cast<double>(replay.step().eliminated);
+  const double early = eliminated[3] + eliminated[4] + eliminated[5];
+  const double late = eliminated[17] + eliminated[18] + eliminated[19];
+  EXPECT_LT(late, 2 * early);
+  Smoother batch(replay.smoother.graph(), replay.smoother.options());
+  batch.optimize();
+  EXPECT_LT(replay.smoother.cost(), 1.03 * batch.cost());
+}
+
 TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
 {
   FlightOptions o;

@@ -40,6 +40,7 @@ struct MapOptions
                                       ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
   double usual_radius = 0.15;         ///< median radius of the trunks to be found [m], 0.001 to 10
   int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
+  double candidate_memory_s = 5;      ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
   double merge_distance = 0.30;       ///< two trunks with less than this between their bark are one [m], 0 to 5
   double radius_min = 0.05;           ///< thinner is no trunk [m]
   double radius_max = 0.60;           ///< thicker is no trunk [m]
@@ -100,7 +101,8 @@ public:
   MapTrunk &add(std::size_t smoother_id, const Trunk &trunk);
   std::vector<MapTrunk> &trunks() { return m_trunks; }
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
-  /// Places in trunks() of those that are not removed: what a frame has to look at, however long the flight.
+  /// Places in trunks() of those that are neither removed nor left behind: what a frame has to look at, however long
+  /// the flight.
   const std::vector<std::size_t> &active() const { return m_active; }
   int count(TrunkStatus status) const;
 
@@ -115,6 +117,10 @@ public:
   /// Promotes, loses and merges by what is known now. The caller carries the changes to the smoother.
   /// \p has_ranges: false while the camera has only turned, so that a trunk earns its place by its bearing and width.
   std::vector<MapChange> review(bool has_ranges = true);
+
+  /// Candidates that were left behind before they could be confirmed, and are not active any more. What was seen of them
+  /// stands: they stay in the smoother and in records().
+  void leaveBehind(double now_s);
 
   /// Gives up all that is active. Returns their ids.
   std::vector<int> removeAll();

@@ -10,9 +10,9 @@
 /// touches and those after them; the change then runs back down the elimination tree until it is
 /// too small to matter; far back it waits for one of the passes that go deeper, each twice as deep
 /// as those before and four times as rare. A variable whose estimate left the point of its linearisation takes its
-/// factors, not the images, to the new point: nothing but the image is linearised for ever. A loop
-/// that comes back to old trunks eliminates the part of the flight between again, once a returning
-/// trunk.
+/// factors, not the images, to the new point: nothing but the image is linearised for ever. Points
+/// that reach far back move the seldomer the farther. A loop that comes back to old trunks
+/// eliminates the part of the flight between again, once a returning trunk.
 ///
 /// Frames: poses wMb, camera at wMb * bMc. Tangents (and the rows of covariances): Pose (rho [m],
 /// phi [rad]), Trunk (x [m], y [m], log r, lean x, lean y), RelativeTrunk (phi_x, phi_y, phi_z
@@ -27,8 +27,8 @@
 /// Cost: update() about a millisecond in steady flight past six trunks at a time (some 40
 /// eliminations of a front of 50 columns, 250 back-substitutions), see the benchmark
 /// smoothing_flat; covariances O(number of eliminations between the variable and the newest pose).
-/// Limit: many laps past the same trunks widen the fronts with every returning trunk; the fixed lag
-/// bounds them.
+/// Limit: fronts hold all trunks that come back later; and now and then a pass goes through the
+/// whole flight. The fixed lag bounds both.
 ///
 /// Deviations from the paper: trunks may lean; robust loss on summary factors; the paper sums
 /// energies, we drop the part of them that no variable can change.
