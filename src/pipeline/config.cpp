@@ -95,7 +95,8 @@ void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
                                  {"flow.track_range", &o.track_range},
                                  {"flow.gate", &o.gate},
                                  {"flow.contrast_noise", &o.contrast_noise},
-                                 {"flow.gate_sigma_px", &o.gate_sigma_px}});
+                                 {"flow.gate_sigma_px", &o.gate_sigma_px},
+                                 {"flow.search_px", &o.search_px}});
 }
 
 void addMotion(std::vector<OptionEntry> &entries, MotionModelOptions &o)

@@ -17,6 +17,7 @@ void FlowOptions::validate() const
   requireRange("flow.gate", gate, 1, 100);
   requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
   requireRange("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
+  requireRange("flow.search_px", search_px, 0, 5);
 }
 
 void PipelineOptions::validate() const

@@ -103,8 +103,9 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
     const RelativeTrunk relative = m_smoother.predictedRelative(trunk.smoother_id);
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0) // behind the camera
       continue;
-    const TrackingPrediction prediction =
-        predict(trunk, relative, m_smoother.relativeCovariance(trunk.smoother_id), wMc);
+    Matrix4d covariance = m_smoother.relativeCovariance(trunk.smoother_id);
+    covariance(2, 2) += missedVariance(trunk.misses_in_a_row);
+    const TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
     TrackingResult tracked = trackTrunk(gradient, m_camera, prediction, m_options.tracking);
     if (tracked.status == TrackingStatus::tracked && !insideGate(prediction, tracked))
       tracked.status = TrackingStatus::diverged;
@@ -124,6 +125,13 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
                              tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
                              isTurning() ? 0 : range});
   }
+}
+
+/// Of the bearing of a trunk that was missed: what a prediction is wrong by is wrong by more in the next frame.
+double Pipeline::missedVariance(int misses) const
+{
+  const double sigma_px = std::min(m_options.flow.search_px * misses, m_options.tracking.scan_max_px / 3);
+  return std::pow(sigma_px / m_camera.fx, 2);
 }
 
 /// Bearing and log r/d against the prediction.

@@ -49,6 +49,8 @@ struct FlowOptions
   double gate = 9.2;             ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
   double contrast_noise = 0.02;  ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
   double gate_sigma_px = 1.0;    ///< of a border beside the prediction [px], 0.1 to 10
+  double search_px = 0;          ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
+                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };

@@ -120,6 +120,7 @@ private:
                double time_s);
   TrackingPrediction predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
                              const Pose &wMc) const;
+  double missedVariance(int misses) const;
   bool insideGate(const TrackingPrediction &prediction, const TrackingResult &tracked) const;
   void hide(TrackingPrediction &prediction, const MapTrunk &trunk, const Pose &wMc) const;
   ElevationRange elevation(const RelativeTrunk &relative, const Trunk &trunk, const Pose &wMc) const;
