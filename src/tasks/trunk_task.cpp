@@ -17,7 +17,6 @@ constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
 constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
 constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
-constexpr double kMisreadAtRest = 0.05; ///< the same, while nothing moves
 constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
@@ -138,16 +137,14 @@ TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipelin
 
 void TrunkTask::desire(double radius)
 {
-  if (m_options.ratio > 0)
-    m_ratio = m_options.ratio;
-  else
-    m_ratio = std::min(0.5, (m_rests ? std::exp(m_log_radius) : radius) / m_options.distance);
+  m_ratio = m_options.ratio > 0 ? m_options.ratio : std::min(0.5, radius / m_options.distance);
   m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
 }
 
-/// As tracked in this image; where it was missed or its width misread, and for the distance while it sways, as the map
-/// has it: pose and place in it rest on all images. The trunk as seen from here may be wider or narrower than in the
-/// map, which has it from all sides: m_log_radius.
+/// The bearing as tracked in this image. The distance as the map has it: pose and place in it rest on all images, while
+/// what one image takes for a border wanders by a tenth of the width. A ratio that is asked for is the image's, but for
+/// misread widths; the trunk as seen from here may be wider or narrower than in the map, which has it from all sides:
+/// m_log_radius.
 RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
 {
   RelativeTrunk seen = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
@@ -155,15 +152,16 @@ RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
   if (!tracked || !seen.isFinite() || !tracked->relative.isFinite())
     return seen;
   seen.cRt = tracked->relative.cRt;
+  if (m_options.ratio <= 0)
+    return seen;
   const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
-  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > (m_rests ? kMisreadAtRest : kMisread);
+  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisread;
   m_misread = is_misread ? m_misread + 1 : 0;
-  if (!m_has_feature || (m_misread > kBelieved && !m_rests)) // it does look like that from here
+  if (!m_has_feature || m_misread > kBelieved) // it does look like that from here
     m_log_radius = radius;
-  else if (!is_misread && !m_rests)
+  else if (!is_misread)
     m_log_radius += kRadiusWeight * (radius - m_log_radius);
-  if (m_options.ratio > 0 || m_rests)
-    seen.log_ratio = is_misread ? seen.log_ratio + m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
+  seen.log_ratio = is_misread ? seen.log_ratio + m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
   return seen;
 }
 

@@ -11,16 +11,16 @@
 /// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
 /// has none. So `hold` by distance first sways sideways, features held, until the map knows the radius
 /// to radius_sigma. The way is a slant: the drone's height has no error of scale as its steps have, and the points tell
-/// the direction of flight, so that the metre of the height becomes the map's. Then it rests, and keeps the r/d that the
-/// distance has become: that is an image's, and does not wander as poses do.
+/// the direction of flight, so that the metre of the height becomes the map's. Then it rests, by the distance that the
+/// map has: pose and map rest on all images, while the borders that one image shows wander with light and background.
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
 /// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
 /// decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is told) shows as a
 /// drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
 ///
-/// The features come from the trunk as tracked in the image of the moment; where it was missed for a frame or two, from
-/// the map and the pose. A distance in metres needs the map's radius and is as good as that; a ratio needs nothing.
+/// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed for
+/// a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
 
 #include <bole/tasks/drone_response.h>
 #include <bole/tasks/feature_filter.h>
