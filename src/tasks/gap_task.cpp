@@ -133,10 +133,10 @@ TaskCommand GapTask::search(const FrameResult &result, const Pipeline &pipeline)
 }
 
 /// The gap where the map has it now; while one of its trunks is gone from the map, where it was last.
-void GapTask::refresh(const Pipeline &pipeline, const Pose &wMb)
+void GapTask::refresh(const std::vector<Obstacle> &trunks, const Pose &wMb)
 {
   std::optional<Obstacle> left, right;
-  for (const Obstacle &trunk : obstacles(pipeline, wMb, 20, 1)) {
+  for (const Obstacle &trunk : trunks) {
     if (trunk.id == m_gap->left)
       left = trunk;
     if (trunk.id == m_gap->right)
@@ -149,7 +149,7 @@ void GapTask::refresh(const Pipeline &pipeline, const Pose &wMb)
   m_across = from_middle.dot(leftOf(m_gap->along));
 }
 
-TaskCommand GapTask::fly(const Pose &wMb)
+TaskCommand GapTask::fly(const std::vector<Obstacle> &trunks, const Pose &wMb)
 {
   if (m_is_lined_up && m_ahead > m_options.beyond) {
     enter(TaskPhase::done);
@@ -166,7 +166,8 @@ TaskCommand GapTask::fly(const Pose &wMb)
     const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
     velocity = limited(kAcrossGain * to_entry, m_options.speed);
   }
-  return {false, towards(wMb, limited(velocity, 1.2 * m_options.speed), heading),
+  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), trunks, m_options.body_radius);
+  return {false, towards(wMb, velocity, heading),
           m_is_lined_up ? "passes the gap" : "lines up"};
 }
 
@@ -183,7 +184,8 @@ TaskCommand GapTask::act(const FrameResult &result, const Pipeline &pipeline)
 {
   if (!m_gap)
     return search(result, pipeline);
-  refresh(pipeline, result.wMb);
-  return fly(result.wMb);
+  const std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, 20, 1);
+  refresh(trunks, result.wMb);
+  return fly(trunks, result.wMb);
 }
 } // namespace bole

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/obstacles.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace bole
@@ -34,5 +35,22 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
                     across * n * n.transpose() + along * u * u.transpose(), pipeline.evidence(trunk)});
   }
   return near;
+}
+
+Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
+                          double body_radius)
+{
+  constexpr double kDamping = 0.7; // [1/s]: the drone's lag is about half a second
+  constexpr double kLeast = 0.12;  // free way at which nothing more leads nearer [m]
+  for (const Obstacle &trunk : trunks) {
+    const Eigen::Vector2d w = trunk.xy - p;
+    const double distance = w.norm();
+    if (!trunk.is_confirmed || distance < 1e-6)
+      continue;
+    const Eigen::Vector2d u = w / distance;
+    const double most = kDamping * (distance - trunk.radius - body_radius - kLeast);
+    velocity -= std::max(0.0, velocity.dot(u) - most) * u;
+  }
+  return velocity;
 }
 } // namespace bole

@@ -28,4 +28,9 @@ struct Obstacle
 /// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
 /// \p observations views (something is there, though it may not be a trunk).
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
+
+/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of \p trunks cut to a speed that dies out
+/// with the free way between a body of \p body_radius [m] and the bark; too near it backs off.
+Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
+                          double body_radius);
 } // namespace bole
