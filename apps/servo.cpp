@@ -73,7 +73,8 @@ vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const L
 
 nlohmann::json toJson(const ServoTrialResult &result)
 {
-  nlohmann::json json{{"seed", result.seed}, {"success", result.is_success}, {"outcome", result.outcome}};
+  nlohmann::json json{{"seed", result.seed}, {"success", result.is_success}, {"outcome", result.outcome},
+                      {"other gap", result.is_other_gap}};
   for (const Column &column : kColumns)
     json[column.name] = std::isnan(result.*column.value) ? nlohmann::json() : nlohmann::json(result.*column.value);
   return json;
@@ -92,43 +93,80 @@ std::string csvOf(const std::vector<ServoTrialResult> &results)
   return text + "\n";
 }
 
-/// Success, contacts, and medians with their 95 % intervals.
-void summarise(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+std::map<std::string, int> failures(const std::vector<ServoTrialResult> &results)
 {
-  const int runs = static_cast<int>(results.size());
-  const auto count = [&results](auto &&is) { return static_cast<int>(std::count_if(results.begin(), results.end(), is)); };
-  const int good = count([](const ServoTrialResult &r) { return r.is_success; });
-  const int contacts = count([](const ServoTrialResult &r) { return r.record.is_contact; });
-  const ShareInterval share = wilson(good, runs);
-  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)}, {"runs", runs}, {"successes", good},
-                      {"contacts", contacts}, {"gated", arguments.trial.pipeline.flow.use_saliency},
-                      {"fault", arguments.fault}, {"version", BOLE_VERSION}};
-  fmt::print("{}: {} of {} runs succeeded (95 % interval {:.2f} to {:.2f}), {} touched a trunk\n",
-             toString(arguments.trial.scenario.kind), good, runs, share.low, share.high, contacts);
   std::map<std::string, int> reasons;
   for (const ServoTrialResult &result : results)
     if (!result.is_success)
       ++reasons[result.outcome.substr(0, 10) == "stopped at" ? "stopped" : result.outcome];
-  for (const auto &[reason, number] : reasons)
-    fmt::print("  {:3} {}\n", number, reason);
+  return reasons;
+}
+
+MedianInterval medianOf(const Column &column, const std::vector<ServoTrialResult> &results)
+{
+  std::vector<double> values;
+  for (const ServoTrialResult &result : results)
+    values.push_back(result.*column.value);
+  return bootstrapMedian(values);
+}
+
+template <class Is> int count(const std::vector<ServoTrialResult> &results, Is is)
+{
+  return static_cast<int>(std::count_if(results.begin(), results.end(), is));
+}
+int successes(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.is_success; });
+}
+int contacts(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.record.is_contact; });
+}
+int otherGaps(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.is_success && r.is_other_gap; });
+}
+
+/// runs.csv and summary.json of the runs so far: written after each, so that what was flown is kept.
+void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+{
+  if (arguments.folder.empty())
+    return;
+  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)}, {"runs", results.size()},
+                      {"runs asked for", arguments.runs}, {"successes", successes(results)},
+                      {"contacts", contacts(results)}, {"other gaps", otherGaps(results)},
+                      {"failures", failures(results)}, {"gated", arguments.trial.pipeline.flow.use_saliency},
+                      {"fault", arguments.fault}, {"version", BOLE_VERSION}};
   for (const Column &column : kColumns) {
-    std::vector<double> values;
-    for (const ServoTrialResult &result : results)
-      values.push_back(result.*column.value);
-    const MedianInterval median = bootstrapMedian(values);
-    if (median.count == 0)
-      continue;
-    fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low, median.high,
-               median.count);
-    json["medians"][column.name] = {{"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
+    const MedianInterval median = medianOf(column, results);
+    if (median.count > 0)
+      json["medians"][column.name] = {{"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
   }
   for (const ServoTrialResult &result : results)
     json["each"].push_back(toJson(result));
-  if (arguments.folder.empty())
-    return;
   writeAtomically(arguments.folder + "/runs.csv", csvOf(results));
   writeAtomically(arguments.folder + "/summary.json", json.dump(1) + "\n");
-  fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
+}
+
+/// Success, contacts, and medians with their 95 % intervals.
+void print(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+{
+  const int runs = static_cast<int>(results.size()), good = successes(results);
+  const ShareInterval share = wilson(good, runs);
+  fmt::print("{}: {} of {} runs succeeded (95 % interval {:.2f} to {:.2f}), {} touched a trunk\n",
+             toString(arguments.trial.scenario.kind), good, runs, share.low, share.high, contacts(results));
+  if (otherGaps(results) > 0)
+    fmt::print("  {:3} of them through another gap than the one set up\n", otherGaps(results));
+  for (const auto &[reason, number] : failures(results))
+    fmt::print("  {:3} {}\n", number, reason);
+  for (const Column &column : kColumns) {
+    const MedianInterval median = medianOf(column, results);
+    if (median.count > 0)
+      fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low, median.high,
+                 median.count);
+  }
+  if (!arguments.folder.empty())
+    fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
 }
 
 std::string runFolder(const Arguments &arguments, std::uint64_t seed)
@@ -194,8 +232,9 @@ void run(Arguments &arguments)
                  static_cast<unsigned long long>(result.seed), result.is_success ? "succeeded" : result.outcome.c_str());
     result.record.samples.clear(); // written already; a hundred of them would fill the memory
     results.push_back(std::move(result));
+    writeTables(arguments, results);
   }
-  summarise(arguments, results);
+  print(arguments, results);
 }
 
 void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *example)
@@ -203,6 +242,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   const auto arguments = std::make_shared<Arguments>();
   ServoTrialOptions &trial = arguments->trial;
   trial.scenario.kind = kind;
+  trial.pipeline = ServoTrialOptions::defaultPipeline(kind);
   CLI::App *task = servo.add_subcommand(toString(kind), what);
   task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
   task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();

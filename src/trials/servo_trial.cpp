@@ -4,6 +4,7 @@
 #include <bole/tasks/trunk_task.h>
 #include <bole/trials/servo_trial.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -16,7 +17,27 @@ namespace
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFinal_s = 5;        ///< final errors are those of the last seconds
 constexpr double kBearing_deg = 0.5, kDistance = 0.03;
+constexpr double kLeastGap = 1.2;     ///< true free width that another gap than the one set up must have [m]
 constexpr double kSameTrunk = 0.6;    ///< a trunk of the map this near to one of the truth is that one [m]
+
+/// The trunk of the truth that stands where the map has the trunk \p id, both seen from the drone; -1: none.
+int trueTrunk(const Forest &forest, const Pipeline &pipeline, int id, const Pose &truth, const Pose &estimate)
+{
+  const MapTrunk *trunk = liveTrunk(pipeline, id);
+  if (!trunk)
+    return -1;
+  const Eigen::Vector3d seen = truth * (estimate.inverse() * trunk->trunk.axisAt(estimate.t.z()));
+  double best = kSameTrunk;
+  int found = -1;
+  for (const SimulatedTrunk &candidate : forest.trunks) {
+    const double off = (candidate.axisAt(seen.z() - candidate.foot.z()) - seen).head<2>().norm();
+    if (off < best) {
+      best = off;
+      found = candidate.id;
+    }
+  }
+  return found;
+}
 
 /// The truth about a trunk task: which trunk it flies by, and its errors.
 class TrunkJudge
@@ -34,8 +55,10 @@ public:
   {
     if (m_task.target() < 0)
       return {};
-    if (m_task.target() != m_target)
-      match(truth, estimate);
+    if (m_task.target() != m_target || m_trunk < 0) { // the first range may be far off: asks again
+      m_target = m_task.target();
+      m_trunk = trueTrunk(m_scenario.forest, m_pipeline, m_target, truth, estimate);
+    }
     if (m_trunk < 0)
       return {};
     const Trunk cylinder = m_scenario.forest.trunks[static_cast<std::size_t>(m_trunk)].cylinder();
@@ -52,24 +75,6 @@ public:
   }
 
 private:
-  void match(const Pose &truth, const Pose &estimate)
-  {
-    m_target = m_task.target();
-    m_trunk = -1;
-    const MapTrunk *trunk = liveTrunk(m_pipeline, m_target);
-    if (!trunk)
-      return;
-    const Eigen::Vector3d seen = truth * (estimate.inverse() * trunk->trunk.axisAt(estimate.t.z()));
-    double best = kSameTrunk;
-    for (const SimulatedTrunk &candidate : m_scenario.forest.trunks) {
-      const double off = (candidate.axisAt(seen.z() - candidate.foot.z()) - seen).head<2>().norm();
-      if (off < best) {
-        best = off;
-        m_trunk = candidate.id;
-      }
-    }
-  }
-
   const Scenario &m_scenario;
   const TrunkTask &m_task;
   const Pipeline &m_pipeline;
@@ -189,24 +194,49 @@ bool passedBetween(const LoopRecord &record, const SimulatedTrunk &left, const S
   return false;
 }
 
-void judgePassage(ServoTrialResult &result, const ServoTrialOptions &options, const Scenario &scenario)
+void judgeSlalom(ServoTrialResult &result)
 {
   const LoopRecord &record = result.record;
-  if (options.scenario.kind == ServoKind::slalom) {
-    result.progress = record.samples.empty() ? 0 : record.samples.back().truth.t.x();
-    const double seconds = result.duration_s - std::max(0.0, record.servoing_from_s);
-    result.mean_speed = result.progress / std::max(seconds, 1e-3);
-    result.outcome = record.is_finished ? "" : fmt::format("stopped at {:.1f} m", result.progress);
+  result.progress = record.samples.empty() ? 0 : record.samples.back().truth.t.x();
+  const double seconds = result.duration_s - std::max(0.0, record.servoing_from_s);
+  result.mean_speed = result.progress / std::max(seconds, 1e-3);
+  result.outcome = record.is_finished ? "" : fmt::format("stopped at {:.1f} m", result.progress);
+}
+
+/// Free way between the bark of two trunks at the height \p z of the world [m].
+double widthBetween(const SimulatedTrunk &one, const SimulatedTrunk &other, double z)
+{
+  const double h = z - one.foot.z(), other_h = z - other.foot.z();
+  return (one.axisAt(h) - other.axisAt(other_h)).head<2>().norm() - one.radiusAt(h) - other.radiusAt(other_h);
+}
+
+/// The task is not told which gap is set up: any that is as wide as those asked for will do.
+void judgeGap(ServoTrialResult &result, const Scenario &scenario, const GapTask &task, const Pipeline &pipeline)
+{
+  const LoopRecord &record = result.record;
+  const auto &trunks = scenario.forest.trunks;
+  if (record.servoing_from_s < 0) {
+    result.outcome = "no gap found";
     return;
   }
-  result.gap_width = scenario.gap_width;
-  const auto &trunks = scenario.forest.trunks;
-  if (record.servoing_from_s < 0)
-    result.outcome = "no gap found";
-  else if (!record.is_finished)
+  if (!record.is_finished || !task.gap()) {
     result.outcome = "did not get through";
-  else if (!passedBetween(record, trunks[static_cast<std::size_t>(scenario.left)], trunks[static_cast<std::size_t>(scenario.right)]))
-    result.outcome = "another gap";
+    return;
+  }
+  const LoopSample &last = record.samples.back();
+  const int left = trueTrunk(scenario.forest, pipeline, task.gap()->left, last.truth, last.estimate);
+  const int right = trueTrunk(scenario.forest, pipeline, task.gap()->right, last.truth, last.estimate);
+  if (left < 0 || right < 0 || left == right) {
+    result.outcome = "flew by what is no trunk";
+    return;
+  }
+  const SimulatedTrunk &one = trunks[static_cast<std::size_t>(left)], &other = trunks[static_cast<std::size_t>(right)];
+  result.gap_width = widthBetween(one, other, last.truth.t.z());
+  result.is_other_gap = std::minmax(left, right) != std::minmax(scenario.left, scenario.right);
+  if (!passedBetween(record, one, other))
+    result.outcome = "did not get through";
+  else if (result.is_other_gap && result.gap_width < kLeastGap)
+    result.outcome = "gap too narrow";
 }
 
 void judgeFault(ServoTrialResult &result)
@@ -237,6 +267,15 @@ vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
   return robot;
 }
 
+PipelineOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
+{
+  PipelineOptions pipeline;
+  pipeline.flow.search_px = 1;
+  if (kind == ServoKind::gap)
+    pipeline.detection.range_min = 1.2;
+  return pipeline;
+}
+
 ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatcher &watcher)
 {
   ServoTrialResult result;
@@ -262,7 +301,10 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   else {
     result.record = runClosedLoop(robot, pipeline, *task, options.loop, {}, watcher);
     result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
-    judgePassage(result, options, scenario);
+    if (const auto *gap_task = dynamic_cast<const GapTask *>(task.get()))
+      judgeGap(result, scenario, *gap_task, pipeline);
+    else
+      judgeSlalom(result);
   }
   if (result.record.is_contact)
     result.outcome = "touched a trunk";
