@@ -166,7 +166,8 @@ TaskCommand GapTask::fly(const std::vector<Obstacle> &trunks, const Pose &wMb)
     const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
     velocity = limited(kAcrossGain * to_entry, m_options.speed);
   }
-  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), trunks, m_options.body_radius);
+  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), trunks, m_options.body_radius,
+                       m_options.evidence);
   return {false, towards(wMb, velocity, heading),
           m_is_lined_up ? "passes the gap" : "lines up"};
 }

@@ -38,17 +38,17 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
 }
 
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
-                          double body_radius)
+                          double body_radius, double evidence)
 {
   constexpr double kDamping = 0.7; // [1/s]: the drone's lag is about half a second
   constexpr double kLeast = 0.12;  // free way at which nothing more leads nearer [m]
   for (const Obstacle &trunk : trunks) {
     const Eigen::Vector2d w = trunk.xy - p;
     const double distance = w.norm();
-    if (!trunk.is_confirmed || distance < 1e-6)
+    if (!trunk.is_confirmed || trunk.evidence < evidence || distance < 1e-6)
       continue;
     const Eigen::Vector2d u = w / distance;
-    const double most = kDamping * (distance - trunk.radius - body_radius - kLeast);
+    const double most = std::max(0.0, kDamping * (distance - trunk.radius - body_radius - kLeast));
     velocity -= std::max(0.0, velocity.dot(u) - most) * u;
   }
   return velocity;

@@ -267,12 +267,10 @@ vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
   return robot;
 }
 
-PipelineOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
+PipelineOptions ServoTrialOptions::defaultPipeline()
 {
   PipelineOptions pipeline;
   pipeline.flow.search_px = 1;
-  if (kind == ServoKind::gap)
-    pipeline.detection.range_min = 1.2;
   return pipeline;
 }
 

@@ -34,7 +34,7 @@ TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
   const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.05, 0.2)};
   Eigen::Vector2d p(0, 0), v(0, 0);
   for (int k = 0; k < 1000; ++k) { // obeys with a lag of 0.5 s
-    v += 0.02 / 0.5 * (keptClear({0.6, 0}, p, trunks, 0.28) - v);
+    v += 0.02 / 0.5 * (keptClear({0.6, 0}, p, trunks, 0.28, 0) - v);
     p += 0.02 * v;
     ASSERT_GT((trunks[0].xy - p).norm(), 0.2 + 0.28) << "after " << k << " steps";
   }
@@ -43,17 +43,26 @@ TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 TEST(KeptClear, AWayThatLeadsPastOrAwayOrToWhatIsNoTrunkYetStaysAsItIs)
 {
   std::vector<Obstacle> trunks{trunkAt(0, 2, 1.5, 0.2)};
-  EXPECT_NEAR((keptClear({0.6, 0}, {2, 0}, trunks, 0.28) - Eigen::Vector2d(0.6, 0)).norm(), 0, 1e-12);
-  EXPECT_NEAR((keptClear({0, -0.6}, {2, 1.0}, trunks, 0.28) - Eigen::Vector2d(0, -0.6)).norm(), 0, 1e-12);
+  EXPECT_NEAR((keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0) - Eigen::Vector2d(0.6, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((keptClear({0, -0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, -0.6)).norm(), 0, 1e-12);
   trunks[0].is_confirmed = false;
-  EXPECT_NEAR((keptClear({0, 0.6}, {2, 1.0}, trunks, 0.28) - Eigen::Vector2d(0, 0.6)).norm(), 0, 1e-12);
+  EXPECT_NEAR((keptClear({0, 0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, 0.6)).norm(), 0, 1e-12);
+}
+
+TEST(KeptClear, NeitherADoubtfulNorANearTrunkPushesTheDroneAway)
+{
+  std::vector<Obstacle> trunks{trunkAt(0, 2, 0.4, 0.2)}; // nearer than the hull allows
+  EXPECT_NEAR(keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0).y(), 0, 1e-12);
+  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).norm(), 0, 1e-12);
+  trunks[0].evidence = -0.5;
+  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).y(), 0.3, 1e-12);
 }
 
 TEST(KeptClear, TheMiddleOfAGapOfTheLeastWidthIsPassedAtFullSpeed)
 {
   const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.75), trunkAt(1, 3, -0.75)}; // 1.2 m free
   for (double x = 0; x < 5; x += 0.05) {
-    const Eigen::Vector2d v = keptClear({0.6, 0}, {x, 0}, trunks, 0.28);
+    const Eigen::Vector2d v = keptClear({0.6, 0}, {x, 0}, trunks, 0.28, 0);
     EXPECT_GT(v.x(), 0.4) << x;
     EXPECT_NEAR(v.y(), 0, 0.05) << x;
   }

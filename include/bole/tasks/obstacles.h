@@ -29,8 +29,9 @@ struct Obstacle
 /// \p observations views (something is there, though it may not be a trunk).
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
 
-/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of \p trunks cut to a speed that dies out
-/// with the free way between a body of \p body_radius [m] and the bark; too near it backs off.
+/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that
+/// dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no trunk
+/// must not drive the drone into one.
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
-                          double body_radius);
+                          double body_radius, double evidence);
 } // namespace bole

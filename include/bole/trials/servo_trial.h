@@ -14,16 +14,15 @@ struct ServoTrialOptions
   double distance = 3;         ///< hold [m], 0.5 to 20
   double ratio = 0;            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
   double speed = 0;            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
-  PipelineOptions pipeline; ///< defaultPipeline() of the task is advised
+  PipelineOptions pipeline = defaultPipeline();
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
   /// vpSimulatorArDrone's defaults with a stiffer velocity loop (gain 0.6) and 2 samples a pixel.
   static vpSimulatorArDrone::Options defaultRobot();
   /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by one
-  /// trunk has little else to correct its heading by. gap: trunks are looked for from 1.2 m on, since one may stand there
-  /// where it takes off.
-  static PipelineOptions defaultPipeline(ServoKind kind);
+  /// trunk has little else to correct its heading by.
+  static PipelineOptions defaultPipeline();
 };
 
 /// What came of it. Figures that a task does not have are NaN.
