@@ -3,6 +3,7 @@
 // time. Usage: benchmark_ablation SEQUENCE... (folders with truth; the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
+#include <bole/geometry/median.h>
 #include <bole/input/asl_source.h>
 #include <bole/output/evaluation.h>
 #include <bole/output/trajectory_writer.h>
@@ -10,10 +11,12 @@
 #include <bole/pipeline/config.h>
 #include <bole/pipeline/pipeline.h>
 
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 namespace
@@ -60,36 +63,86 @@ Evaluation fly(const std::string &sequence, const Step &step)
   Trajectory trajectory;
   for (const auto &pose : pipeline.smoothedTrajectory())
     trajectory.push_back({pose.stamp_ns, pose.wMb});
-  const std::string run = std::filesystem::temp_directory_path() / "bole_ablation";
+  const std::string run = std::filesystem::temp_directory_path() / ("bole_ablation_" + std::to_string(getpid()));
   std::filesystem::create_directories(run);
   writeTrajectory(run + "/trajectory.tum", trajectory);
   writeTrunks(run + "/trunks.csv", pipeline.map());
-  return evaluate(run, sequence);
+  const Evaluation evaluation = evaluate(run, sequence);
+  std::filesystem::remove_all(run);
+  return evaluation;
 }
 
-void print(const std::string &sequence)
+constexpr auto kAligned = static_cast<std::size_t>(Alignment::xy_yaw);
+
+/// The trunks of many flights as if they were one's; medians over the flights of what has no trunks to count.
+class Pool
+{
+public:
+  void add(const Evaluation &evaluation)
+  {
+    const TrunkMetrics &trunks = evaluation.trunks.value();
+    m_found += static_cast<double>(trunks.all.found);
+    m_expected += static_cast<double>(trunks.all.expected);
+    const double confirmed = static_cast<double>(trunks.confirmed);
+    m_confirmed += confirmed;
+    m_true += trunks.precision * confirmed;
+    m_duplicates += trunks.duplicates * confirmed;
+    const double matches = static_cast<double>(trunks.all.matches);
+    m_matches += matches;
+    m_squares += matches * trunks.all.rmse[kAligned] * trunks.all.rmse[kAligned];
+    m_radius_squares += matches * trunks.all.radius_rmse * trunks.all.radius_rmse;
+    for (const TrunkMatch &match : trunks.matches)
+      m_errors.push_back(match.error[kAligned]);
+    if (matches > 0)
+      m_nees.push_back(trunks.all.nees_half);
+    m_ate.push_back(evaluation.smoothed.absolute[kAligned].ate);
+  }
+  void print(const char *name) const
+  {
+    std::printf("| %s | %.2f (%.0f of %.0f) | %.2f | %.2f | %.2f / %.2f | %.1f | %.3f | %.3f |\n", name, m_found / m_expected,
+                m_found, m_expected, m_true / m_confirmed, m_duplicates / m_confirmed, medianOf(m_errors),
+                std::sqrt(m_squares / m_matches), medianOf(m_nees), std::sqrt(m_radius_squares / m_matches), medianOf(m_ate));
+  }
+
+private:
+  double m_found = 0, m_expected = 0, m_confirmed = 0, m_true = 0, m_duplicates = 0, m_matches = 0;
+  double m_squares = 0, m_radius_squares = 0;
+  std::vector<double> m_errors, m_nees, m_ate;
+};
+
+void printHeader(const std::string &title)
 {
   std::printf("\n%s\n\n| step | recall | precision | duplicates | position, aligned: median / RMSE [m] | NEES/2 | radius "
               "RMSE [m] | ATE [m] |\n|---|---|---|---|---|---|---|---|\n",
-              std::filesystem::path(sequence).filename().c_str());
-  constexpr auto kAligned = static_cast<std::size_t>(Alignment::xy_yaw);
-  for (const Step &step : kSteps) {
-    const Evaluation evaluation = fly(sequence, step);
-    const TrunkMetrics &trunks = evaluation.trunks.value();
-    std::printf("| %s | %.2f (%zu of %zu) | %.2f | %.2f | %.2f / %.2f | %.1f | %.3f | %.3f |\n", step.name, trunks.recall,
-                trunks.all.found, trunks.all.expected, trunks.precision, trunks.duplicates, trunks.all.median[kAligned],
-                trunks.all.rmse[kAligned], trunks.all.nees_half, trunks.all.radius_rmse,
-                evaluation.smoothed.absolute[kAligned].ate);
-    std::fflush(stdout);
+              title.c_str());
+}
+
+void flyAll(const std::vector<std::string> &sequences)
+{
+  std::vector<Pool> pools(kSteps.size());
+  for (const std::string &sequence : sequences) {
+    printHeader(std::filesystem::path(sequence).filename());
+    for (std::size_t i = 0; i < kSteps.size(); ++i) {
+      const Evaluation evaluation = fly(sequence, kSteps[i]);
+      Pool one;
+      one.add(evaluation);
+      one.print(kSteps[i].name);
+      std::fflush(stdout);
+      pools[i].add(evaluation);
+    }
   }
+  if (sequences.size() < 2)
+    return;
+  printHeader("all " + std::to_string(sequences.size()) + " flights (NEES/2 and ATE: medians of the flights)");
+  for (std::size_t i = 0; i < kSteps.size(); ++i)
+    pools[i].print(kSteps[i].name);
 }
 } // namespace
 
 int main(int argc, char **argv)
 {
   try {
-    for (const std::string &sequence : bole::test::flightsOf(argc, argv))
-      print(sequence);
+    flyAll(bole::test::flightsOf(argc, argv));
   }
   catch (const std::exception &error) {
     std::fprintf(stderr, "benchmark_ablation: %s\n", error.what());
