@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Time a frame over a long flight: must not grow with its length; and how far the estimate is from
-// the batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg]
+// the batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg] [poses a round]: straight ahead, or
+// round after round past the same trunks.
 #include "support/flight.h"
 #include "support/line_chart.h"
 
@@ -58,6 +59,7 @@ int main(int argc, char **argv)
 {
   bole::test::FlightOptions o;
   o.poses = argc > 1 ? std::atoi(argv[1]) : 20000;
+  o.lap = argc > 3 ? std::atoi(argv[3]) : 0;
   const bole::test::Flight flight = bole::test::simulateFlight(o);
   bole::test::Replay replay(flight, bole::test::smootherFor(o));
   std::vector<double> ms;
@@ -105,7 +107,7 @@ int main(int argc, char **argv)
                windowMedian(400, 600), windowMedian(o.poses - 500, o.poses),
                windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600),
                quantile(ms, 0.99) / quantile(ms, 0.5));
-  if (argc > 2) {
+  if (argc > 2 && *argv[2] != '\0') {
     bole::test::LineChart chart;
     chart.title = "Adding one frame: incremental update and full re-solve";
     chart.x_name = "poses in the graph";
