@@ -3,7 +3,6 @@
 #include <bole/pipeline/pipeline.h>
 
 #include <cmath>
-#include <limits>
 
 namespace bole
 {
@@ -95,7 +94,7 @@ void Pipeline::rescale(double factor)
       trunk.covariance.leftCols<2>() *= factor;
     }
   }
-  refreshMap(-std::numeric_limits<double>::infinity());
+  refreshWholeMap();
   for (StampedPose &pose : m_online)
     pose.wMb.t *= factor;
   if (m_ground_z)
