@@ -9,7 +9,9 @@ namespace
 {
 constexpr std::array<std::uint8_t, 4> kWakeUp = {1, 0, 0, 0};
 constexpr std::size_t kLargestRead = 1 << 16;
-constexpr Milliseconds kPoll{50}, kConnect{500};
+constexpr Milliseconds kPoll{50};
+// With the pause and half a second to a key frame: within a second.
+constexpr Milliseconds kConnect{250};
 constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 } // namespace
@@ -176,9 +178,7 @@ void NavdataReceiver::run()
 
 bool NavdataReceiver::asksForConfig(std::uint32_t bits) const
 {
-  const auto has = [bits](DroneState bit) {
-    return (bits & static_cast<std::uint32_t>(bit)) != 0;
-  };
+  const auto has = [bits](DroneState bit) { return (bits & static_cast<std::uint32_t>(bit)) != 0; };
   return has(DroneState::bootstrap) || has(DroneState::demo_mode) == m_full_navdata;
 }
 } // namespace bole
