@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -68,8 +69,23 @@ Bytes damaged(Bytes bytes, std::mt19937 &random)
   return bytes;
 }
 
-void expectSurvives(int (*target)(const std::uint8_t *, std::size_t), const std::vector<Bytes> &good, int runs)
+/// For libFuzzer to start from: the good inputs as files of BOLE_FUZZ_SEEDS/\p name, when that is set.
+void keepSeeds(const std::string &name, const std::vector<Bytes> &good)
 {
+  const char *folder = std::getenv("BOLE_FUZZ_SEEDS");
+  if (folder == nullptr)
+    return;
+  const std::filesystem::path path = std::filesystem::path(folder) / name;
+  std::filesystem::create_directories(path);
+  for (std::size_t i = 0; i < good.size(); ++i)
+    std::ofstream(path / std::to_string(i), std::ios::binary)
+        .write(reinterpret_cast<const char *>(good[i].data()), static_cast<std::streamsize>(good[i].size()));
+}
+
+void expectSurvives(const std::string &name, int (*target)(const std::uint8_t *, std::size_t),
+                    const std::vector<Bytes> &good, int runs)
+{
+  keepSeeds(name, good);
   std::mt19937 random(1);
   for (const Bytes &bytes : good)
     EXPECT_EQ(target(bytes.data(), bytes.size()), 0);
@@ -127,19 +143,19 @@ TEST(FuzzTargets, DamagedNavdata)
   navdata.physical = Navdata::Physical{};
   std::vector<Bytes> good = {encodeNavdata(navdata)};
   addCaptured(good, "navdata.bin", 1 << 16);
-  expectSurvives(fuzz_navdata, good, 10000);
+  expectSurvives("navdata", fuzz_navdata, good, 10000);
 }
 
 TEST(FuzzTargets, DamagedPaveStreams)
 {
   std::vector<Bytes> good = {paveStream()};
   addCaptured(good, "pave.bin", 40'000);
-  expectSurvives(fuzz_pave, good, 300);
+  expectSurvives("pave", fuzz_pave, good, 300);
 }
 
 TEST(FuzzTargets, DamagedUvlcPictures)
 {
-  expectSurvives(fuzz_uvlc, {encodeUvlc(scene(88, 72, 0), 1), encodeUvlc(scene(160, 120, 3), 2)}, 1500);
+  expectSurvives("uvlc", fuzz_uvlc, {encodeUvlc(scene(88, 72, 0), 1), encodeUvlc(scene(160, 120, 3), 2)}, 1500);
 }
 
 TEST(FuzzTargets, DamagedRecordingsAndCommands)
@@ -158,7 +174,7 @@ TEST(FuzzTargets, DamagedRecordingsAndCommands)
   const Bytes recording{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   ASSERT_GT(recording.size(), 1000u);
   const std::string text = "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
-  expectSurvives(fuzz_recording, {recording, Bytes(text.begin(), text.end())}, 10000);
+  expectSurvives("recording", fuzz_recording, {recording, Bytes(text.begin(), text.end())}, 10000);
 }
 
 TEST(FuzzTargets, DamagedGraphs)
@@ -172,5 +188,5 @@ TEST(FuzzTargets, DamagedGraphs)
   writeG2o(out, replay.smoother.graph());
   const std::string text = out.str();
   ASSERT_GT(text.size(), 1000u);
-  expectSurvives(fuzz_g2o, {Bytes(text.begin(), text.end())}, 1500);
+  expectSurvives("g2o", fuzz_g2o, {Bytes(text.begin(), text.end())}, 1500);
 }
