@@ -94,9 +94,9 @@ std::vector<Fault> allFaults()
   faults[5].name = "`--freeze 4`";
   faults[5].options.freeze_at_s = 4;
   faults[5].over_s = 6;
-  faults[6].name = "`--stall 4.3`";
-  faults[6].options.stall_at_s = 4.3; // ends between key frames
-  faults[6].over_s = 6.3;
+  faults[6].name = "`--stall 4`";
+  faults[6].options.stall_at_s = 4; // the first frame after it is a key frame
+  faults[6].over_s = 6;
   faults[7].name = "`--clock-wrap`";
   faults[7].options.clock_wrap = true;
   faults[8].name = "`--loss 0.05 --corrupt 0.05 --jitter 30 --reboot 4 --clock-wrap`";
