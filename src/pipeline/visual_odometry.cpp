@@ -207,12 +207,14 @@ VisualStep VisualOdometry::step(const Frame &frame, const PointTracker &tracker,
     return result;
   const bool is_held = !m_has_unit;
   Pose caMcb = before.inverse() * placed.wMc;
+  Matrix6d covariance = placed.covariance;
   if (!had_unit && m_has_unit) {
     const std::vector<PlacedFrame> path = m_points.trajectory();
     caMcb = path[path.size() - 2].wMc.inverse() * path.back().wMc;
+    covariance.setZero(); // of the whole way from the start: between two frames of one solution little is left
     linkBacklog(result);
   }
-  const Odometry odometry = toBody(caMcb, placed.covariance, is_held);
+  const Odometry odometry = toBody(caMcb, covariance, is_held);
   if (is_next) {
     result.step.aMb = odometry.aMb;
     result.step.covariance = odometry.covariance;

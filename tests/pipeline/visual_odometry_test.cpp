@@ -5,6 +5,7 @@
 #include <bole/geometry/so3.h>
 #include <bole/pipeline/pipeline.h>
 
+#include <array>
 #include <gtest/gtest.h>
 
 namespace bole
@@ -46,6 +47,23 @@ TEST(PlainVideo, StepsAreThoseOfThePointsUpToOneScale)
   EXPECT_EQ(pipeline.reference().scale, ScaleSource::prior);
   EXPECT_GT(pipeline.reference().scale_sigma, 0.1);
   EXPECT_TRUE(pipeline.reference().has_ranges);
+}
+
+TEST(PlainVideo, NoStepStaysLooseOnceTheUnitIsKnown)
+{
+  constexpr std::size_t kFrames = 24;
+  Pipeline pipeline(kCamera, kMount);
+  for (std::size_t k = 0; k < kFrames; ++k)
+    pipeline.process(frameAt(static_cast<int>(k), sideways(static_cast<int>(k))));
+  std::array<double, kFrames> loosest{}; // of the steps over each frame, the tightest edge's sigma [m]
+  loosest.fill(1e3);
+  for (const auto &edge : pipeline.graph().odometry) {
+    const double sigma = std::sqrt(edge.odometry.covariance.topLeftCorner<3, 3>().trace() / 3);
+    for (std::size_t k = edge.a + 1; k <= edge.b; ++k)
+      loosest[k] = std::min(loosest[k], sigma);
+  }
+  for (std::size_t k = 1; k < kFrames; ++k)
+    EXPECT_LT(loosest[k], 0.1) << "step to frame " << k;
 }
 
 TEST(PlainVideo, ACameraThatOnlyTurnsHasNoRangesAndSaysSo)
