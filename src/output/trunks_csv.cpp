@@ -31,7 +31,7 @@ void writeTrunks(const std::string &path, const std::vector<TrunkRecord> &trunks
   for (const TrunkRecord &trunk : trunks) {
     const Eigen::Matrix2d &P = trunk.covariance_xy;
     fmt::format_to(std::back_inserter(text),
-                   "{},{:.6f},{:.6f},{:.6f},{:.6e},{:.6e},{:.6e},{:.6e},{},{:.9f},{:.9f},{}\n",
+                   "{},{:.6f},{:.6f},{:.6g},{:.6e},{:.6e},{:.6e},{:.6e},{},{:.9f},{:.9f},{}\n",
                    trunk.id, trunk.xy.x(), trunk.xy.y(), trunk.radius, P(0, 0), P(0, 1), P(1, 1),
                    trunk.variance_radius, trunk.observations, trunk.first_seen_s, trunk.last_seen_s,
                    toString(trunk.status));

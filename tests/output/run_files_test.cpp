@@ -131,6 +131,14 @@ TEST_F(RunFiles, TrunksComeBack)
   EXPECT_DOUBLE_EQ(read[0].last_seen_s, 3.1);
 }
 
+TEST_F(RunFiles, TheThinnestTrunkStillComesBack)
+{
+  TrunkRecord thread; // a candidate may shrink to anything before it is given up
+  thread.radius = 3e-8;
+  writeTrunks(path("thin.csv"), {thread});
+  EXPECT_DOUBLE_EQ(readTrunks(path("thin.csv")).at(0).radius, 3e-8);
+}
+
 TEST_F(RunFiles, RefusesTrunksThatAreNone)
 {
   const std::string header = std::string(kTrunksCsvHeader) + "\n";
