@@ -172,7 +172,7 @@ void track(const Arguments &arguments)
     flight.take(std::move(frame));
     progress.update(++count, output.trunksInView(), toString(status));
     if (count % 50 == 0)
-      output.write(pipeline, false);
+      output.keep(pipeline);
   }
   progress.finish();
   if (count == 0)

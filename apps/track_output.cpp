@@ -10,6 +10,7 @@
 #include <bole/smoothing/g2o.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
@@ -32,6 +33,16 @@ vpImage<float> foregroundOf(const Saliency &saliency)
   for (unsigned int i = 0; i < foreground.getSize(); ++i)
     foreground.bitmap[i] = 1 - saliency.p_background.bitmap[i];
   return foreground;
+}
+
+void writeFiles(const std::string &run, const MapPicture &picture, const RunSummary &summary)
+{
+  writeTrajectory(run + "/trajectory.tum", picture.smoothed);
+  writeTrajectory(run + "/trajectory_online.tum", picture.online);
+  writeTrunks(run + "/trunks.csv", picture.trunks);
+  writeMap(run + "/map.svg", picture);
+  writeTiming(run + "/timing.csv", summary.timing);
+  writeSummary(run + "/summary.json", summary);
 }
 } // namespace
 
@@ -121,7 +132,7 @@ void TrackOutput::setLink(const LinkCounters &link)
   figures["live_navdata_late"] = static_cast<double>(link.navdata_late);
 }
 
-void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
+void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
 {
   m_picture.smoothed = toTrajectory(pipeline.smoothedTrajectory());
   m_picture.online = toTrajectory(pipeline.onlineTrajectory());
@@ -133,13 +144,28 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
   m_confirmed = static_cast<int>(
       std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),
                     [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
-  writeTrajectory(m_run + "/trajectory.tum", m_picture.smoothed);
-  writeTrajectory(m_run + "/trajectory_online.tum", m_picture.online);
-  writeTrunks(m_run + "/trunks.csv", m_picture.trunks);
+}
+
+void TrackOutput::keep(const Pipeline &pipeline)
+{
+  if (m_keeping.valid()) {
+    if (m_keeping.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+      return;
+    m_keeping.get(); // throws what went wrong
+  }
+  take(pipeline, false);
+  m_keeping = std::async(std::launch::async, [run = m_run, picture = m_picture, summary = m_summary] {
+    writeFiles(run, picture, summary);
+  });
+}
+
+void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
+{
+  if (m_keeping.valid())
+    m_keeping.get();
+  take(pipeline, is_complete);
+  writeFiles(m_run, m_picture, m_summary);
   writeG2o(m_run + "/graph.g2o", pipeline.graph());
-  writeMap(m_run + "/map.svg", m_picture);
-  writeTiming(m_run + "/timing.csv", m_summary.timing);
-  writeSummary(m_run + "/summary.json", m_summary);
 }
 
 void TrackOutput::finish()

@@ -9,6 +9,7 @@
 #include <bole/output/video_writer.h>
 #include <bole/pipeline/pipeline.h>
 
+#include <future>
 #include <memory>
 #include <string>
 
@@ -28,7 +29,10 @@ public:
   void addSilence(std::size_t frames);
   /// What came of the drone's packets.
   void setLink(const LinkCounters &link);
-  /// Writes all but the videos, as known now.
+  /// Begins to write what is known now, in the background: all but the videos and the graph, which
+  /// takes longer than a frame. Nothing while the last one is still being written.
+  void keep(const Pipeline &pipeline);
+  /// Writes all but the videos.
   void write(const Pipeline &pipeline, bool is_complete);
   /// Ends the videos.
   void finish();
@@ -38,6 +42,8 @@ public:
   const TimingTable &timing() const { return m_summary.timing; }
 
 private:
+  void take(const Pipeline &pipeline, bool is_complete);
+
   std::string m_run;
   RunSummary m_summary;
   PinholeCamera m_camera;
@@ -45,5 +51,6 @@ private:
   std::unique_ptr<VideoWriter> m_overlay, m_saliency;
   std::size_t m_in_view = 0;
   int m_confirmed = 0;
+  std::future<void> m_keeping; ///< last: it ends before the rest goes
 };
 } // namespace bole::apps
