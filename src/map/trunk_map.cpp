@@ -234,12 +234,22 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
   return changes;
 }
 
-void TrunkMap::leaveBehind(double now_s)
+std::vector<int> TrunkMap::leaveBehind(double now_s)
 {
+  std::vector<int> removed;
   const auto is_left_behind = [&](std::size_t i) {
-    return m_trunks[i].status == TrunkStatus::candidate && now_s - m_trunks[i].last_seen_s > m_options.candidate_memory_s;
+    MapTrunk &trunk = m_trunks[i];
+    if (trunk.status != TrunkStatus::candidate || now_s - trunk.last_seen_s <= m_options.candidate_memory_s)
+      return false;
+    if (trunk.observations == 0) {
+      trunk.removed = true;
+      trunk.status = TrunkStatus::lost;
+      removed.push_back(trunk.id);
+    }
+    return true;
   };
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(), is_left_behind), m_active.end());
+  return removed;
 }
 
 std::vector<int> TrunkMap::removeAll()

@@ -178,12 +178,15 @@ void Pipeline::reviewMap(double time_s)
 {
   constexpr double kLately_s = 1;
   refreshMap(time_s - kLately_s);
-  for (const MapChange &change : m_map.review(!isTurning())) {
-    const MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(change.id)];
+  const auto forgetRemoved = [this](int id) {
+    const MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(id)];
     if (trunk.removed && m_smoother.hasTrunk(trunk.smoother_id))
       m_smoother.removeTrunk(trunk.smoother_id);
-  }
-  m_map.leaveBehind(time_s);
+  };
+  for (const MapChange &change : m_map.review(!isTurning()))
+    forgetRemoved(change.id);
+  for (const int id : m_map.leaveBehind(time_s))
+    forgetRemoved(id);
 }
 
 /// Covariances are asked for where something was seen lately: that of a trunk left behind hardly changes, and costs a walk

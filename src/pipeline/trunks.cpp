@@ -163,7 +163,9 @@ void Pipeline::keepView(const Frame &frame, Gradient gradient)
       m_views.pop_back();
   }
   m_views.push_back(std::move(view));
-  if (static_cast<int>(m_views.size()) > m_options.detection.window)
+  const auto lag = static_cast<std::size_t>(m_options.smoothing.fixed_lag);
+  const auto is_closed = [&] { return lag > 0 && m_views.front().pose + lag <= pose + 1; }; // nothing more is told of it
+  while (static_cast<int>(m_views.size()) > m_options.detection.window || is_closed())
     m_views.pop_front();
 }
 
@@ -267,6 +269,8 @@ void Pipeline::adopt(const Detection &detection)
         tracked.left_used && tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
       seen.emplace_back(view.pose, tracked);
   }
+  if (seen.empty())
+    trunk.first_seen_s = trunk.last_seen_s = m_views.back().time_s; // waits for its first view
   trunk.hits = 0; // it was fitted to these: only what comes after puts it to the test
   m_smoother.update();
   const Trunk fitted = m_smoother.trunk(smoother_id);

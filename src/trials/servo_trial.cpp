@@ -271,6 +271,7 @@ PipelineOptions ServoTrialOptions::defaultPipeline()
 {
   PipelineOptions pipeline;
   pipeline.flow.search_px = 1;
+  pipeline.smoothing.fixed_lag = 150;
   return pipeline;
 }
 

@@ -253,6 +253,20 @@ TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeen
   EXPECT_EQ(m_map.records().size(), 1u);
 }
 
+TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
+{
+  const int never_seen = m_map.add(0, trunkAt(3, 1)).id;
+  m_map.trunks().front().last_seen_s = 10;
+  MapTrunk &seen = m_map.add(1, trunkAt(5, 1));
+  m_map.recordView(seen, {10.0, 0.3, 0.2, 0.2, 1, 0});
+  EXPECT_TRUE(m_map.leaveBehind(10.0 + 0.99 * m_options.candidate_memory_s).empty());
+
+  EXPECT_EQ(m_map.leaveBehind(10.0 + 1.01 * m_options.candidate_memory_s), std::vector<int>{never_seen});
+
+  EXPECT_TRUE(m_map.trunks()[0].removed);
+  EXPECT_FALSE(m_map.trunks()[1].removed);
+}
+
 TEST_F(Life, AConfirmedTrunkIsNeverLeftBehind)
 {
   confirmed(trunkAt(3, 1), 200);

@@ -119,8 +119,9 @@ public:
   std::vector<MapChange> review(bool has_ranges = true);
 
   /// Candidates that were left behind before they could be confirmed, and are not active any more. What was seen of them
-  /// stands: they stay in the smoother and in records().
-  void leaveBehind(double now_s);
+  /// stands: they stay in the smoother and in records(). Those of which nothing was ever seen are removed; returns their
+  /// ids: a drone that rests is offered the same wrong ones in every frame.
+  std::vector<int> leaveBehind(double now_s);
 
   /// Gives up all that is active. Returns their ids.
   std::vector<int> removeAll();

@@ -21,7 +21,8 @@ struct ServoTrialOptions
   /// vpSimulatorArDrone's defaults with a stiffer velocity loop (gain 0.6) and 2 samples a pixel.
   static vpSimulatorArDrone::Options defaultRobot();
   /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by one
-  /// trunk has little else to correct its heading by.
+  /// trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from one
+  /// place would make each frame dearer than the last.
   static PipelineOptions defaultPipeline();
 };
 
