@@ -193,23 +193,21 @@ void Pipeline::reviewMap(double time_s)
 /// back to where it stood.
 void Pipeline::refreshMap(double seen_since_s)
 {
-  for (const std::size_t i : m_map.active())
-    refresh(m_map.trunks()[i], seen_since_s);
+  for (const std::size_t i : m_map.active()) {
+    MapTrunk &trunk = m_map.trunks()[i];
+    trunk.trunk = m_smoother.trunk(trunk.smoother_id);
+    if (trunk.last_seen_s >= seen_since_s)
+      trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+  }
 }
 
-/// Those that were left behind, too.
+/// Also where the candidates stand that were left behind; there are too many to ask for their covariances.
 void Pipeline::refreshWholeMap()
 {
   for (MapTrunk &trunk : m_map.trunks())
     if (!trunk.removed)
-      refresh(trunk, -std::numeric_limits<double>::infinity());
-}
-
-void Pipeline::refresh(MapTrunk &trunk, double seen_since_s) const
-{
-  trunk.trunk = m_smoother.trunk(trunk.smoother_id);
-  if (trunk.last_seen_s >= seen_since_s)
-    trunk.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+      trunk.trunk = m_smoother.trunk(trunk.smoother_id);
+  refreshMap(-std::numeric_limits<double>::infinity());
 }
 
 std::vector<TrunkRecord> Pipeline::map() const

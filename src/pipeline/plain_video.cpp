@@ -90,9 +90,9 @@ void Pipeline::rescale(double factor)
     if (trunk.removed) {
       trunk.trunk.xy *= factor;
       trunk.trunk.log_radius += std::log(factor);
-      trunk.covariance.topRows<2>() *= factor;
-      trunk.covariance.leftCols<2>() *= factor;
     }
+    trunk.covariance.topRows<2>() *= factor;
+    trunk.covariance.leftCols<2>() *= factor;
   }
   refreshWholeMap();
   for (StampedPose &pose : m_online)

@@ -87,7 +87,6 @@ public:
   /// Trunk record fields that need the smoother are refreshed from it; called by process() and finish().
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
-  void refresh(MapTrunk &trunk, double seen_since_s) const;
 
 private:
   struct View ///< a frame of the detector's window
