@@ -230,7 +230,8 @@ void Pipeline::finish()
 {
   if (m_smoother.poseCount() == 0)
     return;
-  m_smoother.optimize();
+  constexpr double kSettled = 1e-6; // of the cost: no view notices
+  m_smoother.optimize(kSettled);
   refreshWholeMap();
   reviewScale(0, true);
 }
