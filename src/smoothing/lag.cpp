@@ -6,12 +6,16 @@
 
 namespace bole
 {
+/// Poses between two whose covariance is taken on closing: it is a walk through the whole lag, and changes slowly.
+constexpr int kCovarianceEvery = 16;
+
 /// A leaf of the tree leaves exactly its contribution behind.
 void Smoother::State::closeVariable(int id)
 {
   Variable &v = variables[id];
   if (v.is_pose) {
-    poses[v.number].closed_covariance = poseCovariance(v.number);
+    poses[v.number].closed_covariance =
+        v.number % kCovarianceEvery == 0 ? poseCovariance(v.number) : poses[v.number - 1].closed_covariance;
     poses[v.number].point = estimate(poses[v.number]);
   }
   else {

@@ -211,7 +211,7 @@ public:
   void pushChildren(int id, int depth, int quiet);
   void settle(Variable &v, int id, double *rhs, UpdateResult &result);
   int movableAge() const;
-  int oldestPose(const Variable &variable) const;
+  int reachBack(const Variable &variable) const;
   void moveLinearisation(UpdateResult &result);
   Eigen::Vector3d shiftBeyondAffected() const;
   void dropOldContributions();

@@ -16,8 +16,8 @@ constexpr int kContributionEvery =
 constexpr int kReach = 256; ///< variables below the eliminated ones that a pass visits
 constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
 constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
-constexpr int kNearAge = 400; ///< poses behind the newest: points that reach no farther may always move
-constexpr unsigned kFartherEvery = 64; ///< passes until some may reach twice as far, and so on
+constexpr int kNearAge = 100; ///< poses behind the newest: points that reach no farther may always move
+constexpr unsigned kFartherEvery = 16; ///< passes until some may reach twice as far, and so on
 constexpr int kQuiet = 16;    ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
@@ -240,16 +240,20 @@ int Smoother::State::movableAge() const
   return age;
 }
 
-/// The oldest pose that is eliminated again when \p variable is linearised again.
-int Smoother::State::oldestPose(const Variable &variable) const
+/// How many poses behind the newest those stand that are eliminated again when \p variable is linearised again. What a
+/// closed variable left behind lies at the far end of all that is open.
+int Smoother::State::reachBack(const Variable &variable) const
 {
-  if (variable.is_pose)
-    return variable.number;
-  int oldest = trunks[variable.number].last_pose;
-  for (const int f : variable.factors)
+  const int newest = static_cast<int>(poses.size()) - 1;
+  int oldest = variable.is_pose ? variable.number : trunks[variable.number].last_pose;
+  int reach = 0;
+  for (const int f : variable.factors) {
     if (factors[f].kind == FactorKind::observation)
       oldest = std::min(oldest, variables[factors[f].a].number);
-  return oldest;
+    if (factors[f].kind == FactorKind::marginal)
+      reach = std::max(newest - oldest_open_pose, kNearAge + 1);
+  }
+  return std::max(reach, newest - oldest);
 }
 
 /// Linearises anew what moved too far, and what is eliminated again anyway. Points must fit
@@ -263,8 +267,8 @@ int Smoother::State::oldestPose(const Variable &variable) const
 /// must wait is found once more by a later pass.
 void Smoother::State::moveLinearisation(UpdateResult &result)
 {
-  const int newest = static_cast<int>(poses.size()) - 1, oldest = newest - movableAge();
-  const auto mayMove = [&](const Variable &v) { return oldestPose(v) >= oldest; };
+  const int age = movableAge();
+  const auto mayMove = [&](const Variable &v) { return reachBack(v) <= age; };
   const auto move = [&](int id) {
     variables[id].in_moved = true;
     touchNeighbours(id);

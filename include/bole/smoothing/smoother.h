@@ -172,7 +172,8 @@ public:
   double cost() const;
 
   // Marginal covariances of the linearised graph as of the last update(): that of what was not yet
-  // taken in is not known. For a trunk or pose closed by the fixed lag: its last one.
+  // taken in is not known. For a trunk closed by the fixed lag: its last one; for a pose: that of
+  // one at most 15 poses before it, when that was closed.
 
   Matrix5d trunkCovariance(std::size_t trunk) const;
   Matrix6d poseCovariance(std::size_t pose) const;
