@@ -26,7 +26,7 @@ Eigen::Vector3d directionPlus(const Eigen::Vector3d &d, const Eigen::Vector2d &t
 
 Eigen::Vector2d directionMinus(const Eigen::Vector3d &e, const Eigen::Vector3d &d)
 {
-  const Eigen::Vector2d in_plane = directionBasis(d).transpose() * e;
+  Eigen::Vector2d in_plane = directionBasis(d).transpose() * e;
   const double sine = in_plane.norm();
   if (sine < 1e-12) {
     return in_plane;
