@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "borders.h"
+
 #include <bole/tracking/border_energy.h>
 
 #include <bole/geometry/require_range.h>
@@ -8,11 +10,6 @@
 
 namespace bole
 {
-namespace
-{
-constexpr Border kBorders[] = {Border::left, Border::right};
-} // namespace
-
 void EnergyOptions::validate() const
 {
   requireRange("energy.alpha", alpha, 0.01, 100);

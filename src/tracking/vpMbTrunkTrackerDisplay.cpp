@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What vpMbTrunkTracker shows, and how well its model lies on the image.
+#include "borders.h"
+
 #include <bole/vpMbTrunkTracker.h>
 
 #include <algorithm>
@@ -7,11 +9,10 @@
 #include <visp3/core/vpDisplay.h>
 
 using bole::Border;
+using bole::kBorders;
 
 namespace
 {
-const std::array<Border, 2> kBorders{Border::left, Border::right};
-
 template <class Image>
 void draw(const Image &I, const std::vector<std::vector<double>> &lines, const std::vector<std::vector<double>> &features,
           const vpColor &colour, unsigned int thickness)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The estimation of vpMbTrunkTracker: predict, scan, choose, judge; the servoing is in vpMbTrunkTrackerServo.cpp.
+#include "borders.h"
 #include "camera_twist.h"
 
 #include <bole/vpMbTrunkTracker.h>
@@ -11,6 +12,7 @@
 
 using bole::Border;
 using bole::inverted;
+using bole::kBorders;
 using bole::Matrix6d;
 using bole::moved;
 using bole::Pose;
@@ -23,8 +25,6 @@ using Status = vpMbTrunkTracker::Status;
 namespace
 {
 constexpr double kTrustAgain = 0.06; ///< of agreement beyond Options::min_agreement
-
-const std::array<Border, 2> kBorders{Border::left, Border::right};
 
 /// Cost of following a peak, half a squared deviation: how its contrast differs from what is expected, how far it is.
 double peakCost(const bole::ContrastPeak &peak, double expected_offset, double sigma_px, double reference, bool signs)

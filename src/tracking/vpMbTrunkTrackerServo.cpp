@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The virtual visual servoing of vpMbTrunkTracker: from found places to a pose and its covariance.
+#include "borders.h"
 #include "camera_twist.h"
 
 #include <bole/vpMbTrunkTracker.h>
@@ -8,6 +9,7 @@
 
 using bole::Border;
 using bole::inverted;
+using bole::kBorders;
 using bole::Matrix6d;
 using bole::moved;
 using bole::Pose;
@@ -21,8 +23,6 @@ namespace
 {
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 using Vector9d = Eigen::Matrix<double, 9, 1>;
-
-const std::array<Border, 2> kBorders{Border::left, Border::right};
 } // namespace
 
 Matrix6d vpMbTrunkTracker::estimatedInObject() const

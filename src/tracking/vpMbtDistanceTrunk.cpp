@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "borders.h"
+
 #include <bole/vpMbtDistanceTrunk.h>
 
 #include <Eigen/Geometry>
@@ -9,12 +11,12 @@
 #include <visp3/core/vpException.h>
 
 using bole::Border;
+using bole::kBorders;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 namespace
 {
-const std::array<Border, 2> kBorders{Border::left, Border::right};
 constexpr double kProfileRate = 0.5; ///< how fast the remembered profile follows: the background moves on behind the border
 
 void check(const char *name, double value, double low, double high)
