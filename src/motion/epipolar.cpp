@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "epipolar.h"
 
+#include <bole/geometry/median.h>
 #include <bole/geometry/so3.h>
 
 #include <Eigen/Dense>
@@ -287,9 +288,7 @@ Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double
   }
   parallax.ratio = along / std::max(across, 1e-3 * sum);
   parallax.score = agreement / std::sqrt(std::max(squares, 1e-12));
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  parallax.median = *middle;
+  parallax.median = medianOf(std::move(lengths));
   return parallax;
 }
 

@@ -3,6 +3,8 @@
 
 #include "require.h"
 
+#include <bole/geometry/median.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -110,10 +112,7 @@ double ScaleFromHeight::metresPerUnit() const
   if (m_logs.empty()) {
     return 1;
   }
-  std::vector<double> sorted = m_logs;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  double centre = *middle;
+  double centre = medianOf(m_logs);
   for (int round = 0; round < 5; ++round) {
     double sum = 0, weights = 0;
     for (std::size_t i = 0; i < m_logs.size(); ++i) {

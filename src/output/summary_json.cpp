@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include <bole/geometry/median.h>
 #include <bole/output/atomic_file.h>
 #include <bole/output/summary_json.h>
 
@@ -23,11 +24,7 @@ using Json = nlohmann::ordered_json;
 
 Json median(std::vector<double> values)
 {
-  if (values.empty())
-    return nullptr;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return values.empty() ? Json() : Json(medianOf(std::move(values)));
 }
 
 Json trunksJson(const std::vector<TrunkRecord> &trunks)
