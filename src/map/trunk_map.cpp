@@ -67,8 +67,8 @@ void TrunkMap::recordView(MapTrunk &trunk, const TrunkView &view) const
   ++trunk.hits;
   trunk.misses_in_a_row = 0;
   const auto blend = [](std::optional<double> &mean, double now) {
-    if (now != 0)
-      mean = mean ? 0.7 * *mean + 0.3 * now : now;
+    if (now != 0) // one that turned over begins anew
+      mean = mean && *mean * now > 0 ? 0.7 * *mean + 0.3 * now : now;
   };
   const double weaker = std::min(std::abs(view.left_contrast), std::abs(view.right_contrast));
   if (weaker > 0)

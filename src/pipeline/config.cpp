@@ -96,7 +96,9 @@ void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
                                  {"flow.gate", &o.gate},
                                  {"flow.contrast_noise", &o.contrast_noise},
                                  {"flow.gate_sigma_px", &o.gate_sigma_px},
-                                 {"flow.search_px", &o.search_px}});
+                                 {"flow.search_px", &o.search_px},
+                                 {"flow.view_correlation", &o.view_correlation},
+                                 {"flow.turned_frames", &o.turned_frames}});
 }
 
 void addMotion(std::vector<OptionEntry> &entries, MotionModelOptions &o)

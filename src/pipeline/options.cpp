@@ -18,6 +18,8 @@ void FlowOptions::validate() const
   requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
   requireRange("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
   requireRange("flow.search_px", search_px, 0, 5);
+  requireRange("flow.view_correlation", view_correlation, 0, 1);
+  requireRange("flow.turned_frames", turned_frames, 0, 1000);
 }
 
 void PipelineOptions::validate() const

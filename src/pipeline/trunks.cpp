@@ -79,12 +79,23 @@ double Pipeline::misfit(const TrackingResult &tracked, const RelativeTrunk &expe
          (1 + std::pow(width_px / 20, 2) + std::pow(m_options.flow.contrast_noise / weakest, 2));
 }
 
+/// Share of its information that a view from \p camera adds to the one before.
+double Pipeline::weightOfView(const MapTrunk &trunk, const Eigen::Vector3d &camera) const
+{
+  constexpr double kLeast = 0.05; // holds the pose of a drone at rest
+  if (m_options.flow.view_correlation <= 0 || !trunk.seen_from)
+    return 1;
+  return std::clamp((camera - *trunk.seen_from).norm() / m_options.flow.view_correlation, kLeast, 1.0);
+}
+
 bool Pipeline::observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction,
                        const TrackingResult &tracked, double time_s)
 {
-  const SummaryFactor summary{tracked.optimum, tracked.energy, tracked.f, tracked.F};
+  const double weight = weightOfView(trunk, cameraAt(pose).t);
+  const SummaryFactor summary{tracked.optimum, weight * tracked.energy, weight * tracked.f, weight * tracked.F};
   if (m_smoother.addObservation(pose, trunk.smoother_id, summary) != SummaryStatus::ok)
     return false;
+  trunk.seen_from = cameraAt(pose).t;
   const double innovation2 = misfit(tracked, prediction.relative);
   m_map.recordView(trunk, {time_s, bearingOf(cameraAt(pose), trunk.trunk), tracked.left_contrast,
                            tracked.right_contrast, tracked.evenness, innovation2});
@@ -109,6 +120,8 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
     TrackingResult tracked = trackTrunk(gradient, m_camera, prediction, m_options.tracking);
     if (tracked.status == TrackingStatus::tracked && !insideGate(prediction, tracked))
       tracked.status = TrackingStatus::diverged;
+    if (hasTurned(trunk, prediction, tracked))
+      tracked.status = TrackingStatus::tracked;
     if (tracked.status == TrackingStatus::not_visible)
       continue;
     if (tracked.status == TrackingStatus::tracked)
@@ -125,6 +138,16 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
                              tracked.status == TrackingStatus::tracked ? tracked.optimum : relative, prediction.range,
                              isTurning() ? 0 : range});
   }
+}
+
+/// Whether the borders found have the other sign, but stand where they are expected, and have done so long enough.
+bool Pipeline::hasTurned(MapTrunk &trunk, const TrackingPrediction &prediction, const TrackingResult &tracked) const
+{
+  TrackingPrediction narrow = prediction;
+  narrow.covariance(2, 2) -= missedVariance(trunk.misses_in_a_row);
+  const bool is_near = tracked.status == TrackingStatus::sign_changed && insideGate(narrow, tracked);
+  trunk.turned_in_a_row = is_near ? trunk.turned_in_a_row + 1 : 0;
+  return m_options.flow.turned_frames > 0 && trunk.turned_in_a_row >= m_options.flow.turned_frames;
 }
 
 /// Of the bearing of a trunk that was missed: what a prediction is wrong by is wrong by more in the next frame.

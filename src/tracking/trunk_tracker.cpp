@@ -223,11 +223,11 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   result.F = curvature.F;
   if (curvature.negative || !result.F.allFinite() || !result.optimum.isFinite())
     return finish(TrackingStatus::negative_curvature);
+  result.evenness = evennessOf(gradient, camera, result, prediction.range);
   const auto flipped = [](double now, const std::optional<double> &before) { return before && now * *before < 0; };
   if (flipped(result.left_contrast, prediction.left_contrast) ||
       flipped(result.right_contrast, prediction.right_contrast))
     return finish(TrackingStatus::sign_changed);
-  result.evenness = evennessOf(gradient, camera, result, prediction.range);
   return finish(TrackingStatus::tracked);
 }
 } // namespace bole

@@ -239,6 +239,19 @@ TEST_F(Life, AConfirmedTrunkThatIsLostKeepsItsPlaceAndComesBackUnderItsId)
   EXPECT_EQ(trunk.id, id);
 }
 
+TEST_F(Life, ABorderWhoseSignTurnsOverBeginsAnew)
+{
+  MapTrunk &trunk = m_map.add(0, trunkAt(3, 1));
+  m_map.recordView(trunk, {1.0, 0.3, -0.2, 0.1, 1, 0});
+  m_map.recordView(trunk, {1.1, 0.3, -0.1, 0.2, 1, 0});
+  EXPECT_NEAR(*trunk.left_contrast, -0.17, 1e-12);
+
+  m_map.recordView(trunk, {1.2, 0.3, 0.05, 0.2, 1, 0});
+
+  EXPECT_NEAR(*trunk.left_contrast, 0.05, 1e-12);
+  EXPECT_GT(*trunk.right_contrast, 0.1);
+}
+
 TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeenOfIt)
 {
   MapTrunk &candidate = m_map.add(0, trunkAt(3, 1));

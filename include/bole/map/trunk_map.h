@@ -57,6 +57,8 @@ struct MapTrunk
   Trunk trunk;                               ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
   int observations = 0;                      ///< summary factors
+  std::optional<Eigen::Vector3d> seen_from; ///< the camera's place at its last view [m]
+  int turned_in_a_row = 0; ///< frames in which its borders had the other sign where they were expected
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
   int found_again = 0;                           ///< times the detector came to the same reading later
   double contrast = 0;                           ///< running mean of the weaker border's

@@ -51,6 +51,11 @@ struct FlowOptions
   double gate_sigma_px = 1.0;    ///< of a border beside the prediction [px], 0.1 to 10
   double search_px = 0;          ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
                                  ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
+  double view_correlation = 0;   ///< views of a trunk from places nearer to one another than this share what is wrong in
+                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
+  int turned_frames = 0;         ///< borders whose sign turned over are believed when found where they are expected in so
+                                 ///< many frames in a row: seen from its other side, what was brighter than the background
+                                 ///< is darker; 0 (never) to 1000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
