@@ -6,6 +6,13 @@
 
 namespace bole
 {
+namespace
+{
+constexpr double kMisread = 0.3; ///< of the radius: a border read inside the bark, where light and shade meet
+constexpr double kDoubted = -2;  ///< log odds below which a candidate is taken for nothing
+constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
+} // namespace
+
 double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
 {
   const Eigen::Vector2d away = p - xy;
@@ -26,13 +33,16 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
       continue;
     const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
     const double d = w.norm();
-    if (d > range || d < 1e-6)
+    const double evidence = pipeline.evidence(trunk);
+    if (d > range || d < trunk.trunk.radius() + kFlownThrough || (!is_confirmed && evidence < kDoubted))
       continue;
     const Matrix4d relative = pipeline.smoother().relativeCovariance(trunk.smoother_id);
     const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
     const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
+    const double misread = kMisread * trunk.trunk.radius();
     near.push_back({trunk.id, is_confirmed, xy, trunk.trunk.radius(),
-                    across * n * n.transpose() + along * u * u.transpose(), pipeline.evidence(trunk)});
+                    across * n * n.transpose() + along * u * u.transpose() + misread * misread * Eigen::Matrix2d::Identity(),
+                    evidence});
   }
   return near;
 }

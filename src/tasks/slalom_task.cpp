@@ -19,9 +19,10 @@ constexpr double kOffsetGain = 1.0;    ///< sideways velocity over offset [1/s]
 constexpr double kOffLine = 0.12;      ///< cost a metre off the line
 constexpr double kChange = 0.08;       ///< cost a metre of a change of mind
 constexpr double kSlow = 1.5;          ///< cost of standing still against full speed
-constexpr double kNear = 6;            ///< cost a square metre inside the margin
+constexpr double kNear = 12;           ///< cost a square metre inside the margin and a second
 constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
 constexpr double kLook = 0.6;          ///< share of the direction of flight that the heading takes
+constexpr double kSwingOn = 0.6;       ///< the swing goes on as if flying at [m/s], at the least
 constexpr double kRange = 9;           ///< trunks farther do not matter yet [m]
 
 double line(double x, const SlalomTaskOptions &options)
@@ -38,22 +39,31 @@ double sidewaysTo(double offset, double y, const SlalomTaskOptions &options)
 void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState state, const SlalomTaskOptions &options)
 {
   way.clearance = std::numeric_limits<double>::infinity();
-  double contact_s = options.horizon;
+  const auto clearanceOf = [&options](const Obstacle &trunk, const SlalomState &at) {
+    return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
+  };
+  std::vector<double> allowed; // who is nearer than that already may leave
+  for (const Obstacle &trunk : trunks)
+    allowed.push_back(std::min(0.0, clearanceOf(trunk, state)));
+  double contact_s = options.horizon, depth = 0;
   for (double t = 0; t < options.horizon; t += kStep_s) {
     state.vy += kStep_s / options.lag * (sidewaysTo(way.offset, state.y, options) - state.vy);
     state.y += kStep_s * state.vy;
     state.x += kStep_s * way.speed;
-    for (const Obstacle &trunk : trunks) {
-      const double clearance = trunk.clearance({state.x, state.y}, options.sigmas) - options.body_radius;
-      if (clearance < 0)
+    double clearance = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < trunks.size(); ++k) {
+      const double to_trunk = clearanceOf(trunks[k], state);
+      clearance = std::min(clearance, to_trunk);
+      if (to_trunk < allowed[k])
         contact_s = std::min(contact_s, t);
-      way.clearance = std::min(way.clearance, clearance);
+      depth = std::max(depth, allowed[k] - to_trunk);
     }
+    way.clearance = std::min(way.clearance, clearance);
+    const double inside = std::max(0.0, options.margin - clearance); // for as long as it is: near a trunk, away from it
+    way.cost += kStep_s * kNear * inside * inside;
   }
-  const double inside = std::max(0.0, options.margin - way.clearance);
-  way.cost += kNear * inside * inside;
-  if (way.clearance < 0)
-    way.cost += kContact * (1 - way.clearance + (options.horizon - contact_s));
+  if (depth > 0)
+    way.cost += kContact * (1 + depth + (options.horizon - contact_s));
 }
 } // namespace
 
@@ -79,7 +89,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
 {
   SlalomWay best;
   best.cost = std::numeric_limits<double>::infinity();
-  const double wanted = line(state.x + options.speed, options); // a second ahead
+  const double wanted = line(state.x + state.lead + options.speed, options); // a second ahead
   for (const double share : {1.0, 0.6, 0.25, 0.0})
     for (double offset = -options.reach; offset <= options.reach + 1e-9; offset += kOffsetStep) {
       SlalomWay way{wanted + offset, share * options.speed, 0, 0};
@@ -117,6 +127,7 @@ void SlalomTask::locate(const FrameResult &result)
   const double dt = time_s - m_time_s;
   if (dt > 0)
     m_state.vy += 0.4 * (std::clamp((p.y() - m_state.y) / dt, -2.0, 2.0) - m_state.vy);
+  m_state.lead += std::max(0.0, kSwingOn * dt - (p.x() - m_state.x));
   m_state.x = p.x();
   m_state.y = p.y();
   m_time_s = time_s;

@@ -168,6 +168,24 @@ TEST(Slalom, KeepsFartherFromWhatIsLessWellKnown)
   EXPECT_GT(std::abs(chooseWay({vague}, state, 0, {}).offset), std::abs(chooseWay({sure}, state, 0, {}).offset));
 }
 
+TEST(Slalom, LeavesATrunkBesideItThoughNoWayLeadsNearer)
+{
+  const Obstacle beside = trunkAt(0, 0.1, -0.6, 0.2); // 12 cm from the hull
+  SlalomTaskOptions straight;
+  straight.swing = 0;
+  EXPECT_EQ(chooseWay({}, {}, 0, straight).offset, 0);
+  EXPECT_GE(chooseWay({beside}, {}, 0, straight).offset, 0.25);
+}
+
+TEST(Slalom, LeavesWhatItStandsInByTheMap)
+{
+  Obstacle ghost = trunkAt(0, 0.3, -0.2, 0.1); // there is no free way but away from it
+  const SlalomWay way = chooseWay({ghost}, {}, 0, {});
+  EXPECT_LT(way.clearance, 0);
+  EXPECT_GT(way.offset, 0.2);
+  EXPECT_LT(way.cost, 100); // which no contact costs
+}
+
 TEST(Slalom, StopsBeforeAWallWithoutOpening)
 {
   std::vector<Obstacle> trunks;

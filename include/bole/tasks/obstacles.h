@@ -10,7 +10,8 @@
 namespace bole
 {
 /// A trunk at the height of the drone, with how well its place *relative to the drone* is known: across the line of
-/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is seen well).
+/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is seen well),
+/// either way by as much as a border may have been read inside the bark.
 /// The covariance in the world would count the drone's own drift, which moves drone and trunk alike.
 struct Obstacle
 {
@@ -26,7 +27,8 @@ struct Obstacle
 };
 
 /// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
-/// \p observations views (something is there, though it may not be a trunk).
+/// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
+/// below -2, or where the drone is.
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
 
 /// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that

@@ -6,7 +6,8 @@
 /// Idea: each frame the ways to a set of sideways offsets, at a few speeds, are flown in thought over the next seconds
 /// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near
 /// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The line itself swings from
-/// side to side: flying straight at a trunk gives no parallax, and what has none is not in the map. The camera looks
+/// side to side: flying straight at a trunk gives no parallax, and what has none is not in the map. It swings on where the
+/// drone is held up, since what is no trunk shows itself as such from another side. The camera looks
 /// half-way into the direction of flight.
 
 #include <bole/tasks/obstacles.h>
@@ -42,10 +43,11 @@ struct SlalomWay
   double cost = 0;
 };
 
-/// Where the drone is on its line: x along, y across (left), [m]; \p vy [m/s].
+/// Where the drone is on its line: x along, y across (left), [m]; \p vy [m/s]; \p lead: by how much the swing of the line
+/// is ahead of x [m], since it goes on where the drone does not.
 struct SlalomState
 {
-  double x = 0, y = 0, vy = 0;
+  double x = 0, y = 0, vy = 0, lead = 0;
 };
 
 /// The cheapest way round \p trunks, whose places are on the line's axes (x along, y left).
