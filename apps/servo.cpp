@@ -242,6 +242,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   const auto arguments = std::make_shared<Arguments>();
   ServoTrialOptions &trial = arguments->trial;
   trial.scenario.kind = kind;
+  trial.pipeline = ServoTrialOptions::defaultPipeline(kind);
   CLI::App *task = servo.add_subcommand(toString(kind), what);
   task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
   task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();

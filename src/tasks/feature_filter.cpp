@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/tasks/feature_filter.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace bole
 {
 void FeatureFilter::start(double seen, double sigma, double drift_sigma)
@@ -21,8 +24,10 @@ void FeatureFilter::predict(double moved, double dt, double unrest)
 
 void FeatureFilter::correct(double seen, double sigma)
 {
-  const Eigen::Vector2d gain = m_P.col(0) / (m_P(0, 0) + sigma * sigma);
-  m_x += gain * (seen - m_x(0));
+  constexpr double kBelieved = 3; // standard deviations; what is farther off counts as no more
+  const double variance = m_P(0, 0) + sigma * sigma, most = kBelieved * std::sqrt(variance);
+  const Eigen::Vector2d gain = m_P.col(0) / variance;
+  m_x += gain * std::clamp(seen - m_x(0), -most, most);
   m_P -= gain * m_P.row(0);
 }
 } // namespace bole

@@ -3,6 +3,8 @@
 #include <bole/geometry/require_range.h>
 #include <bole/tasks/trunk_task.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 
@@ -19,6 +21,9 @@ constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as see
 constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
 constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
+constexpr int kPatience = 10;           ///< frames that the way round is blocked before it goes round the other way
+constexpr double kClearRange = 3;       ///< of trunks to keep clear of [m]
+constexpr double kSureTrunk = 0;        ///< log odds from which on a trunk is kept clear of
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
 } // namespace
 
@@ -36,8 +41,7 @@ void TrunkTaskOptions::validate() const
   requireRange("sway", sway, 0, 2);
   requireRange("sway_climb", sway_climb, 0, 1);
   requireRange("sway_period", sway_period, 1, 60);
-  requireRange("sway_s", sway_s, 0, 600);
-  requireRange("radius_sigma", radius_sigma, 1e-3, 1);
+  requireRange("body_radius", body_radius, 0.05, 2);
   requireRange("free_way", free_way, 0, 5);
   requireRange("choice_evidence", choice_evidence, -20, 20);
   requireRange("choice_angle", choice_angle, 0.02, 0.6);
@@ -168,7 +172,7 @@ RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
 void TrunkTask::giveUpTarget()
 {
   m_target = -1;
-  m_has_feature = m_rests = false;
+  m_has_feature = false;
   m_sway_start_s = -1;
   m_ratio = 0;
   m_sidestep.restart();
@@ -184,7 +188,8 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   if (!trunk) {
     if (phase() == TaskPhase::servoing)
       giveUpTarget();
-    const TaskCommand command = search(result, pipeline, time_s);
+    TaskCommand command = search(result, pipeline, time_s);
+    keepClear(command, pipeline, result.wMb);
     m_response.send(time_s, command.velocity);
     return command;
   }
@@ -194,28 +199,45 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
-  const double sway = swayNow(*trunk, time_s);
-  const double round = isFree(*trunk, pipeline, result.wMb, m_options.speed + sway) ? m_options.speed + m_options.sway * sway : 0;
+  const double sway = swayNow(time_s);
+  const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
+  const bool is_free = isFree(*trunk, pipeline, result.wMb, wanted);
+  m_blocked = is_free ? 0 : m_blocked + 1;
+  if (m_blocked > kPatience) {
+    m_turned_back = -m_turned_back;
+    m_blocked = 0;
+  }
+  const double round = is_free ? wanted : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
   command.velocity.z() = m_options.sway_climb * sway;
+  if (keepClear(command, pipeline, result.wMb))
+    m_response.send(time_s, command.velocity);
   if (sway != 0)
-    command.reason = "sways to measure the range";
+    command.reason = "holds, swaying";
   else if (m_options.speed != 0)
     command.reason = round != 0 ? "circles" : "way blocked: waits";
   return command;
 }
 
-/// -1 to 1; 0 once the radius is known, and where no distance is asked for.
-double TrunkTask::swayNow(const MapTrunk &trunk, double time_s)
+/// -1 to 1; 0 where no distance is asked for.
+double TrunkTask::swayNow(double time_s)
 {
-  if (m_options.speed != 0 || m_options.ratio > 0 || m_rests)
+  if (m_options.speed != 0 || m_options.ratio > 0)
     return 0;
   if (m_sway_start_s < 0)
     m_sway_start_s = time_s;
-  const double t = time_s - m_sway_start_s, turns = t / m_options.sway_period;
-  const bool is_central = std::abs(std::remainder(turns, 0.5)) < 0.03; // at the height it had, from which it sees best
-  m_rests = is_central && (std::sqrt(trunk.covariance(2, 2)) < m_options.radius_sigma || t > m_options.sway_s);
-  return m_rests ? 0 : std::cos(2 * M_PI * turns);
+  return std::cos(2 * M_PI * (time_s - m_sway_start_s) / m_options.sway_period);
+}
+
+/// Cuts what leads to a trunk: the camera looks neither behind nor aside, the map does. True where it had to.
+bool TrunkTask::keepClear(TaskCommand &command, const Pipeline &pipeline, const Pose &wMb) const
+{
+  const Eigen::Rotation2Dd heading(yawOf(wMb));
+  const Eigen::Vector2d wanted = heading * Eigen::Vector2d(command.velocity.head<2>());
+  const Eigen::Vector2d velocity =
+      keptClear(wanted, wMb.t.head<2>(), obstacles(pipeline, wMb, kClearRange, 1), m_options.body_radius, kSureTrunk);
+  command.velocity.head<2>() = heading.inverse() * velocity;
+  return velocity != wanted;
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).

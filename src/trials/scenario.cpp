@@ -62,9 +62,11 @@ Scenario oneTrunk(const ScenarioOptions &options, const ForestOptions &forest, R
   stand(trunk, at);
   Path path = clearStart();
   addLine(path, {0, 0}, at - at.normalized() * (trunk.radius + 0.8));
-  if (options.kind == ServoKind::circle)
-    for (double a = 0; a < 2 * M_PI; a += 0.05)
-      add(path, at.x() + trunk.radius / options.ratio * std::cos(a), at.y() + trunk.radius / options.ratio * std::sin(a));
+  if (options.kind == ServoKind::circle) // nothing stands in the way round, nor before the trunk
+    for (const double share : {0.4, 0.7, 1.0})
+      for (double a = 0; a < 2 * M_PI; a += 0.05)
+        add(path, at.x() + share * trunk.radius / options.ratio * std::cos(a),
+            at.y() + share * trunk.radius / options.ratio * std::sin(a));
   Scenario scenario;
   scenario.forest = Forest::plant(forest, path, {trunk});
   scenario.target = 0;

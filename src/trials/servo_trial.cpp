@@ -267,10 +267,12 @@ vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
   return robot;
 }
 
-PipelineOptions ServoTrialOptions::defaultPipeline()
+PipelineOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
 {
   PipelineOptions pipeline;
   pipeline.flow.search_px = 1;
+  pipeline.flow.view_correlation = 0.05;
+  pipeline.flow.turned_frames = kind == ServoKind::hold ? 0 : 3;
   pipeline.smoothing.fixed_lag = 150;
   return pipeline;
 }

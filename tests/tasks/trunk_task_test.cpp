@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The control law on exact features: a camera that moves as it is told, before a trunk.
+#include "support/drawn_trunks.h"
+
 #include <bole/geometry/so3.h>
 #include <bole/input/camera_file.h>
 #include <bole/tasks/trunk_task.h>
@@ -201,6 +203,54 @@ TEST(FeatureFilter, FindsAValueThatMovesAsOrderedAndDriftsBesides)
   }
   EXPECT_NEAR(filter.value(), value, 1e-6);
   EXPECT_NEAR(filter.drift(), 0.04, 1e-5);
+}
+
+TEST(FeatureFilter, AValueFarOffMovesItByNoMoreThanThreeSigma)
+{
+  FeatureFilter calm, jumped;
+  for (FeatureFilter *filter : {&calm, &jumped}) {
+    filter->start(0, 0.002, 0.01);
+    for (int k = 0; k < 100; ++k) {
+      filter->predict(0, 0.1, 0.01);
+      filter->correct(0, 0.002);
+    }
+    filter->predict(0, 0.1, 0.01);
+  }
+  calm.correct(0.02, 0.002); // far off, and ten times as far: of other edges
+  jumped.correct(0.2, 0.002);
+  EXPECT_GT(calm.value(), 0.001);
+  EXPECT_NEAR(jumped.value(), calm.value(), 1e-12);
+  EXPECT_LT(jumped.value(), 0.008);
+}
+
+TEST(TrunkTask, GoesRoundTheOtherWayWhereATrunkStandsInItsWay)
+{
+  // a drone that moves to and fro by itself; to its left, near the way round, stands another trunk
+  const std::vector<Cylinder> wood = {test::uprightTrunk(3.5, 0, 0.15), test::uprightTrunk(2, 1.2, 0.12)};
+  const PinholeCamera camera;
+  TrunkTaskOptions options;
+  options.speed = 0.4;
+  options.ratio = 0.05;
+  options.free_way = 3;
+  TrunkTask task(forwardCamera(), options);
+  Pipeline pipeline(camera, forwardCamera());
+  int waited = 0, left = 0, right = 0;
+  for (int k = 0; k < 140 && right == 0; ++k) {
+    Frame frame;
+    frame.index = static_cast<std::size_t>(k);
+    frame.stamp_ns = k * 100000000LL;
+    frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0, 0.4 * std::sin(0.15 * k), 1.2});
+    frame.image = test::drawTrunks(camera, (*frame.wMb_odometry * forwardCamera()).inverse(), wood, unsigned(k));
+    const FrameResult result = pipeline.process(frame);
+    const TaskCommand command = task.step(result, pipeline);
+    waited += command.reason == "way blocked: waits";
+    if (command.reason == "circles")
+      ++(command.velocity.y() > 0 ? left : right);
+  }
+  EXPECT_EQ(left, 0);
+  EXPECT_GE(waited, 10);
+  EXPECT_LE(waited, 12);
+  EXPECT_GT(right, 0);
 }
 
 TEST(TrunkTask, KeepsItsLargestSpeed)

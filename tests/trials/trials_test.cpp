@@ -114,6 +114,21 @@ TEST(Scenario, TheGapHasTheWidthItSaysAndIsFree)
   }
 }
 
+TEST(Scenario, NothingStandsBetweenTheCircleAndItsTrunk)
+{
+  ScenarioOptions options;
+  options.kind = ServoKind::circle;
+  for (options.seed = 1; options.seed < 20; ++options.seed) {
+    const Scenario scenario = makeScenario(options);
+    const SimulatedTrunk &target = scenario.forest.trunks[static_cast<std::size_t>(scenario.target)];
+    const double circle = target.radius / options.ratio;
+    for (const SimulatedTrunk &other : scenario.forest.trunks) {
+      const double apart = (other.axisAt(1.2) - target.axisAt(1.2)).head<2>().norm();
+      EXPECT_TRUE(other.id == target.id || apart > circle + 0.5) << options.seed << ": " << apart;
+    }
+  }
+}
+
 TEST(Scenario, TrunksStandOnTheSlalomsLineToo)
 {
   ScenarioOptions options;

@@ -9,10 +9,11 @@
 /// `circle` gives it a speed, and what that does to the two is fed forward.
 ///
 /// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
-/// has none. So `hold` by distance first sways sideways, features held, until the map knows the radius
-/// to radius_sigma. The way is a slant: the drone's height has no error of scale as its steps have, and the points tell
-/// the direction of flight, so that the metre of the height becomes the map's. Then it rests, by the distance that the
-/// map has: pose and map rest on all images, while the borders that one image shows wander with light and background.
+/// has none: it drifts by several per cent in half a minute, since it takes what is wrong in how the trunk looks from
+/// one side for a distance. So `hold` by distance sways sideways, features held. The way is a slant: the drone's height
+/// has no error of scale as its steps have, and the points tell the direction of flight, so that the metre of the height
+/// becomes the map's. The distance is the map's: pose and map rest on all images, while the borders that one image shows
+/// wander with light and background.
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
 /// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
@@ -45,9 +46,8 @@ struct TrunkTaskOptions
   double sway = 0.8;           ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
   double sway_climb = 0.4;     ///< largest rate of climb meanwhile [m/s], 0 to 1
   double sway_period = 6;      ///< [s], 1 to 60
-  double sway_s = 25;          ///< sways no longer than this [s], 0 to 600
-  double radius_sigma = 0.01;  ///< standard deviation of log r, without the scale, at which it rests, 1e-3 to 1
-  double free_way = 0.9;       ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
+  double body_radius = 0.28;   ///< of the drone with its hull [m], 0.05 to 2
+  double free_way = 0.5;       ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
   double choice_angle = 0.35;  ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
   double choice_range = 7;     ///< nor those beyond this [m], 1 to 20
   double choice_evidence = 2;  ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
@@ -87,7 +87,8 @@ private:
   int successor(const Pipeline &pipeline) const;
   RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk);
   void desire(double radius);
-  double swayNow(const MapTrunk &trunk, double time_s);
+  double swayNow(double time_s);
+  bool keepClear(TaskCommand &command, const Pipeline &pipeline, const Pose &wMb) const;
   bool isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
@@ -105,8 +106,9 @@ private:
   double m_time_s = 0, m_ratio = 0;
   double m_log_radius = 0; ///< as seen from here: of distance by the map times r/d in the image, over a second
   int m_misread = 0;       ///< frames in a row
+  double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
+  int m_blocked = 0;          ///< frames in a row
   double m_sway_start_s = -1; ///< -1: has not begun
-  bool m_rests = false;       ///< has swayed enough
   bool m_has_feature = false;
 };
 } // namespace bole
