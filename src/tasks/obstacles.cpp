@@ -11,6 +11,11 @@ namespace
 constexpr double kMisread = 0.3; ///< of the radius: a border read inside the bark, where light and shade meet
 constexpr double kDoubted = -2;  ///< log odds below which a candidate is taken for nothing
 constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
+constexpr double kWidth = 0.15;       ///< of a column of points [m]
+constexpr double kRemembered_s = 3;   ///< of what is out of view
+constexpr int kSeen = 6;              ///< points in a column before it counts
+constexpr double kUpright = 0.5;      ///< and their least extent in height [m]
+constexpr double kPointRadius = 0.05; ///< of the bark round a point [m]
 } // namespace
 
 double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
@@ -45,6 +50,33 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
                     evidence});
   }
   return near;
+}
+
+void NearPoints::see(const std::vector<Eigen::Vector3d> &points, const Pose &wMb, double time_s)
+{
+  constexpr double kLow = 0.8, kHigh = 0.8; // below and above the drone [m]
+  for (auto column = m_columns.begin(); column != m_columns.end();)
+    column = time_s - column->second.last_s > kRemembered_s ? m_columns.erase(column) : std::next(column);
+  for (const Eigen::Vector3d &point : points) {
+    if (point.z() < wMb.t.z() - kLow || point.z() > wMb.t.z() + kHigh)
+      continue;
+    Column &column = m_columns[{static_cast<int>(std::floor(point.x() / kWidth)), static_cast<int>(std::floor(point.y() / kWidth))}];
+    column.sum += point.head<2>();
+    ++column.count;
+    column.low = std::min(column.low, point.z());
+    column.high = std::max(column.high, point.z());
+    column.last_s = time_s;
+  }
+}
+
+void NearPoints::addTo(std::vector<Obstacle> &obstacles, const Pose &wMb, double range) const
+{
+  constexpr double kSure = 100; // log odds that something is there
+  for (const auto &[place, column] : m_columns) {
+    const Eigen::Vector2d xy = column.sum / column.count;
+    if (column.count >= kSeen && column.high - column.low > kUpright && (xy - wMb.t.head<2>()).norm() < range)
+      obstacles.push_back({-1, true, xy, kPointRadius, Eigen::Matrix2d::Zero(), kSure});
+  }
 }
 
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,

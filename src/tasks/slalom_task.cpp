@@ -23,6 +23,7 @@ constexpr double kNear = 12;           ///< cost a square metre inside the margi
 constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
 constexpr double kLook = 0.6;          ///< share of the direction of flight that the heading takes
 constexpr double kSwingOn = 0.6;       ///< the swing goes on as if flying at [m/s], at the least
+constexpr double kNearRange = 2.5;     ///< points beyond this do not matter yet [m]
 constexpr double kRange = 9;           ///< trunks farther do not matter yet [m]
 
 double line(double x, const SlalomTaskOptions &options)
@@ -140,6 +141,8 @@ TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
   if (phase() == TaskPhase::done)
     return {true, Eigen::Vector4d::Zero(), "arrived"};
   std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, kRange, m_options.views);
+  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, m_time_s);
+  m_near_points.addTo(trunks, result.wMb, kNearRange);
   const Eigen::Matrix2d axes = m_start.R.topLeftCorner<2, 2>().transpose();
   for (Obstacle &trunk : trunks) {
     trunk.xy = axes * (trunk.xy - m_start.t.head<2>());

@@ -5,6 +5,7 @@
 #include <bole/geometry/so3.h>
 #include <bole/pipeline/pipeline.h>
 
+#include <algorithm>
 #include <array>
 #include <gtest/gtest.h>
 
@@ -117,6 +118,24 @@ TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
     }
     filter_before = *frame.wMb_odometry;
   }
+}
+TEST(ScenePoints, LieOnTheWallsAsFarAsAsked)
+{
+  Pipeline pipeline(kCamera, kMount);
+  for (int k = 0; k < 12; ++k) {
+    Frame frame = frameAt(k, sideways(k));
+    frame.wMb_odometry = bodyAt(sideways(k));
+    pipeline.process(frame);
+    EXPECT_TRUE(k > 1 || pipeline.scenePoints(20).empty()); // of no age, without parallax
+  }
+  const auto all = pipeline.scenePoints(10), near = pipeline.scenePoints(6);
+  EXPECT_GT(all.size(), 20u);
+  EXPECT_GT(near.size(), 5u);
+  EXPECT_LT(near.size(), all.size());
+  const auto on_a_wall = std::count_if(all.begin(), all.end(), [](const Eigen::Vector3d &point) {
+    return std::min(std::abs(point.x() - 5), std::abs(point.x() - 8)) < 0.3;
+  });
+  EXPECT_GE(20 * on_a_wall, 19 * static_cast<long>(all.size())); // corners where one wall ends before another slide
 }
 } // namespace
 } // namespace bole

@@ -29,6 +29,26 @@ TEST(Obstacle, CountsItsCovarianceInTheDirectionAsked)
   EXPECT_NEAR(trunk.clearance({0, 2}, 2), 1.8 - 0.2, 1e-12);
 }
 
+TEST(NearPoints, WhatStandsUprightCountsAndWhatLiesLowDoesNot)
+{
+  const Pose wMb(Eigen::Matrix3d::Identity(), {0, 0, 1.2});
+  NearPoints near;
+  for (int k = 0; k < 4; ++k) // in a frame each: bark, a bush, a crown over the drone
+    near.see({{1.03, 0.02, 0.6 + 0.3 * k}, {1.03, 0.02, 1.2}, {1.03, 1.02, 0.5 + 0.02 * k}, {1.03, 1.02, 0.5}, {1.03, -1.02, 3.0}},
+             wMb, 0.1 * k);
+  std::vector<Obstacle> found;
+  near.addTo(found, wMb, 2);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR((found[0].xy - Eigen::Vector2d(1.03, 0.02)).norm(), 0, 1e-9);
+  EXPECT_GT(found[0].evidence, 10);
+  found.clear();
+  near.addTo(found, wMb, 0.9);
+  EXPECT_TRUE(found.empty());
+  near.see({}, wMb, 10); // long after
+  near.addTo(found, wMb, 2);
+  EXPECT_TRUE(found.empty());
+}
+
 TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 {
   const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.05, 0.2)};

@@ -71,6 +71,9 @@ public:
   std::vector<RelativeMotion> process(const Frame &frame);
 
   const PointTracker &tracker() const { return m_tracker; }
+  /// How many frames back it remembers, and Frame::index of the one \p back frames before the current one.
+  int framesBack() const { return static_cast<int>(m_seen.size()) - 1; }
+  std::size_t frameIndex(int back) const { return (m_seen.rbegin() + back)->index; }
   const GyroBias &gyroBias() const { return m_bias; }
 
 private:

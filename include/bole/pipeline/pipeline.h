@@ -82,6 +82,9 @@ public:
   };
   std::vector<StampedPose> smoothedTrajectory() const;
   const std::vector<StampedPose> &onlineTrajectory() const { return m_online; }
+  /// Points of the last frame whose tracks have parallax enough to be placed within a few per cent of their distance, no
+  /// farther than \p range [m]: world [m]. Bark, branches, ground: whatever has corners.
+  std::vector<Eigen::Vector3d> scenePoints(double range) const;
   Graph graph() const { return m_smoother.graph(); }
   const Smoother &smoother() const { return m_smoother; }
   /// Trunk record fields that need the smoother are refreshed from it; called by process() and finish().

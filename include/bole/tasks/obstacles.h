@@ -5,6 +5,8 @@
 
 #include <bole/pipeline/pipeline.h>
 
+#include <map>
+#include <utility>
 #include <vector>
 
 namespace bole
@@ -30,6 +32,28 @@ struct Obstacle
 /// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
 /// below -2, or where the drone is.
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
+
+/// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it, has
+/// bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are forgotten
+/// after some seconds.
+class NearPoints
+{
+public:
+  /// \p points of one frame, world [m]; those well below or above the drone at \p wMb are left out.
+  void see(const std::vector<Eigen::Vector3d> &points, const Pose &wMb, double time_s);
+  /// As obstacles without a radius to speak of, those within \p range [m] of \p wMb.
+  void addTo(std::vector<Obstacle> &obstacles, const Pose &wMb, double range) const;
+
+private:
+  struct Column
+  {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    int count = 0;
+    double low = 1e9, high = -1e9; ///< [m]
+    double last_s = 0;
+  };
+  std::map<std::pair<int, int>, Column> m_columns;
+};
 
 /// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that
 /// dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no trunk

@@ -7,8 +7,9 @@
 /// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near
 /// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The line itself swings from
 /// side to side: flying straight at a trunk gives no parallax, and what has none is not in the map. It swings on where the
-/// drone is held up, since what is no trunk shows itself as such from another side. The camera looks
-/// half-way into the direction of flight.
+/// drone is held up, since what is no trunk shows itself as such from another side. What stands upright near by the
+/// points of the scene counts beside the map, whatever it is: a trunk may be missing in the map, or stand elsewhere. The
+/// camera looks half-way into the direction of flight.
 
 #include <bole/tasks/obstacles.h>
 #include <bole/tasks/servo_task.h>
@@ -75,6 +76,7 @@ private:
   Pose m_start;
   SlalomState m_state;
   double m_time_s = 0;
+  NearPoints m_near_points;
   SlalomWay m_way;
 };
 } // namespace bole
