@@ -44,6 +44,7 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState sta
     return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
   };
   std::vector<double> allowed; // who is nearer than that already may leave
+  allowed.reserve(trunks.size());
   for (const Obstacle &trunk : trunks)
     allowed.push_back(std::min(0.0, clearanceOf(trunk, state)));
   double contact_s = options.horizon, depth = 0;

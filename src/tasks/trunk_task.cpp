@@ -315,7 +315,7 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   against[1] = -besides(1);
   v += m_servo.getTaskJacobianPseudoInverse() * against;
   const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
-  const Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
+  Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
   m_response.send(time_s, velocity);
   return velocity;
 }
