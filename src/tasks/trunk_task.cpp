@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/tasks/obstacles.h>
 #include <bole/geometry/require_range.h>
 #include <bole/tasks/trunk_task.h>
 
@@ -22,7 +21,7 @@ constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion ex
 constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
 constexpr int kPatience = 10;           ///< frames that the way round is blocked before it goes round the other way
-constexpr double kClearRange = 3;       ///< of trunks to keep clear of [m]
+constexpr double kClearRange = 3;       ///< of trunks to keep clear of, or that stand in the way round [m]
 constexpr double kSureTrunk = 0;        ///< log odds from which on a trunk is kept clear of
 constexpr double kLargestTurn = 0.8;    ///< [rad/s]
 } // namespace
@@ -185,11 +184,12 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   if (m_target >= 0 && !liveTrunk(pipeline, m_target))
     m_target = successor(pipeline);
   const MapTrunk *trunk = liveTrunk(pipeline, m_target);
+  const std::vector<Obstacle> around = obstacles(pipeline, result.wMb, kClearRange, 1);
   if (!trunk) {
     if (phase() == TaskPhase::servoing)
       giveUpTarget();
     TaskCommand command = search(result, pipeline, time_s);
-    keepClear(command, pipeline, result.wMb);
+    keepClear(command, around, result.wMb);
     m_response.send(time_s, command.velocity);
     return command;
   }
@@ -201,7 +201,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   feature.buildFrom(seen, trunk->trunk.radius());
   const double sway = swayNow(time_s);
   const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
-  const bool is_free = isFree(*trunk, pipeline, result.wMb, wanted);
+  const bool is_free = isFree(trunk->id, around, result.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
   if (m_blocked > kPatience) {
     m_turned_back = -m_turned_back;
@@ -210,7 +210,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   const double round = is_free ? wanted : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
   command.velocity.z() = m_options.sway_climb * sway;
-  if (keepClear(command, pipeline, result.wMb))
+  if (keepClear(command, around, result.wMb))
     m_response.send(time_s, command.velocity);
   if (sway != 0)
     command.reason = "holds, swaying";
@@ -230,22 +230,21 @@ double TrunkTask::swayNow(double time_s)
 }
 
 /// Cuts what leads to a trunk: the camera looks neither behind nor aside, the map does. True where it had to.
-bool TrunkTask::keepClear(TaskCommand &command, const Pipeline &pipeline, const Pose &wMb) const
+bool TrunkTask::keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const
 {
   const Eigen::Rotation2Dd heading(yawOf(wMb));
   const Eigen::Vector2d wanted = heading * Eigen::Vector2d(command.velocity.head<2>());
-  const Eigen::Vector2d velocity =
-      keptClear(wanted, wMb.t.head<2>(), obstacles(pipeline, wMb, kClearRange, 1), m_options.body_radius, kSureTrunk);
+  const Eigen::Vector2d velocity = keptClear(wanted, wMb.t.head<2>(), around, m_options.body_radius, kSureTrunk);
   command.velocity.head<2>() = heading.inverse() * velocity;
   return velocity != wanted;
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
-bool TrunkTask::isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const
+bool TrunkTask::isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const
 {
   const Eigen::Vector2d way = (speed > 0 ? 1 : -1) * wMb.R.col(1).head<2>().normalized();
-  for (const Obstacle &other : obstacles(pipeline, wMb, 3, 1))
-    if (other.id != trunk.id && other.is_confirmed && way.dot(other.xy - wMb.t.head<2>()) > 0 &&
+  for (const Obstacle &other : around)
+    if (other.id != target && other.is_confirmed && way.dot(other.xy - wMb.t.head<2>()) > 0 &&
         other.clearance(wMb.t.head<2>(), 1) < m_options.free_way)
       return false;
   return true;

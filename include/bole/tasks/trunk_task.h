@@ -25,6 +25,7 @@
 
 #include <bole/tasks/drone_response.h>
 #include <bole/tasks/feature_filter.h>
+#include <bole/tasks/obstacles.h>
 #include <bole/tasks/servo_task.h>
 #include <bole/vpFeatureTrunk.h>
 
@@ -88,8 +89,8 @@ private:
   RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk);
   void desire(double radius);
   double swayNow(double time_s);
-  bool keepClear(TaskCommand &command, const Pipeline &pipeline, const Pose &wMb) const;
-  bool isFree(const MapTrunk &trunk, const Pipeline &pipeline, const Pose &wMb, double speed) const;
+  bool keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const;
+  bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
   Eigen::Matrix<double, 2, 4> interactionOf(vpFeatureTrunk feature) const;
