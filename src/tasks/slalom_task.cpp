@@ -36,17 +36,17 @@ double sidewaysTo(double offset, double y, const SlalomTaskOptions &options)
   return std::clamp(kOffsetGain * (offset - y), -options.sideways, options.sideways);
 }
 
-/// Flies \p way in thought and fills its clearance and cost.
-void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState state, const SlalomTaskOptions &options)
+/// From hull to bark, covariance counted [m].
+double clearanceOf(const Obstacle &trunk, const SlalomState &at, const SlalomTaskOptions &options)
+{
+  return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
+}
+
+/// Flies \p way in thought and fills its clearance and cost. \p allowed: of each trunk, what is nearer is a contact [m].
+void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vector<double> &allowed, SlalomState state,
+            const SlalomTaskOptions &options)
 {
   way.clearance = std::numeric_limits<double>::infinity();
-  const auto clearanceOf = [&options](const Obstacle &trunk, const SlalomState &at) {
-    return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
-  };
-  std::vector<double> allowed; // who is nearer than that already may leave
-  allowed.reserve(trunks.size());
-  for (const Obstacle &trunk : trunks)
-    allowed.push_back(std::min(0.0, clearanceOf(trunk, state)));
   double contact_s = options.horizon, depth = 0;
   for (double t = 0; t < options.horizon; t += kStep_s) {
     state.vy += kStep_s / options.lag * (sidewaysTo(way.offset, state.y, options) - state.vy);
@@ -54,7 +54,7 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, SlalomState sta
     state.x += kStep_s * way.speed;
     double clearance = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < trunks.size(); ++k) {
-      const double to_trunk = clearanceOf(trunks[k], state);
+      const double to_trunk = clearanceOf(trunks[k], state, options);
       clearance = std::min(clearance, to_trunk);
       if (to_trunk < allowed[k])
         contact_s = std::min(contact_s, t);
@@ -92,6 +92,10 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
   SlalomWay best;
   best.cost = std::numeric_limits<double>::infinity();
   const double wanted = line(state.x + state.lead + options.speed, options); // a second ahead
+  std::vector<double> allowed; // who stands too near already may leave
+  allowed.reserve(trunks.size());
+  for (const Obstacle &trunk : trunks)
+    allowed.push_back(std::min(0.0, clearanceOf(trunk, state, options)));
   for (const double share : {1.0, 0.6, 0.25, 0.0})
     for (double offset = -options.reach; offset <= options.reach + 1e-9; offset += kOffsetStep) {
       SlalomWay way{wanted + offset, share * options.speed, 0, 0};
@@ -100,7 +104,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
       way.cost = kOffLine * std::abs(offset) + kChange * std::abs(way.offset - last_offset) + kSlow * (1 - share);
       if (way.cost >= best.cost)
         continue;
-      tryOut(way, trunks, state, options);
+      tryOut(way, trunks, allowed, state, options);
       if (way.cost < best.cost)
         best = way;
     }
