@@ -8,6 +8,17 @@
 
 namespace bole
 {
+namespace
+{
+/// Out of the map, as what is no trunk or not to be told. Returns its id.
+int giveUp(MapTrunk &trunk)
+{
+  trunk.removed = true;
+  trunk.status = TrunkStatus::lost;
+  return trunk.id;
+}
+} // namespace
+
 void MapOptions::validate() const
 {
   requireRange("map.confirm_observations", confirm_observations, 2, 1000);
@@ -241,11 +252,8 @@ std::vector<int> TrunkMap::leaveBehind(double now_s)
     MapTrunk &trunk = m_trunks[i];
     if (trunk.status != TrunkStatus::candidate || now_s - trunk.last_seen_s <= m_options.candidate_memory_s)
       return false;
-    if (trunk.observations == 0) {
-      trunk.removed = true;
-      trunk.status = TrunkStatus::lost;
-      removed.push_back(trunk.id);
-    }
+    if (trunk.observations == 0)
+      removed.push_back(giveUp(trunk));
     return true;
   };
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(), is_left_behind), m_active.end());
@@ -255,11 +263,8 @@ std::vector<int> TrunkMap::leaveBehind(double now_s)
 std::vector<int> TrunkMap::removeAll()
 {
   std::vector<int> removed;
-  for (const std::size_t i : m_active) {
-    m_trunks[i].removed = true;
-    m_trunks[i].status = TrunkStatus::lost;
-    removed.push_back(m_trunks[i].id);
-  }
+  for (const std::size_t i : m_active)
+    removed.push_back(giveUp(m_trunks[i]));
   m_active.clear();
   return removed;
 }

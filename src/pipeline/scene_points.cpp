@@ -20,27 +20,26 @@ std::vector<Eigen::Vector3d> Pipeline::scenePoints(double range) const
   std::vector<Eigen::Vector3d> points;
   if (m_smoother.poseCount() == 0 || m_points.framesBack() < 2 || isTurning())
     return points;
-  const auto cameraThen = [this](int back) { return cameraAt(poseOf(m_points.frameIndex(back))); };
-  const Pose wMb = cameraThen(0);
-  std::vector<Pose> then;
+  std::vector<Pose> wMc; // by frames back
   for (int back = 0; back <= std::min(kBack, m_points.framesBack()); ++back)
-    then.push_back(cameraThen(back));
+    wMc.push_back(cameraAt(poseOf(m_points.frameIndex(back))));
+  const Pose &now = wMc.front();
   for (const PointTrack &track : m_points.tracker().tracks()) {
-    const int back = std::min<int>(track.age(), static_cast<int>(then.size()) - 1);
+    const int back = std::min<int>(track.age(), static_cast<int>(wMc.size()) - 1);
     if (back < 2)
       continue;
     const auto seen = [&track](int ago) { return *(track.positions_px.rbegin() + ago); };
-    const Pose &wMa = then[static_cast<std::size_t>(back)];
-    const Eigen::Vector3d a = (wMa.R * m_camera.ray(seen(back))).normalized(), b = (wMb.R * m_camera.ray(seen(0))).normalized();
+    const Pose &before = wMc[static_cast<std::size_t>(back)];
+    const Eigen::Vector3d a = (before.R * m_camera.ray(seen(back))).normalized(), b = (now.R * m_camera.ray(seen(0))).normalized();
     const double cosine = a.dot(b), sine2 = 1 - cosine * cosine;
     if (sine2 < kParallax * kParallax)
       continue;
-    const Eigen::Vector3d ba = wMb.t - wMa.t; // along a by u, from the other along b by v
+    const Eigen::Vector3d ba = now.t - before.t; // along a by u, from the other along b by v
     const double u = (ba.dot(a) - cosine * ba.dot(b)) / sine2, v = (cosine * ba.dot(a) - ba.dot(b)) / sine2;
-    const Eigen::Vector3d on_a = wMa.t + u * a, on_b = wMb.t + v * b, point = 0.5 * (on_a + on_b);
+    const Eigen::Vector3d on_a = before.t + u * a, on_b = now.t + v * b, point = 0.5 * (on_a + on_b);
     if (u <= 0 || v <= 0 || v > range || (on_a - on_b).norm() > kMissed * v)
       continue;
-    const Eigen::Vector3d half_way = then[static_cast<std::size_t>(back / 2)].inverse() * point;
+    const Eigen::Vector3d half_way = wMc[static_cast<std::size_t>(back / 2)].inverse() * point;
     if (half_way.z() > 0 && (m_camera.project(half_way) - seen(back / 2)).norm() < kMiddle_px)
       points.push_back(point);
   }
