@@ -19,6 +19,7 @@ public:
   void start(double seen, double sigma, double drift_sigma);
   /// \p moved by what the drone did in \p dt [s]; \p unrest: how fast the drift changes [1/s per root of a second].
   void predict(double moved, double dt, double unrest);
+  /// What is farther off than three standard deviations moves it by no more than these: read from other edges.
   void correct(double seen, double sigma);
 
   double value() const { return m_x(0); }
