@@ -33,6 +33,7 @@ void MapOptions::validate() const
   requireRange("map.doubt_confirmed", doubt_confirmed, -50, 0);
   requireRange("map.doubt_rival", doubt_rival, 0, 50);
   requireRange("map.near_range", near_range, 0, 100);
+  requireRange("map.through_range", through_range, 0, 100);
   requireRange("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
   requireRange("map.usual_radius", usual_radius, 0.001, 10);
   requireRange("map.lost_misses", lost_misses, 1, 1000);

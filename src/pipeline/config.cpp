@@ -283,6 +283,7 @@ void addMap(std::vector<OptionEntry> &entries, MapOptions &o)
                                  {"map.doubt_confirmed", &o.doubt_confirmed},
                                  {"map.doubt_rival", &o.doubt_rival},
                                  {"map.near_range", &o.near_range},
+                                 {"map.through_range", &o.through_range},
                                  {"map.innovation_unit_px", &o.innovation_unit_px},
                                  {"map.usual_radius", &o.usual_radius},
                                  {"map.lost_misses", &o.lost_misses},

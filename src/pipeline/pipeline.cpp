@@ -70,6 +70,7 @@ FrameResult Pipeline::process(const Frame &frame)
     keepView(frame, std::move(gradient));
     detectNew(result);
     lap("detection");
+    lookThroughTrunks();
     reviewMap(time_s);
     reviewScale(0.1, false);
     lap("map");

@@ -41,6 +41,7 @@ const std::vector<Step> kSteps = {
     {"detector: range not asked", {"detection.range_sigma_max=1", "detection.parallax_min=0"}},
     {"odds not asked before confirmation", {"map.confirm_evidence=-20", "map.doubt_candidate=-50", "map.doubt_confirmed=-50"}},
     {"saliency inside a trunk not asked", {"map.near_range=0"}},
+    {"points behind a trunk not asked", {"map.through_range=0"}},
     {"merging off", {"map.merge_distance=0"}},
     {"scan off: minimised from the prediction", {"tracking.scan=false"}},
     {"blurred minimum and maximum (Eq. 3)", {"gradient.split=true", "energy.form=paper"}},

@@ -172,6 +172,9 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
   EXPECT_GT(after([](MapTrunk &t) { t.contrast *= 2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.innovation2 /= 2; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.misses += 5; }), odds);
+  EXPECT_EQ(after([](MapTrunk &t) { t.points_behind = 3; }), odds); // a slipped track or two
+  EXPECT_LT(after([](MapTrunk &t) { t.points_behind = 10; }), odds - 1);
+  EXPECT_GT(after([](MapTrunk &t) { t.points_behind = t.points_on = 10; }), after([](MapTrunk &t) { t.points_behind = 10; }) + 0.5);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius += 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius -= 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.covariance *= 9; }), odds);

@@ -137,5 +137,44 @@ TEST(ScenePoints, LieOnTheWallsAsFarAsAsked)
   });
   EXPECT_GE(20 * on_a_wall, 19 * static_cast<long>(all.size())); // corners where one wall ends before another slide
 }
+
+/// Dark slabs at z = 4 before a bright wall at z = 9, seen from wMc: a post 0.6 m wide about x = 1.1, and a slot of
+/// 0.4 m about x = -0.7.
+vpImage<unsigned char> drawSlabs(const Pose &wMc)
+{
+  vpImage<unsigned char> image(static_cast<unsigned>(kCamera.height), static_cast<unsigned>(kCamera.width));
+  const auto isSlab = [](double x) { return (x > -4 && x < -0.9) || (x > -0.5 && x < 0.1) || (x > 0.8 && x < 1.4); };
+  for (unsigned y = 0; y < image.getHeight(); ++y)
+    for (unsigned x = 0; x < image.getWidth(); ++x) {
+      const Eigen::Vector3d ray = wMc.R * kCamera.ray({double(x), double(y)});
+      const Eigen::Vector3d near = wMc.t + (4 - wMc.t.z()) / ray.z() * ray, far = wMc.t + (9 - wMc.t.z()) / ray.z() * ray;
+      image[y][x] = isSlab(near.x()) ? static_cast<unsigned char>(10 + 60 * test::texture(near.x() / 0.12, near.y() / 0.12, 4))
+                                     : static_cast<unsigned char>(120 + 120 * test::texture(far.x() / 0.25, far.y() / 0.25, 9));
+    }
+  return image;
+}
+
+TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
+{
+  Pipeline pipeline(kCamera, kMount);
+  for (int k = 0; k < 30; ++k) {
+    const Pose wMc(Eigen::Matrix3d::Identity(), {0.08 * k - 1.2, 0, 0});
+    Frame frame = frameAt(k, wMc);
+    frame.image = drawSlabs(wMc);
+    frame.wMb_odometry = bodyAt(wMc);
+    pipeline.process(frame);
+  }
+  const auto standsAt = [&](double x) -> const MapTrunk * {
+    for (const MapTrunk &trunk : pipeline.mapTrunks())
+      if (!trunk.removed && (trunk.trunk.xy - Eigen::Vector2d(4, -x)).norm() < 0.15)
+        return &trunk;
+    return nullptr;
+  };
+  const MapTrunk *slot = standsAt(-0.7), *post = standsAt(1.1);
+  ASSERT_TRUE(slot && post); // two borders with parallax are all that a trunk is asked for at first
+  EXPECT_GT(slot->lookedThrough(), 2);
+  EXPECT_GT(post->points_on, 0);
+  EXPECT_EQ(post->lookedThrough(), 0);
+}
 } // namespace
 } // namespace bole

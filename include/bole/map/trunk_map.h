@@ -36,6 +36,8 @@ struct MapOptions
   double doubt_rival = 1.5;             ///< log odds by which another candidate for the same place must be better for one
                                       ///< to be given up, 0 to 50
   double near_range = 5.5;            ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
+  double through_range = 9;           ///< whether points behind a trunk are seen through it is asked nearer than this
+                                      ///< [m], 0 (never) to 100
   double innovation_unit_px = 1;      ///< rms of prediction against what was found that counts as one pixel of a camera
                                       ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
   double usual_radius = 0.15;         ///< median radius of the trunks to be found [m], 0.001 to 10
@@ -70,10 +72,13 @@ struct MapTrunk
   double innovation2 = 0;                    ///< running mean of TrunkView::innovation2
   double foreground = 0;                     ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
+  int points_on = 0, points_behind = 0;      ///< of the scene, seen inside its borders, over all frames
   bool removed = false;                      ///< out of the smoother (merged, or a candidate given up)
 
   double parallax() const { return bearing_high - bearing_low; }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
+  /// Points behind it for each on its bark; 0 up to 3 points, which a slipped track or two may be.
+  double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
 };
 
 /// What one view of a trunk adds to its history.
@@ -129,8 +134,9 @@ public:
   std::vector<int> removeAll();
 
   /// Log odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
-  /// often it was missed, how it moved against the background, its contrast, its radius and how well its place is
-  /// known. A logistic regression on simulated flights: see trunk_evidence.cpp for its weights and what they rest on.
+  /// often it was missed, how it moved against the background, whether points behind it were seen through it, its
+  /// contrast, its radius and how well its place is known. A logistic regression on simulated flights: see
+  /// trunk_evidence.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
 
   /// \p ground_z: height of the ground in the world [m], over which breast height counts.

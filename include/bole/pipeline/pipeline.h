@@ -82,7 +82,7 @@ public:
   };
   std::vector<StampedPose> smoothedTrajectory() const;
   const std::vector<StampedPose> &onlineTrajectory() const { return m_online; }
-  /// Points of the last frame whose tracks have parallax enough to be placed within a few per cent of their distance, no
+  /// Points of the last frame whose tracks have parallax enough to be placed within 7 per cent of their distance, no
   /// farther than \p range [m]: world [m]. Bark, branches, ground: whatever has corners.
   std::vector<Eigen::Vector3d> scenePoints(double range) const;
   Graph graph() const { return m_smoother.graph(); }
@@ -98,6 +98,12 @@ private:
     LevelProfile profile;
     std::size_t pose = 0;
     double time_s = 0;
+  };
+  struct Sight ///< where a point of the last frame stands, by its parallax
+  {
+    Eigen::Vector3d ray;         ///< unit vector from the camera, world
+    double inverse_distance = 0; ///< [1/m], below 0 by noise
+    double sigma = 0;            ///< of it [1/m]
   };
   struct Lap;
 
@@ -118,6 +124,8 @@ private:
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
   void addTurn(std::size_t a, std::size_t b, const RelativePoseEstimate &estimate);
   void estimateSaliency(const Frame &frame, FrameResult &result);
+  std::vector<Sight> sights() const;
+  void lookThroughTrunks();
   void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
   double misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const;
   bool observe(MapTrunk &trunk, std::size_t pose, const TrackingPrediction &prediction, const TrackingResult &tracked,
