@@ -10,6 +10,7 @@ namespace
 {
 constexpr double kMisread = 0.3; ///< of the radius: a border read inside the bark, where light and shade meet
 constexpr double kDoubted = -2;  ///< log odds below which a candidate is taken for nothing
+constexpr double kSeenThrough = 4; ///< MapTrunk::lookedThrough from which nothing stands there
 constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
 constexpr double kWidth = 0.15;       ///< of a column of points [m]
 constexpr double kRemembered_s = 3;   ///< of what is out of view
@@ -35,6 +36,8 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
     const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
     const bool counts = is_confirmed || (trunk.status == TrunkStatus::candidate && trunk.observations >= observations);
     if (trunk.removed || !counts) // most of a long flight's
+      continue;
+    if (trunk.lookedThrough() > kSeenThrough)
       continue;
     const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
     const double d = w.norm();

@@ -30,7 +30,7 @@ struct Obstacle
 
 /// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
 /// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
-/// below -2, or where the drone is.
+/// below -2, looked through, or where the drone is.
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
 
 /// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it, has
