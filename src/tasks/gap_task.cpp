@@ -16,6 +16,7 @@ constexpr double kAcrossGain = 0.8; ///< [1/s]
 constexpr double kLinedUp = 0.2;   ///< across the axis, at the entry [m]
 constexpr double kInView = 1.2;    ///< nearer to the middle the trunks leave the image [m]
 constexpr int kViews = 8;          ///< of a candidate that counts as in the way
+constexpr double kNearRange = 2.5; ///< points beyond this do not matter yet [m]
 
 Eigen::Vector2d leftOf(const Eigen::Vector2d &v) { return {-v.y(), v.x()}; }
 
@@ -149,7 +150,7 @@ void GapTask::refresh(const std::vector<Obstacle> &trunks, const Pose &wMb)
   m_across = from_middle.dot(leftOf(m_gap->along));
 }
 
-TaskCommand GapTask::fly(const std::vector<Obstacle> &trunks, const Pose &wMb)
+TaskCommand GapTask::fly(const std::vector<Obstacle> &around, const Pose &wMb)
 {
   if (m_is_lined_up && m_ahead > m_options.beyond) {
     enter(TaskPhase::done);
@@ -166,7 +167,7 @@ TaskCommand GapTask::fly(const std::vector<Obstacle> &trunks, const Pose &wMb)
     const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
     velocity = limited(kAcrossGain * to_entry, m_options.speed);
   }
-  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), trunks, m_options.body_radius,
+  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), around, m_options.body_radius,
                        m_options.evidence);
   return {false, towards(wMb, velocity, heading),
           m_is_lined_up ? "passes the gap" : "lines up"};
@@ -183,10 +184,12 @@ void GapTask::giveUpTarget()
 
 TaskCommand GapTask::act(const FrameResult &result, const Pipeline &pipeline)
 {
+  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, 1e-9 * static_cast<double>(result.stamp_ns));
   if (!m_gap)
     return search(result, pipeline);
-  const std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, 20, 1);
-  refresh(trunks, result.wMb);
-  return fly(trunks, result.wMb);
+  std::vector<Obstacle> around = obstacles(pipeline, result.wMb, 20, 1);
+  refresh(around, result.wMb);
+  m_near_points.addTo(around, result.wMb, kNearRange);
+  return fly(around, result.wMb);
 }
 } // namespace bole

@@ -5,8 +5,9 @@
 ///
 /// Idea: sidestep until the map holds two confirmed trunks with a gap between them and nothing in the way, line up on
 /// the gap's axis before it, then fly along the axis. All places are those of the map, taken anew each frame, so a
-/// trunk that moves in the map moves the axis, and what was not known when the gap was chosen is kept clear of. When the
-/// trunks leave the image on both sides the map and the points carry the last metre.
+/// trunk that moves in the map moves the axis, and what was not known when the gap was chosen is kept clear of, and
+/// so is whatever stands upright near by the points of the scene, in the map or not. When the trunks leave the image on
+/// both sides the map and the points carry the last metre.
 
 #include <bole/tasks/obstacles.h>
 #include <bole/tasks/servo_task.h>
@@ -65,10 +66,11 @@ protected:
 private:
   TaskCommand search(const FrameResult &result, const Pipeline &pipeline);
   void refresh(const std::vector<Obstacle> &trunks, const Pose &wMb);
-  TaskCommand fly(const std::vector<Obstacle> &trunks, const Pose &wMb);
+  TaskCommand fly(const std::vector<Obstacle> &around, const Pose &wMb);
 
   GapTaskOptions m_options;
   Sidestep m_sidestep{0.8, 9};
+  NearPoints m_near_points;
   std::optional<Gap> m_gap;
   bool m_is_lined_up = false;
   double m_across = 0, m_ahead = -100; ///< of the drone, from the gap's axis and middle [m]
