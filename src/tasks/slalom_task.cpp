@@ -23,6 +23,7 @@ constexpr double kNear = 12;           ///< cost a square metre inside the margi
 constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
 constexpr double kLook = 0.6;          ///< share of the direction of flight that the heading takes
 constexpr double kSwingOn = 0.6;       ///< the swing goes on as if flying at [m/s], at the least
+constexpr double kLookAside = 0.6;      ///< amplitude of the sidestep before it leaves [m]
 constexpr double kNearRange = 2.5;     ///< points beyond this do not matter yet [m]
 constexpr double kRange = 9;           ///< trunks farther do not matter yet [m]
 
@@ -71,6 +72,7 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vect
 
 void SlalomTaskOptions::validate() const
 {
+  requireRange("look", look, 0, 30);
   requireRange("length", length, 1, 1000);
   requireRange("speed", speed, 0.1, 3);
   requireRange("sideways", sideways, 0.1, 3);
@@ -111,7 +113,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
   return best;
 }
 
-SlalomTask::SlalomTask(const SlalomTaskOptions &options) : ServoTask(options.safety), m_options(options)
+SlalomTask::SlalomTask(const SlalomTaskOptions &options) : ServoTask(options.safety), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
   m_options.validate();
 }
@@ -142,11 +144,15 @@ void SlalomTask::locate(const FrameResult &result)
 TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
 {
   locate(result);
+  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, m_time_s);
+  if (phase() == TaskPhase::searching && m_sidestep.elapsed(m_time_s) < m_options.look) {
+    m_state.lead = 0;
+    return {false, m_sidestep.velocity(result.wMb, m_time_s), "looks before it leaves"};
+  }
   enter(m_state.x >= m_options.length ? TaskPhase::done : TaskPhase::servoing);
   if (phase() == TaskPhase::done)
     return {true, Eigen::Vector4d::Zero(), "arrived"};
   std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, kRange, m_options.views);
-  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, m_time_s);
   m_near_points.addTo(trunks, result.wMb, kNearRange);
   const Eigen::Matrix2d axes = m_start.R.topLeftCorner<2, 2>().transpose();
   for (Obstacle &trunk : trunks) {

@@ -206,6 +206,29 @@ TEST(Slalom, LeavesWhatItStandsInByTheMap)
   EXPECT_LT(way.cost, 100); // which no contact costs
 }
 
+TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
+{
+  SlalomTaskOptions options;
+  options.look = 4;
+  SlalomTask task(options);
+  const Pipeline pipeline(PinholeCamera(), SmootherOptions::forwardCamera());
+  FrameResult result; // of a drone that obeys at once
+  double left = 0, right = 0;
+  for (int k = 0; k < 60; ++k) {
+    const double t = 0.1 * k;
+    result.stamp_ns = k * 100000000LL;
+    const TaskCommand command = task.step(result, pipeline);
+    ASSERT_FALSE(command.is_hovering);
+    EXPECT_EQ(task.phase(), t < 4 ? TaskPhase::searching : TaskPhase::servoing) << t;
+    EXPECT_EQ(command.velocity.x() > 0.3, t >= 4) << t;
+    result.wMb.t += 0.1 * command.velocity.head<3>();
+    left = std::max(left, t < 4 ? result.wMb.t.y() : 0);
+    right = std::min(right, t < 4 ? result.wMb.t.y() : 0);
+  }
+  EXPECT_GT(left, 0.4);
+  EXPECT_LT(right, -0.4);
+}
+
 TEST(Slalom, StopsBeforeAWallWithoutOpening)
 {
   std::vector<Obstacle> trunks;

@@ -5,9 +5,9 @@
 ///
 /// Idea: each frame the ways to a set of sideways offsets, at a few speeds, are flown in thought over the next seconds
 /// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near
-/// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The line itself swings from
-/// side to side: flying straight at a trunk gives no parallax, and what has none is not in the map. It swings on where the
-/// drone is held up, since what is no trunk shows itself as such from another side. What stands upright near by the
+/// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The drone sidesteps once before it leaves, and the
+/// line itself swings from side to side: flying straight at a trunk gives no parallax, and what has none is not in the
+/// map. It swings on where the drone is held up, since what is no trunk shows itself as such from another side. What stands upright near by the
 /// points of the scene counts beside the map, whatever it is: a trunk may be missing in the map, or stand elsewhere. The
 /// camera looks half-way into the direction of flight.
 
@@ -18,6 +18,7 @@ namespace bole
 {
 struct SlalomTaskOptions
 {
+  double look = 6;           ///< one sidestep before it leaves: what stands ahead shows by parallax [s], 0 (none) to 30
   double length = 40;        ///< along the heading at the start [m], 1 to 1000
   double speed = 1;          ///< [m/s], 0.1 to 3
   double sideways = 0.9;     ///< largest speed across the line [m/s], 0.1 to 3
@@ -77,6 +78,7 @@ private:
   SlalomState m_state;
   double m_time_s = 0;
   NearPoints m_near_points;
+  Sidestep m_sidestep;
   SlalomWay m_way;
 };
 } // namespace bole
