@@ -82,6 +82,43 @@ private:
   int m_target = -1, m_trunk = -1;
 };
 
+/// The truth about a gap: which trunks it flies between, as last seen from the drone: behind it the map may lose them.
+class GapJudge
+{
+public:
+  GapJudge(const Scenario &scenario, const GapTask &task, const Pipeline &pipeline)
+    : m_scenario(scenario), m_task(task), m_pipeline(pipeline)
+  {
+  }
+
+  /// Of the truth; -1: what the task takes for one is none.
+  int left() const { return m_left; }
+  int right() const { return m_right; }
+
+  ServoTask::Values operator()(const Pose &truth, const Pose &estimate)
+  {
+    if (!m_task.gap())
+      return {};
+    follow(m_task.gap()->left, m_left_id, m_left, truth, estimate);
+    follow(m_task.gap()->right, m_right_id, m_right, truth, estimate);
+    return {};
+  }
+
+private:
+  void follow(int id, int &last_id, int &found, const Pose &truth, const Pose &estimate)
+  {
+    const int now = trueTrunk(m_scenario.forest, m_pipeline, id, truth, estimate);
+    if (id != last_id || liveTrunk(m_pipeline, id))
+      found = now;
+    last_id = id;
+  }
+
+  const Scenario &m_scenario;
+  const GapTask &m_task;
+  const Pipeline &m_pipeline;
+  int m_left_id = -1, m_right_id = -1, m_left = -1, m_right = -1;
+};
+
 double valueOf(const ServoTask::Values &values, const char *name)
 {
   for (const auto &[key, value] : values)
@@ -211,7 +248,7 @@ double widthBetween(const SimulatedTrunk &one, const SimulatedTrunk &other, doub
 }
 
 /// The task is not told which gap is set up: any that is as wide as those asked for will do.
-void judgeGap(ServoTrialResult &result, const Scenario &scenario, const GapTask &task, const Pipeline &pipeline)
+void judgeGap(ServoTrialResult &result, const Scenario &scenario, const GapTask &task, const GapJudge &judge)
 {
   const LoopRecord &record = result.record;
   const auto &trunks = scenario.forest.trunks;
@@ -224,8 +261,7 @@ void judgeGap(ServoTrialResult &result, const Scenario &scenario, const GapTask 
     return;
   }
   const LoopSample &last = record.samples.back();
-  const int left = trueTrunk(scenario.forest, pipeline, task.gap()->left, last.truth, last.estimate);
-  const int right = trueTrunk(scenario.forest, pipeline, task.gap()->right, last.truth, last.estimate);
+  const int left = judge.left(), right = judge.right();
   if (left < 0 || right < 0 || left == right) {
     result.outcome = "flew by what is no trunk";
     return;
@@ -293,19 +329,23 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   Pipeline pipeline(robot.camera(), robot.bMc(), options.pipeline);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
 
+  const auto fly = [&](const Judge &judge) {
+    result.record = runClosedLoop(robot, pipeline, *task, options.loop, judge, watcher);
+    result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
+  };
   if (auto *trunk_task = dynamic_cast<TrunkTask *>(task.get())) {
     TrunkJudge judge(scenario, *trunk_task, pipeline, robot.bMc());
-    result.record = runClosedLoop(robot, pipeline, *task, options.loop, std::ref(judge), watcher);
-    result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
+    fly(std::ref(judge));
     judgeTrunk(result, options, scenario, judge.trunk());
   }
+  else if (const auto *gap_task = dynamic_cast<const GapTask *>(task.get())) {
+    GapJudge judge(scenario, *gap_task, pipeline);
+    fly(std::ref(judge));
+    judgeGap(result, scenario, *gap_task, judge);
+  }
   else {
-    result.record = runClosedLoop(robot, pipeline, *task, options.loop, {}, watcher);
-    result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
-    if (const auto *gap_task = dynamic_cast<const GapTask *>(task.get()))
-      judgeGap(result, scenario, *gap_task, pipeline);
-    else
-      judgeSlalom(result);
+    fly({});
+    judgeSlalom(result);
   }
   if (result.record.is_contact)
     result.outcome = "touched a trunk";
