@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -118,6 +119,10 @@ std::string legend(const MapPicture &picture)
     y += 16;
   };
   entry(true, "#c0392b", "trunks, two sigma");
+  const bool has_candidates = std::any_of(picture.trunks.begin(), picture.trunks.end(), [](const TrunkRecord &record) {
+    return record.status == TrunkStatus::candidate;
+  });
+  entry(has_candidates, "#e0a800", "candidates, not confirmed");
   entry(!picture.truth_trunks.empty(), "#27ae60", "trunks, truth");
   entry(!picture.smoothed.empty(), "#1f4e9e", "trajectory, smoothed");
   entry(!picture.online.empty(), "#7fa8e0", "trajectory, online");

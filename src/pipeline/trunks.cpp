@@ -120,7 +120,7 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
     TrackingResult tracked = trackTrunk(gradient, m_camera, prediction, m_options.tracking);
     if (tracked.status == TrackingStatus::tracked && !insideGate(prediction, tracked))
       tracked.status = TrackingStatus::diverged;
-    if (hasTurned(trunk, prediction, tracked))
+    if (confirmTurn(trunk, prediction, tracked))
       tracked.status = TrackingStatus::tracked;
     if (tracked.status == TrackingStatus::not_visible)
       continue;
@@ -140,8 +140,9 @@ void Pipeline::trackKnown(const Gradient &gradient, double time_s, FrameResult &
   }
 }
 
-/// Whether the borders found have the other sign, but stand where they are expected, and have done so long enough.
-bool Pipeline::hasTurned(MapTrunk &trunk, const TrackingPrediction &prediction, const TrackingResult &tracked) const
+/// Takes down whether the borders found have the other sign, but stand where they are expected; true when they have
+/// done so for long enough.
+bool Pipeline::confirmTurn(MapTrunk &trunk, const TrackingPrediction &prediction, const TrackingResult &tracked) const
 {
   TrackingPrediction narrow = prediction;
   narrow.covariance(2, 2) -= missedVariance(trunk.misses_in_a_row);

@@ -13,7 +13,7 @@ const PinholeCamera kCamera{215.1, 215.8, 160.7, 123.3, 320, 240};
 
 TEST(PinholeCamera, ProjectUndoesRay)
 {
-  for (const Eigen::Vector2d u : {Eigen::Vector2d(0, 0), Eigen::Vector2d(319, 10), Eigen::Vector2d(77.25, 201.5)})
+  for (const Eigen::Vector2d &u : {Eigen::Vector2d(0, 0), Eigen::Vector2d(319, 10), Eigen::Vector2d(77.25, 201.5)})
     EXPECT_LT((kCamera.project(3.7 * kCamera.ray(u)) - u).norm(), 1e-10);
 }
 

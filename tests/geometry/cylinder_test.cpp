@@ -21,7 +21,7 @@ double planeDistance(double rho, double theta, const Vector3d &n)
 
 TEST(Cylinder, BordersAreTheLimbsOfVispForAnyDirectionOfTheAxis)
 {
-  for (const Vector3d axis : {Vector3d(0, -1, 0), Vector3d(0.8, -0.5, 0.1), Vector3d(1, 0.2, -0.3), Vector3d(0.1, 0.9, 0.4)}) {
+  for (const Vector3d &axis : {Vector3d(0, -1, 0), Vector3d(0.8, -0.5, 0.1), Vector3d(1, 0.2, -0.3), Vector3d(0.1, 0.9, 0.4)}) {
     Cylinder c; // in the camera frame
     c.foot = {0.4, 0.7, 3};
     c.top = c.foot + 1.7 * axis.normalized();

@@ -255,6 +255,10 @@ TEST(MapSvg, LeavesOutWhatIsLostOrMergedAndOutlinesCandidates)
   EXPECT_EQ(circles(TrunkStatus::confirmed), 1);
   EXPECT_EQ(circles(TrunkStatus::candidate), 1);
   EXPECT_THAT(toSvg(smallMap()), HasSubstr("<ellipse"));
+  EXPECT_THAT(toSvg(smallMap()), testing::Not(HasSubstr("candidates")));
+  MapPicture doubtful = smallMap();
+  doubtful.trunks[0].status = TrunkStatus::candidate;
+  EXPECT_THAT(toSvg(doubtful), HasSubstr("candidates"));
   EXPECT_EQ(circles(TrunkStatus::lost), 0);
   EXPECT_EQ(circles(TrunkStatus::merged), 0);
 }

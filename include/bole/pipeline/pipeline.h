@@ -133,7 +133,7 @@ private:
   TrackingPrediction predict(const MapTrunk &trunk, const RelativeTrunk &relative, const Matrix4d &covariance,
                              const Pose &wMc) const;
   double weightOfView(const MapTrunk &trunk, const Eigen::Vector3d &camera) const;
-  bool hasTurned(MapTrunk &trunk, const TrackingPrediction &prediction, const TrackingResult &tracked) const;
+  bool confirmTurn(MapTrunk &trunk, const TrackingPrediction &prediction, const TrackingResult &tracked) const;
   double missedVariance(int misses) const;
   bool insideGate(const TrackingPrediction &prediction, const TrackingResult &tracked) const;
   void hide(TrackingPrediction &prediction, const MapTrunk &trunk, const Pose &wMc) const;
