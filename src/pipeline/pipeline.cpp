@@ -40,6 +40,7 @@ Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineO
 
 FrameResult Pipeline::process(const Frame &frame)
 {
+  m_sights.clear();
   FrameResult result;
   result.index = frame.index;
   result.stamp_ns = frame.stamp_ns;
@@ -70,6 +71,7 @@ FrameResult Pipeline::process(const Frame &frame)
     keepView(frame, std::move(gradient));
     detectNew(result);
     lap("detection");
+    placeSights();
     lookThroughTrunks();
     reviewMap(time_s);
     reviewScale(0.1, false);

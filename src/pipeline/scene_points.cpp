@@ -26,11 +26,11 @@ constexpr double kBehind = 2.5;      ///< sigmas behind the bark, or before
 } // namespace
 
 /// The point now.t + ray / w lies on the ray seen before where a x (ray + w base) = 0: least squares in w.
-std::vector<Pipeline::Sight> Pipeline::sights() const
+void Pipeline::placeSights()
 {
-  std::vector<Sight> sights;
-  if (m_smoother.poseCount() == 0 || m_points.framesBack() < 2 || isTurning())
-    return sights;
+  m_sights.clear();
+  if (m_points.framesBack() < 2 || isTurning())
+    return;
   std::vector<Pose> wMc; // by frames back
   for (int back = 0; back <= std::min(kBack, m_points.framesBack()); ++back)
     wMc.push_back(cameraAt(poseOf(m_points.frameIndex(back))));
@@ -53,26 +53,24 @@ std::vector<Pipeline::Sight> Pipeline::sights() const
     const Pose &half_way = wMc[static_cast<std::size_t>(back / 2)];
     const Eigen::Vector3d c = half_way.R.transpose() * (ray + w * (now.t - half_way.t)); // the point times w
     if (c.z() > 0 && (m_camera.project(c) - seen(back / 2)).norm() < kMiddle_px)
-      sights.push_back({ray, w, kRaySigma / across});
+      m_sights.push_back({ray, w, kRaySigma / across});
   }
-  return sights;
 }
 
 std::vector<Eigen::Vector3d> Pipeline::scenePoints(double range) const
 {
   std::vector<Eigen::Vector3d> points;
-  for (const Sight &sight : sights())
+  for (const Sight &sight : m_sights)
     if (sight.inverse_distance > kPlaced * sight.sigma && sight.inverse_distance * range > 1)
-      points.emplace_back(cameraAt(m_smoother.poseCount() - 1).t + sight.ray / sight.inverse_distance);
+      points.emplace_back(cameraPose().t + sight.ray / sight.inverse_distance);
   return points;
 }
 
 void Pipeline::lookThroughTrunks()
 {
-  const std::vector<Sight> sights = this->sights();
-  if (sights.empty())
+  if (m_sights.empty())
     return;
-  const Pose wMc = cameraAt(m_smoother.poseCount() - 1);
+  const Pose wMc = cameraPose();
   for (const std::size_t i : m_map.active()) {
     MapTrunk &trunk = m_map.trunks()[i];
     const double range = (trunk.trunk.xy - wMc.t.head<2>()).norm(), radius = trunk.trunk.radius();
@@ -83,7 +81,7 @@ void Pipeline::lookThroughTrunks()
     const double inside = std::min(kInside * half, half - kBorder_px / m_camera.fx);
     const ElevationRange stem = elevation(relative, trunk.trunk, wMc);
     const double bark = 1 / (range - radius);
-    for (const Sight &sight : sights) {
+    for (const Sight &sight : m_sights) {
       const double level = sight.ray.head<2>().norm(), slope = sight.ray.z() / level;
       if (slope < stem.low || slope > stem.high || sight.sigma > kKnown * bark * level)
         continue;

@@ -17,6 +17,9 @@ constexpr double kRemembered_s = 3;   ///< of what is out of view
 constexpr int kSeen = 6;              ///< points in a column before it counts
 constexpr double kUpright = 0.5;      ///< and their least extent in height [m]
 constexpr double kPointRadius = 0.05; ///< of the bark round a point [m]
+constexpr double kCell = 0.2;         ///< of the space seen [m]
+constexpr int kRays = 12;             ///< through a cell before it counts as seen
+constexpr double kSeenFor_s = 10;     ///< and how long it does
 } // namespace
 
 double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
@@ -80,6 +83,51 @@ void NearPoints::addTo(std::vector<Obstacle> &obstacles, const Pose &wMb, double
     if (column.count >= kSeen && column.high - column.low > kUpright && (xy - wMb.t.head<2>()).norm() < range)
       obstacles.push_back({-1, true, xy, kPointRadius, Eigen::Matrix2d::Zero(), kSure});
   }
+}
+
+namespace
+{
+std::int32_t cellNumber(double metres) { return static_cast<std::int32_t>(std::floor(metres / kCell)); }
+
+std::size_t placeIn(std::int32_t side, std::int32_t x, std::int32_t y)
+{
+  const auto wrapped = [side](std::int32_t k) { return static_cast<std::size_t>((k % side + side) % side); };
+  return wrapped(y) * static_cast<std::size_t>(side) + wrapped(x);
+}
+} // namespace
+
+/// That of \p p, emptied where it was another's.
+SeenSpace::Cell &SeenSpace::cellAt(const Eigen::Vector2d &p)
+{
+  const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
+  Cell &cell = m_cells[placeIn(kSide, x, y)];
+  if (cell.x != x || cell.y != y)
+    cell = {x, y, 0, 0};
+  return cell;
+}
+
+void SeenSpace::see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s)
+{
+  constexpr double kFar = 6;      // nothing beyond matters [m]
+  constexpr double kHeight = 0.5; // of a ray above or below the camera [m]
+  m_time_s = time_s;
+  for (const Pipeline::Sight &sight : sights) {
+    const double level = sight.ray.head<2>().norm();
+    const double surely_free = level / (std::max(sight.inverse_distance, 0.0) + 2 * sight.sigma) - kCell;
+    const double end = std::min({surely_free, kFar, kHeight * level / std::max(std::abs(sight.ray.z()), 1e-6)});
+    for (double range = 0; range < end; range += 0.7 * kCell) {
+      Cell &cell = cellAt(from.head<2>() + range / level * sight.ray.head<2>());
+      ++cell.rays;
+      cell.last_s = time_s;
+    }
+  }
+}
+
+bool SeenSpace::isSeen(const Eigen::Vector2d &p) const
+{
+  const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
+  const Cell &cell = m_cells[placeIn(kSide, x, y)];
+  return cell.x == x && cell.y == y && cell.rays >= kRays && m_time_s - cell.last_s < kSeenFor_s;
 }
 
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,

@@ -18,6 +18,9 @@ constexpr double kOffsetStep = 0.25;   ///< [m]
 constexpr double kOffsetGain = 1.0;    ///< sideways velocity over offset [1/s]
 constexpr double kOffLine = 0.12;      ///< cost a metre off the line
 constexpr double kChange = 0.08;       ///< cost a metre of a change of mind
+constexpr double kUnseen = 8;          ///< cost a second of a hull in what was not seen through
+constexpr double kUnseenTo = 1.8;      ///< as far ahead as it must have been [m]
+constexpr double kRound = 0.12;        ///< and round the hull [m]
 constexpr double kSlow = 1.5;          ///< cost of standing still against full speed
 constexpr double kNear = 12;           ///< cost a square metre inside the margin and a second
 constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
@@ -43,10 +46,24 @@ double clearanceOf(const Obstacle &trunk, const SlalomState &at, const SlalomTas
   return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
 }
 
+/// Of a ring about the hull.
+double unseenShare(const SlalomState &at, const IsSeen &is_seen, const SlalomTaskOptions &options)
+{
+  constexpr int kPlaces = 8;
+  const double r = options.body_radius + kRound;
+  int unseen = 0;
+  for (int k = 0; k < kPlaces; ++k) {
+    const double angle = 2 * M_PI * k / kPlaces;
+    unseen += !is_seen(at.x + r * std::cos(angle), at.y + r * std::sin(angle));
+  }
+  return static_cast<double>(unseen) / kPlaces;
+}
+
 /// Flies \p way in thought and fills its clearance and cost. \p allowed: of each trunk, what is nearer is a contact [m].
 void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vector<double> &allowed, SlalomState state,
-            const SlalomTaskOptions &options)
+            const SlalomTaskOptions &options, const IsSeen &is_seen)
 {
+  const SlalomState start = state;
   way.clearance = std::numeric_limits<double>::infinity();
   double contact_s = options.horizon, depth = 0;
   for (double t = 0; t < options.horizon; t += kStep_s) {
@@ -64,6 +81,8 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vect
     way.clearance = std::min(way.clearance, clearance);
     const double inside = std::max(0.0, options.margin - clearance); // for as long as it is: near a trunk, away from it
     way.cost += kStep_s * kNear * inside * inside;
+    if (is_seen && std::hypot(state.x - start.x, state.y - start.y) < kUnseenTo)
+      way.cost += kStep_s * kUnseen * unseenShare(state, is_seen, options);
   }
   if (depth > 0)
     way.cost += kContact * (1 + depth + (options.horizon - contact_s));
@@ -89,7 +108,7 @@ void SlalomTaskOptions::validate() const
 }
 
 SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &state, double last_offset,
-                    const SlalomTaskOptions &options)
+                    const SlalomTaskOptions &options, const IsSeen &is_seen)
 {
   SlalomWay best;
   best.cost = std::numeric_limits<double>::infinity();
@@ -106,7 +125,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
       way.cost = kOffLine * std::abs(offset) + kChange * std::abs(way.offset - last_offset) + kSlow * (1 - share);
       if (way.cost >= best.cost)
         continue;
-      tryOut(way, trunks, allowed, state, options);
+      tryOut(way, trunks, allowed, state, options, is_seen);
       if (way.cost < best.cost)
         best = way;
     }
@@ -144,6 +163,8 @@ void SlalomTask::locate(const FrameResult &result)
 TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
 {
   locate(result);
+  if (!pipeline.sights().empty())
+    m_seen.see(pipeline.sights(), pipeline.cameraPose().t, m_time_s);
   m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, m_time_s);
   if (phase() == TaskPhase::searching && m_sidestep.elapsed(m_time_s) < m_options.look) {
     m_state.lead = 0;
@@ -159,7 +180,10 @@ TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
     trunk.xy = axes * (trunk.xy - m_start.t.head<2>());
     trunk.covariance = axes * trunk.covariance * axes.transpose();
   }
-  m_way = chooseWay(trunks, m_state, m_way.offset, m_options);
+  const auto is_seen = [&](double x, double y) {
+    return m_seen.isSeen(m_start.t.head<2>() + axes.transpose() * Eigen::Vector2d(x, y));
+  };
+  m_way = chooseWay(trunks, m_state, m_way.offset, m_options, is_seen);
   const Eigen::Vector2d velocity(m_way.speed, sidewaysTo(m_way.offset, m_state.y, m_options));
   const double heading = yawOf(m_start) + kLook * std::atan2(velocity.y(), std::max(velocity.x(), 0.5 * m_options.speed));
   return {false, towards(result.wMb, axes.transpose() * velocity, heading), m_way.speed < m_options.speed ? "slows" : "flies"};

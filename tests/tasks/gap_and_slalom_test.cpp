@@ -49,6 +49,42 @@ TEST(NearPoints, WhatStandsUprightCountsAndWhatLiesLowDoesNot)
   EXPECT_TRUE(found.empty());
 }
 
+TEST(SeenSpace, IsWhatPointsWereSeenThroughAndNotWhatHidesThem)
+{
+  const Eigen::Vector3d from(-20.3, 7.1, 1.2); // the map of cells goes round
+  const auto ray = [](double degrees, double slope) {
+    const double a = degrees * M_PI / 180;
+    return Eigen::Vector3d(std::cos(a), std::sin(a), slope).normalized();
+  };
+  std::vector<Pipeline::Sight> sights;
+  for (double degrees = -30; degrees <= 30; degrees += 0.25)
+    sights.push_back({ray(degrees, 0), std::abs(degrees) < 8 ? 1 / 1.5 : 1 / 9.0, 0.01}); // a wide thing 1.5 m ahead
+  SeenSpace space;
+  for (int k = 0; k < 10; ++k)
+    space.see(sights, from, 0.1 * k);
+  const auto isSeen = [&](double degrees, double range) {
+    return space.isSeen(from.head<2>() + range * ray(degrees, 0).head<2>());
+  };
+  EXPECT_TRUE(isSeen(0, 1.0));
+  EXPECT_FALSE(isSeen(0, 1.5)); // its bark
+  EXPECT_FALSE(isSeen(0, 2.5)); // and behind it
+  EXPECT_TRUE(isSeen(20, 2.5));
+  EXPECT_FALSE(isSeen(50, 1.5)); // beside the image
+  space.see({}, from, 30);       // long after
+  EXPECT_FALSE(isSeen(20, 2.5));
+}
+
+TEST(SeenSpace, RaysToTheGroundTellOfTheHeightOfTheDroneOnly)
+{
+  std::vector<Pipeline::Sight> sights;
+  for (int k = 0; k < 200; ++k)
+    sights.push_back({Eigen::Vector3d(1, 0, -0.5).normalized(), 1 / 6.0, 0.01});
+  SeenSpace space;
+  space.see(sights, {0, 0, 1.2}, 0);
+  EXPECT_TRUE(space.isSeen({0.7, 0}));
+  EXPECT_FALSE(space.isSeen({1.7, 0})); // the ray is 0.85 m below it there
+}
+
 TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 {
   const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.05, 0.2)};
@@ -186,6 +222,18 @@ TEST(Slalom, KeepsFartherFromWhatIsLessWellKnown)
   vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
   const SlalomState state;
   EXPECT_GT(std::abs(chooseWay({vague}, state, 0, {}).offset), std::abs(chooseWay({sure}, state, 0, {}).offset));
+}
+
+TEST(Slalom, GoesRoundWhatWasNotSeenThrough)
+{
+  SlalomTaskOptions straight;
+  straight.swing = 0;
+  const IsSeen but_ahead_left = [](double x, double y) { return x < 1 || y < -0.2; };
+  EXPECT_NEAR(chooseWay({}, {}, 0, straight).offset, 0, 1e-9);
+  EXPECT_LT(chooseWay({}, {}, 0, straight, but_ahead_left).offset, -0.4);
+  EXPECT_EQ(chooseWay({}, {}, 0, straight, [](double, double) { return true; }).offset, 0);
+  const SlalomWay blind = chooseWay({}, {}, 0, straight, [](double x, double) { return x < 0.5; });
+  EXPECT_LT(blind.speed, straight.speed); // and does not fly where nothing is known
 }
 
 TEST(Slalom, LeavesATrunkBesideItThoughNoWayLeadsNearer)

@@ -82,6 +82,15 @@ public:
   };
   std::vector<StampedPose> smoothedTrajectory() const;
   const std::vector<StampedPose> &onlineTrajectory() const { return m_online; }
+  struct Sight ///< where a point of the last frame stands, by its parallax
+  {
+    Eigen::Vector3d ray;         ///< unit vector from the camera, world
+    double inverse_distance = 0; ///< [1/m], below 0 by noise
+    double sigma = 0;            ///< of it [1/m]
+  };
+  /// All points of the last frame that have a parallax; none where that frame was not ok or the camera has only turned.
+  const std::vector<Sight> &sights() const { return m_sights; }
+  Pose cameraPose() const { return cameraAt(m_smoother.poseCount() - 1); } ///< at the last frame, in the world
   /// Points of the last frame whose tracks have parallax enough to be placed within 7 per cent of their distance, no
   /// farther than \p range [m]: world [m]. Bark, branches, ground: whatever has corners.
   std::vector<Eigen::Vector3d> scenePoints(double range) const;
@@ -98,12 +107,6 @@ private:
     LevelProfile profile;
     std::size_t pose = 0;
     double time_s = 0;
-  };
-  struct Sight ///< where a point of the last frame stands, by its parallax
-  {
-    Eigen::Vector3d ray;         ///< unit vector from the camera, world
-    double inverse_distance = 0; ///< [1/m], below 0 by noise
-    double sigma = 0;            ///< of it [1/m]
   };
   struct Lap;
 
@@ -124,7 +127,7 @@ private:
   void addRelativePoses(const std::vector<RelativeMotion> &motions);
   void addTurn(std::size_t a, std::size_t b, const RelativePoseEstimate &estimate);
   void estimateSaliency(const Frame &frame, FrameResult &result);
-  std::vector<Sight> sights() const;
+  void placeSights();
   void lookThroughTrunks();
   void trackKnown(const Gradient &gradient, double time_s, FrameResult &result);
   double misfit(const TrackingResult &tracked, const RelativeTrunk &expected) const;
@@ -158,6 +161,7 @@ private:
   TrunkMap m_map;
   std::deque<View> m_views; ///< oldest first
   std::vector<StampedPose> m_online;
+  std::vector<Sight> m_sights;               ///< of the last frame
   std::vector<std::size_t> m_indices;       ///< Frame::index of each processed frame
   Vector6d m_velocity = Vector6d::Zero();   ///< of the body, in its frame
   std::optional<double> m_ground_z;         ///< height of the ground in the world, where it is known [m]

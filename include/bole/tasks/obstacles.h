@@ -5,6 +5,7 @@
 
 #include <bole/pipeline/pipeline.h>
 
+#include <cstdint>
 #include <map>
 #include <utility>
 #include <vector>
@@ -53,6 +54,30 @@ private:
     double last_s = 0;
   };
   std::map<std::pair<int, int>, Column> m_columns;
+};
+
+/// Where the camera has seen that nothing stands: what it sees a point through is free. What it has not seen through may
+/// hold anything: dark bark has no corners and may have but one border in the image, and beside the image nothing is seen.
+class SeenSpace
+{
+public:
+  /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
+  void see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s);
+  /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
+  bool isSeen(const Eigen::Vector2d &p) const;
+
+private:
+  struct Cell
+  {
+    std::int32_t x = 0, y = 0;
+    int rays = 0;
+    double last_s = 0;
+  };
+  Cell &cellAt(const Eigen::Vector2d &p);
+
+  static constexpr std::int32_t kSide = 64; ///< of a map that goes round: what is left behind makes room
+  std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
+  double m_time_s = 0;
 };
 
 /// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that

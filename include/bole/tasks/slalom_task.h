@@ -8,11 +8,14 @@
 /// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The drone sidesteps once before it leaves, and the
 /// line itself swings from side to side: flying straight at a trunk gives no parallax, and what has none is not in the
 /// map. It swings on where the drone is held up, since what is no trunk shows itself as such from another side. What stands upright near by the
-/// points of the scene counts beside the map, whatever it is: a trunk may be missing in the map, or stand elsewhere. The
-/// camera looks half-way into the direction of flight.
+/// points of the scene counts beside the map, whatever it is: a trunk may be missing in the map, or stand elsewhere. And
+/// what the camera has not seen through is dear: a trunk without corners is in neither. The camera looks half-way into
+/// the direction of flight.
 
 #include <bole/tasks/obstacles.h>
 #include <bole/tasks/servo_task.h>
+
+#include <functional>
 
 namespace bole
 {
@@ -52,9 +55,13 @@ struct SlalomState
   double x = 0, y = 0, vy = 0, lead = 0;
 };
 
-/// The cheapest way round \p trunks, whose places are on the line's axes (x along, y left).
+/// Whether the place x along, y left of the line [m] was seen to be free.
+using IsSeen = std::function<bool(double x, double y)>;
+
+/// The cheapest way round \p trunks, whose places are on the line's axes (x along, y left), and round what \p is_seen
+/// does not know of; none: all of it is.
 SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &state, double last_offset,
-                    const SlalomTaskOptions &options);
+                    const SlalomTaskOptions &options, const IsSeen &is_seen = {});
 
 class SlalomTask : public ServoTask
 {
@@ -78,6 +85,7 @@ private:
   SlalomState m_state;
   double m_time_s = 0;
   NearPoints m_near_points;
+  SeenSpace m_seen;
   Sidestep m_sidestep;
   SlalomWay m_way;
 };
