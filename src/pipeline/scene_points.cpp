@@ -79,6 +79,8 @@ void Pipeline::lookThroughTrunks()
       continue;
     const double half = std::asin(std::min(0.99, radius / range));
     const double inside = std::min(kInside * half, half - kBorder_px / m_camera.fx);
+    if (inside <= 0)
+      continue;
     const ElevationRange stem = elevation(relative, trunk.trunk, wMc);
     const double bark = 1 / (range - radius);
     for (const Sight &sight : m_sights) {

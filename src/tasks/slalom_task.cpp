@@ -132,7 +132,8 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
   return best;
 }
 
-SlalomTask::SlalomTask(const SlalomTaskOptions &options) : ServoTask(options.safety), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
+SlalomTask::SlalomTask(const SlalomTaskOptions &options)
+  : ServoTask(options.safety), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
   m_options.validate();
 }

@@ -4,13 +4,13 @@
 /// Through a stand of trees along a straight line, round whatever the map says is in the way.
 ///
 /// Idea: each frame the ways to a set of sideways offsets, at a few speeds, are flown in thought over the next seconds
-/// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near
-/// to a trunk, its covariance included, how far it leads from the line, and how slow it is. The drone sidesteps once before it leaves, and the
-/// line itself swings from side to side: flying straight at a trunk gives no parallax, and what has none is not in the
-/// map. It swings on where the drone is held up, since what is no trunk shows itself as such from another side. What stands upright near by the
-/// points of the scene counts beside the map, whatever it is: a trunk may be missing in the map, or stand elsewhere. And
-/// what the camera has not seen through is dear: a trunk without corners is in neither. The camera looks half-way into
-/// the direction of flight.
+/// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near to
+/// a trunk, its covariance included, how far it leads from the line, and how slow it is. The drone sidesteps once
+/// before it leaves, and the line itself swings from side to side: flying straight at a trunk gives no parallax, and
+/// what has none is not in the map. It swings on where the drone is held up, since what is no trunk shows itself as
+/// such from another side. What stands upright near by the points of the scene counts beside the map, whatever it is: a
+/// trunk may be missing in the map, or stand elsewhere. And what the camera has not seen through is dear: a trunk
+/// without corners is in neither. The camera looks half-way into the direction of flight.
 
 #include <bole/tasks/obstacles.h>
 #include <bole/tasks/servo_task.h>
