@@ -28,7 +28,6 @@ constexpr double kBehind = 2.5;      ///< sigmas behind the bark, or before
 /// The point now.t + ray / w lies on the ray seen before where a x (ray + w base) = 0: least squares in w.
 void Pipeline::placeSights()
 {
-  m_sights.clear();
   if (m_points.framesBack() < 2 || isTurning())
     return;
   std::vector<Pose> wMc; // by frames back

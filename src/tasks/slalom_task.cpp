@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -46,22 +47,31 @@ double clearanceOf(const Obstacle &trunk, const SlalomState &at, const SlalomTas
   return trunk.clearance({at.x, at.y}, options.sigmas) - options.body_radius;
 }
 
-/// Of a ring about the hull.
-double unseenShare(const SlalomState &at, const IsSeen &is_seen, const SlalomTaskOptions &options)
+using Ring = std::array<Eigen::Vector2d, 8>;
+
+/// Places about the hull, from its middle [m].
+Ring ringRound(const SlalomTaskOptions &options)
 {
-  constexpr int kPlaces = 8;
+  Ring ring;
   const double r = options.body_radius + kRound;
-  int unseen = 0;
-  for (int k = 0; k < kPlaces; ++k) {
-    const double angle = 2 * M_PI * k / kPlaces;
-    unseen += !is_seen(at.x + r * std::cos(angle), at.y + r * std::sin(angle));
+  for (std::size_t k = 0; k < ring.size(); ++k) {
+    const double angle = 2 * M_PI * static_cast<double>(k) / static_cast<double>(ring.size());
+    ring[k] = {r * std::cos(angle), r * std::sin(angle)};
   }
-  return static_cast<double>(unseen) / kPlaces;
+  return ring;
+}
+
+double unseenShare(const SlalomState &at, const Ring &ring, const IsSeen &is_seen)
+{
+  const auto unseen = std::count_if(ring.begin(), ring.end(), [&](const Eigen::Vector2d &place) {
+    return !is_seen(at.x + place.x(), at.y + place.y());
+  });
+  return static_cast<double>(unseen) / static_cast<double>(ring.size());
 }
 
 /// Flies \p way in thought and fills its clearance and cost. \p allowed: of each trunk, what is nearer is a contact [m].
 void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vector<double> &allowed, SlalomState state,
-            const SlalomTaskOptions &options, const IsSeen &is_seen)
+            const SlalomTaskOptions &options, const Ring &ring, const IsSeen &is_seen)
 {
   const SlalomState start = state;
   way.clearance = std::numeric_limits<double>::infinity();
@@ -82,7 +92,7 @@ void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vect
     const double inside = std::max(0.0, options.margin - clearance); // for as long as it is: near a trunk, away from it
     way.cost += kStep_s * kNear * inside * inside;
     if (is_seen && std::hypot(state.x - start.x, state.y - start.y) < kUnseenTo)
-      way.cost += kStep_s * kUnseen * unseenShare(state, is_seen, options);
+      way.cost += kStep_s * kUnseen * unseenShare(state, ring, is_seen);
   }
   if (depth > 0)
     way.cost += kContact * (1 + depth + (options.horizon - contact_s));
@@ -112,6 +122,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
 {
   SlalomWay best;
   best.cost = std::numeric_limits<double>::infinity();
+  const Ring ring = ringRound(options);
   const double wanted = line(state.x + state.lead + options.speed, options); // a second ahead
   std::vector<double> allowed; // who stands too near already may leave
   allowed.reserve(trunks.size());
@@ -125,7 +136,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
       way.cost = kOffLine * std::abs(offset) + kChange * std::abs(way.offset - last_offset) + kSlow * (1 - share);
       if (way.cost >= best.cost)
         continue;
-      tryOut(way, trunks, allowed, state, options, is_seen);
+      tryOut(way, trunks, allowed, state, options, ring, is_seen);
       if (way.cost < best.cost)
         best = way;
     }
