@@ -33,7 +33,8 @@ double TrunkMap::evidence(const MapTrunk &trunk) const
   const double foreground_known = std::min(trunk.foreground_count, 5) / 5.0;
   return kBias + kInnovation * std::sqrt(trunk.innovation2) / m_options.innovation_unit_px + kMissed * missed + kLogRadius * log_radius +
          kLogRadius2 * log_radius * log_radius + foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
-         kLookedThrough * std::log1p(trunk.lookedThrough()) + kLogParallax * std::log(trunk.parallax() + 0.01) + kLogContrast * std::log(trunk.contrast + 0.005) +
+         kLookedThrough * std::log1p(trunk.lookedThrough()) + kLogParallax * std::log(trunk.parallax() + 0.01) +
+         kLogContrast * std::log(trunk.contrast + 0.005) +
          kFoundAgain * std::log1p(trunk.found_again) + kLogPositionSigma * std::log(trunk.positionSigma() + 1e-3);
 }
 } // namespace bole
