@@ -2,8 +2,8 @@
 // bole evaluate: a finished run against the ground truth of its sequence.
 #include "commands.h"
 
-#include <bole/output/atomic_file.h>
-#include <bole/output/evaluation.h>
+#include "output/atomic_file.h"
+#include <bole/evaluation.h>
 
 #include <cstdio>
 #include <memory>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "field_of_view.h"
 
-#include <bole/motion/focal_length.h>
+#include "motion/focal_length.h"
 
 #include <cmath>
 

@@ -3,7 +3,7 @@
 /// \file
 /// The field of view of a video that came without a camera file.
 
-#include <bole/input/open_source.h>
+#include <bole/open_source.h>
 
 namespace bole::apps
 {

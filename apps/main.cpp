@@ -12,17 +12,19 @@ int main(int argc, char **argv)
   app.require_subcommand(1);
   bole::apps::addTrack(app);
   bole::apps::addEvaluate(app);
+  bole::apps::addRecord(app);
+  bole::apps::addGraph(app);
+  bole::apps::addSolve(app);
+#ifdef BOLE_LAB
   bole::apps::addCompare(app);
-  bole::apps::addCalibrateSaliency(app);
-  bole::apps::addShowSaliency(app);
   bole::apps::addSimulate(app);
   bole::apps::addServo(app);
   bole::apps::addBenchmark(app);
-  bole::apps::addRecord(app);
   bole::apps::addReplay(app);
   bole::apps::addEmulate(app);
-  bole::apps::addGraph(app);
-  bole::apps::addSolve(app);
+  bole::apps::addCalibrateSaliency(app);
+  bole::apps::addShowSaliency(app);
+#endif
   try {
     app.parse(argc, argv);
   }

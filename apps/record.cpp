@@ -3,9 +3,9 @@
 #include "commands.h"
 #include "interrupt.h"
 
-#include <bole/ardrone/ardrone_source.h>
-#include <bole/ardrone/flight_folder.h>
-#include <bole/ardrone/recording.h>
+#include <bole/ardrone_source.h>
+#include "ardrone/flight_folder.h"
+#include "ardrone/recording.h"
 
 #include <fmt/format.h>
 #include <map>

@@ -2,8 +2,8 @@
 // `bole solve`: the optimum of a saved graph.
 #include "commands.h"
 
-#include <bole/smoothing/g2o.h>
-#include <bole/smoothing/smoother.h>
+#include "smoothing/g2o.h"
+#include <bole/smoother.h>
 
 #include <chrono>
 #include <fmt/core.h>

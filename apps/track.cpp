@@ -6,11 +6,11 @@
 #include "overlay_window.h"
 #include "track_output.h"
 
-#include <bole/ardrone/ardrone_source.h>
-#include <bole/input/open_source.h>
-#include <bole/input/video_source.h>
-#include <bole/output/progress.h>
-#include <bole/pipeline/config.h>
+#include <bole/ardrone_source.h>
+#include <bole/open_source.h>
+#include "input/video_source.h"
+#include "output/progress.h"
+#include <bole/config.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "track_output.h"
 
-#include <bole/input/asl_source.h>
-#include <bole/input/truth.h>
-#include <bole/output/overlay.h>
-#include <bole/output/timing_csv.h>
-#include <bole/output/trajectory_writer.h>
-#include <bole/output/trunks_csv.h>
-#include <bole/smoothing/g2o.h>
+#include "input/asl_source.h"
+#include "input/truth.h"
+#include <bole/overlay.h>
+#include "output/timing_csv.h"
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
+#include "smoothing/g2o.h"
 
 #include <algorithm>
 #include <chrono>

@@ -3,11 +3,11 @@
 /// \file
 /// The folder that `bole track` writes, every file atomically.
 
-#include <bole/ardrone/drone_link.h>
-#include <bole/output/map_svg.h>
-#include <bole/output/summary_json.h>
-#include <bole/output/video_writer.h>
-#include <bole/pipeline/pipeline.h>
+#include "ardrone/drone_link.h"
+#include "output/map_svg.h"
+#include "output/summary_json.h"
+#include "output/video_writer.h"
+#include <bole/pipeline.h>
 
 #include <future>
 #include <memory>

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # cmake --install: headers, libraries, the command, presets and data, and boleConfig.cmake.
-get_property(stages GLOBAL PROPERTY BOLE_STAGES)
-install(TARGETS ${stages} bole_library EXPORT boleTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS bole_library EXPORT boleTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS bole RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY include/bole DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 

@@ -3,7 +3,7 @@
 /// \file
 /// AR.Drone 1 and 2 behind ViSP's grabber interface.
 
-#include <bole/ardrone/drone_link.h>
+#include "ardrone/drone_link.h"
 
 #include <memory>
 #include <string>

@@ -3,7 +3,7 @@
 /// \file
 /// A tree trunk as a visual feature for ViSP's vpServo.
 
-#include <bole/geometry/relative_trunk.h>
+#include <bole/trunk.h>
 
 #include <visp3/core/vpRGBa.h>
 #include <visp3/visual_features/vpBasicFeature.h>

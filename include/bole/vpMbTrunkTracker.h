@@ -40,11 +40,11 @@
 ///
 /// Cost: see README, "Against ViSP's edge trackers". One tracker a thread.
 
-#include <bole/tracking/border_vote.h>
-#include <bole/tracking/camera_motion.h>
-#include <bole/tracking/image_health.h>
-#include <bole/tracking/rotation_aligner.h>
-#include <bole/vpMbtDistanceTrunk.h>
+#include "mbt/border_vote.h"
+#include "mbt/camera_motion.h"
+#include "input/image_health.h"
+#include "mbt/rotation_aligner.h"
+#include "mbt/vpMbtDistanceTrunk.h"
 
 #include <Eigen/Core>
 

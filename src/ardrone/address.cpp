@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/address.h>
+#include "ardrone/address.h"
 
 #include <charconv>
 #include <fmt/format.h>

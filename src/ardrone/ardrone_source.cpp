@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/ardrone_source.h>
+#include <bole/ardrone_source.h>
 
-#include "socket.h"
+#include "ardrone/socket.h"
 
 #include <atomic>
 #include <cmath>

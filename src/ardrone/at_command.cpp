@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/at_command.h>
+#include "ardrone/at_command.h"
 
-#include "socket.h"
+#include "ardrone/socket.h"
 
 #include <charconv>
 #include <cstring>

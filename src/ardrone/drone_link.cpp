@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/drone_link.h>
+#include "ardrone/drone_link.h"
 
-#include "receivers.h"
-#include "video_stamps.h"
+#include "ardrone/receivers.h"
+#include "ardrone/video_stamps.h"
 
 #include <condition_variable>
 #include <mutex>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/flight_folder.h>
+#include "ardrone/flight_folder.h"
 
 #include <Eigen/Geometry>
 #include <cerrno>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/h264.h>
+#include "ardrone/h264.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 // What the manufacturer's SDK 2.0 puts into each option (facts of navdata_common.h, sizes verified
 // against a packet of a real drone): name and type of each field, in order. "f4 theta" is one
 // float, "u2 motor 4" four 16-bit numbers.
-#include <bole/ardrone/navdata.h>
+#include "ardrone/navdata.h"
 
-#include "bytes.h"
+#include "ardrone/bytes.h"
 
 #include <sstream>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/navdata_odometry.h>
-#include <bole/geometry/so3.h>
+#include "ardrone/navdata_odometry.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

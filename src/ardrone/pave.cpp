@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/pave.h>
+#include "ardrone/pave.h"
 
-#include "bytes.h"
+#include "ardrone/bytes.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "receivers.h"
+#include "ardrone/receivers.h"
 
 #include <array>
 

@@ -3,9 +3,9 @@
 /// \file
 /// The two threads that drain a drone's sockets.
 
-#include "socket.h"
+#include "ardrone/socket.h"
 
-#include <bole/ardrone/drone_link.h>
+#include "ardrone/drone_link.h"
 
 #include <atomic>
 #include <thread>

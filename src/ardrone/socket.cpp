@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "socket.h"
+#include "ardrone/socket.h"
 
 #include <arpa/inet.h>
 #include <cerrno>

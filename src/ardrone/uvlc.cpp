@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/uvlc.h>
+#include "ardrone/uvlc.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/uvlc.h>
-#include <bole/ardrone/video_decoder.h>
+#include "ardrone/uvlc.h"
+#include "ardrone/video_decoder.h"
 
 #include <fmt/format.h>
 

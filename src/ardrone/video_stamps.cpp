@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "video_stamps.h"
+#include "ardrone/video_stamps.h"
 
 #include <cstdlib>
 

@@ -3,7 +3,7 @@
 /// \file
 /// When the frames of the drone's video were, on a clock that only rises.
 
-#include <bole/ardrone/drone_clock.h>
+#include "ardrone/drone_clock.h"
 
 namespace bole
 {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/vpArDroneGrabber.h>
 
-#include "socket.h"
+#include "ardrone/socket.h"
 
 #include <algorithm>
 #include <fmt/format.h>

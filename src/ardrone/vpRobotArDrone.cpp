@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/body_velocity.h>
-#include <bole/geometry/pose.h>
-#include <bole/input/camera_file.h>
+#include "geometry/body_velocity.h"
+#include <bole/pose.h>
+#include "input/camera_file.h"
 #include <bole/vpRobotArDrone.h>
 
-#include "socket.h"
+#include "ardrone/socket.h"
 
 #include <algorithm>
 #include <atomic>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/detection/level_profile.h>
+#include "detection/level_profile.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

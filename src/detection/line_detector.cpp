@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/detection/line_detector.h>
+#include "detection/line_detector.h"
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

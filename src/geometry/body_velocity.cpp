@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/body_velocity.h>
+#include "geometry/body_velocity.h"
 
 #include <cmath>
 #include <visp3/core/vpVelocityTwistMatrix.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/median.h>
+#include "geometry/median.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/relative_trunk.h>
-#include <bole/geometry/so3.h>
+#include <bole/trunk.h>
+#include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 

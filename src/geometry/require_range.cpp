@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <visp3/core/vpException.h>
 

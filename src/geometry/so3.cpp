@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
+#include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/gradient/border_line.h>
+#include "gradient/border_line.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

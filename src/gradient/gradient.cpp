@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/gradient/gradient.h>
+#include "gradient/gradient.h"
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <opencv2/imgproc.hpp>
 #include <string>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "frame_builder.h"
+#include "input/frame_builder.h"
 
-#include <bole/input/asl_source.h>
-#include <bole/input/csv_reader.h>
+#include "input/asl_source.h"
+#include "input/csv_reader.h"
 
 #include <filesystem>
 #include <fmt/format.h>

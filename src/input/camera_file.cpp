@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "sensor_yaml.h"
+#include "input/sensor_yaml.h"
 
-#include <bole/input/camera_file.h>
+#include "input/camera_file.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/csv_reader.h>
+#include "input/csv_reader.h"
 
 #include <charconv>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/frame.h>
+#include <bole/frame.h>
 
 namespace bole
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "frame_builder.h"
+#include "input/frame_builder.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,13 +3,13 @@
 /// \file
 /// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
 
-#include "image_file.h"
+#include "input/image_file.h"
 
-#include <bole/input/camera_file.h>
-#include <bole/input/frame.h>
-#include <bole/input/rectifier.h>
-#include <bole/input/source_options.h>
-#include <bole/input/trajectory.h>
+#include "input/camera_file.h"
+#include <bole/frame.h>
+#include "input/rectifier.h"
+#include <bole/source_options.h>
+#include "input/trajectory.h"
 
 #include <optional>
 

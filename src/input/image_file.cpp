@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "image_file.h"
+#include "input/image_file.h"
 
 #include <algorithm>
 #include <array>

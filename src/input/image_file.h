@@ -3,7 +3,7 @@
 /// \file
 /// Reading one image file without ever throwing: a broken file is a status.
 
-#include <bole/input/frame.h>
+#include <bole/frame.h>
 
 #include <string>
 

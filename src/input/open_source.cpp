@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/asl_source.h>
-#include <bole/input/open_source.h>
-#include <bole/input/sequence_source.h>
-#include <bole/input/video_source.h>
+#include "input/asl_source.h"
+#include <bole/open_source.h>
+#include "input/sequence_source.h"
+#include "input/video_source.h"
 
 #include <filesystem>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/rectifier.h>
+#include "input/rectifier.h"
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "sensor_yaml.h"
+#include "input/sensor_yaml.h"
 
 #include <Eigen/LU>
 #include <cmath>

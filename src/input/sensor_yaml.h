@@ -3,7 +3,7 @@
 /// \file
 /// Strict reading of the keys of an EuRoC sensor.yaml.
 
-#include <bole/geometry/pose.h>
+#include <bole/pose.h>
 
 #include <set>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "frame_builder.h"
+#include "input/frame_builder.h"
 
-#include <bole/input/sequence_source.h>
+#include "input/sequence_source.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/source_options.h>
+#include <bole/source_options.h>
 
 #include <cmath>
 #include <fmt/format.h>

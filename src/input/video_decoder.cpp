@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "video_decoder.h"
+#include "input/video_decoder.h"
 
 #include <array>
 #include <cmath>

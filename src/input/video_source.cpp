@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "frame_builder.h"
-#include "video_decoder.h"
+#include "input/frame_builder.h"
+#include "input/video_decoder.h"
 
-#include <bole/input/video_source.h>
+#include "input/video_source.h"
 
 #include <deque>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/map/trunk_map.h>
+#include "map/trunk_map.h"
 
 #include <algorithm>
 #include <cmath>

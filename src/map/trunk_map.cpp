@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/map/trunk_map.h>
+#include "map/trunk_map.h"
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <algorithm>
 #include <cmath>

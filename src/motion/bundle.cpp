@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "bundle.h"
+#include "motion/bundle.h"
 
-#include "epipolar.h"
+#include "motion/epipolar.h"
 
 #include <Eigen/Dense>
 

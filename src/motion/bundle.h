@@ -6,7 +6,7 @@
 /// the inverse depths are eliminated one by one (Schur), so a step costs a dense solve of 6
 /// unknowns a free frame.
 
-#include <bole/geometry/pose.h>
+#include <bole/pose.h>
 
 #include <optional>
 #include <vector>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "epipolar.h"
+#include "motion/epipolar.h"
 
-#include <bole/geometry/median.h>
-#include <bole/geometry/so3.h>
+#include "geometry/median.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Dense>
 

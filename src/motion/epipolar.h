@@ -4,8 +4,8 @@
 /// The pieces of estimateRelativePose(): matches as rays, robust weights, the rotation-only fit,
 /// the joint fit and the statistics of parallax.
 
-#include <bole/geometry/so3.h>
-#include <bole/motion/relative_pose.h>
+#include "geometry/so3.h"
+#include "motion/relative_pose.h"
 
 #include <Eigen/Geometry>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/focal_length.h>
+#include "motion/focal_length.h"
 
-#include <bole/geometry/median.h>
+#include "geometry/median.h"
 
-#include "epipolar.h"
-#include "require.h"
+#include "motion/epipolar.h"
+#include "motion/require.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/ground_plane.h>
+#include "motion/ground_plane.h"
 
-#include "require.h"
+#include "motion/require.h"
 
-#include <bole/geometry/median.h>
+#include "geometry/median.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/gyro.h>
+#include "motion/gyro.h"
 
-#include "require.h"
+#include "motion/require.h"
 
 #include <Eigen/Dense>
 

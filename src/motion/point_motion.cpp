@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/point_motion.h>
+#include "motion/point_motion.h"
 
-#include "require.h"
+#include "motion/require.h"
 
 #include <algorithm>
 

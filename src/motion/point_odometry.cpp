@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/point_odometry.h>
+#include "motion/point_odometry.h"
 
-#include <bole/geometry/median.h>
+#include "geometry/median.h"
 
-#include "bundle.h"
-#include "epipolar.h"
-#include "require.h"
+#include "motion/bundle.h"
+#include "motion/epipolar.h"
+#include "motion/require.h"
 
 #include <Eigen/Dense>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/point_tracker.h>
+#include "motion/point_tracker.h"
 
-#include "require.h"
+#include "motion/require.h"
 
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>

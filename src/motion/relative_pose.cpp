@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/relative_pose.h>
+#include "motion/relative_pose.h"
 
-#include "epipolar.h"
-#include "require.h"
+#include "motion/epipolar.h"
+#include "motion/require.h"
 
 #include <Eigen/Dense>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/atomic_file.h>
+#include "output/atomic_file.h"
 
 #include <cerrno>
 #include <cstring>

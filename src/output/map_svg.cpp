@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/map_svg.h>
+#include "output/map_svg.h"
 
-#include <bole/output/atomic_file.h>
+#include "output/atomic_file.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>

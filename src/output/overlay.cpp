@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/overlay.h>
+#include <bole/overlay.h>
 
 #include <cmath>
 #include <fmt/format.h>

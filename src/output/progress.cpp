@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/progress.h>
+#include "output/progress.h"
 
 #include <algorithm>
 #include <fmt/format.h>

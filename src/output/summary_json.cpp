@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/median.h>
-#include <bole/output/atomic_file.h>
-#include <bole/output/summary_json.h>
+#include "geometry/median.h"
+#include "output/atomic_file.h"
+#include "output/summary_json.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/atomic_file.h>
-#include <bole/output/trajectory_writer.h>
+#include "output/atomic_file.h"
+#include "output/trajectory_writer.h"
 
 #include <Eigen/Geometry>
 

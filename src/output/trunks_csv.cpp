@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/csv_reader.h>
-#include <bole/output/atomic_file.h>
-#include <bole/output/trunks_csv.h>
+#include "input/csv_reader.h"
+#include "output/atomic_file.h"
+#include "output/trunks_csv.h"
 
 #include <fmt/format.h>
 #include <iterator>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/atomic_file.h>
-#include <bole/output/video_writer.h>
+#include "output/atomic_file.h"
+#include "output/video_writer.h"
 
 #include <array>
 #include <fmt/format.h>

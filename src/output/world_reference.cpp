@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/output/world_reference.h>
+#include <bole/world_reference.h>
 
 #include <cmath>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pipeline/config.h>
+#include <bole/config.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pipeline/motion_model.h>
+#include "pipeline/motion_model.h"
 
-#include <bole/geometry/require_range.h>
-#include <bole/geometry/so3.h>
+#include "geometry/require_range.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

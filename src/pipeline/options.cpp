@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pipeline/options.h>
+#include <bole/options.h>
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 
 namespace bole

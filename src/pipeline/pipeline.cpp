@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pipeline/pipeline.h>
+#include <bole/pipeline.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the pipeline does with a video that has no pose filter: steps from points, the metre from heights or radii.
-#include <bole/pipeline/pipeline.h>
+#include <bole/pipeline.h>
 
 #include <cmath>
 

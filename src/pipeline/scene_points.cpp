@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the points of the scene say beside the trunks: where something stands, and what the camera looks through.
-#include <bole/pipeline/pipeline.h>
+#include <bole/pipeline.h>
 
 #include <Eigen/Dense>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the pipeline does with trunks: follows those it knows, looks for new ones and takes them into the map.
-#include <bole/pipeline/pipeline.h>
+#include <bole/pipeline.h>
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pipeline/visual_odometry.h>
+#include "pipeline/visual_odometry.h"
 
-#include <bole/geometry/median.h>
-#include <bole/geometry/require_range.h>
-#include <bole/geometry/so3.h>
+#include "geometry/median.h"
+#include "geometry/require_range.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

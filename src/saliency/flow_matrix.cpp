@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/saliency/flow_matrix.h>
+#include "saliency/flow_matrix.h"
 
 namespace bole
 {

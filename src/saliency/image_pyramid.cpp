@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/saliency/image_pyramid.h>
+#include "saliency/image_pyramid.h"
 
 #include <algorithm>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "fast_math.h"
-#include "plane_warp.h"
+#include "saliency/fast_math.h"
+#include "saliency/plane_warp.h"
 
-#include <bole/saliency/flow_matrix.h>
-#include <bole/saliency/inverse_depth_evidence.h>
+#include "saliency/flow_matrix.h"
+#include "saliency/inverse_depth_evidence.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "plane_warp.h"
+#include "saliency/plane_warp.h"
 
-#include <bole/saliency/noise_learner.h>
+#include "saliency/noise_learner.h"
 
 #include <algorithm>
 #include <cmath>

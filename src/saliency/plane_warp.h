@@ -2,8 +2,8 @@
 #pragma once
 // Private to the stage: where pixels come from, row by row, and bilinear samples there.
 
-#include <bole/geometry/camera.h>
-#include <bole/geometry/pose.h>
+#include <bole/camera.h>
+#include <bole/pose.h>
 
 #include <Eigen/LU>
 #include <visp3/core/vpImage.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/saliency/roc.h>
+#include "saliency/roc.h"
 
 #include <algorithm>
 #include <limits>

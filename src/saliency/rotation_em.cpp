@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "fast_math.h"
-#include "plane_warp.h"
+#include "saliency/fast_math.h"
+#include "saliency/plane_warp.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/saliency/rotation_em.h>
+#include "geometry/so3.h"
+#include "saliency/rotation_em.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/saliency/saliency.h>
+#include "geometry/so3.h"
+#include "saliency/saliency.h"
 
 #include <algorithm>
 #include <cmath>

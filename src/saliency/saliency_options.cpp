@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/saliency/saliency_options.h>
+#include "saliency/saliency_options.h"
 
 #include <fmt/format.h>
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Growing the graph: variables, factors, and taking them out again.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 #include <visp3/core/vpException.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Marginal covariances. With H = L L^T, X^T H^-1 X = |L^-1 X|^2, and L^-1 X is zero outside the
 // paths from the rows of X to the roots: a handful of variables for what was seen of late.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 #include <visp3/core/vpException.h>

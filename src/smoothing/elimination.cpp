@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Eliminating one variable from its front, and solving for it afterwards.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

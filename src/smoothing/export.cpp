@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The graph as plain data, out and in.
-#include "state.h"
+#include "smoothing/state.h"
 
 namespace bole
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/smoothing/factors.h>
+#include "geometry/so3.h"
+#include "smoothing/factors.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

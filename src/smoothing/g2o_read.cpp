@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/smoothing/g2o.h>
+#include "smoothing/g2o.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

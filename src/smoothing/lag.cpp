@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The fixed lag: variables too far behind are marginalised into a linear prior on their neighbours.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // From factors to whitened linear blocks, and the cost at the estimates.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

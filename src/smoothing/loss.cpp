@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/smoothing/loss.h>
+#include "smoothing/loss.h"
 
 #include <cmath>
 #include <visp3/core/vpException.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The optimum of the whole graph, by Levenberg-Marquardt over the same elimination.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/smoothing/smoother.h>
+#include <bole/smoother.h>
 
 #include <visp3/core/vpException.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The order in which the affected variables are eliminated again.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

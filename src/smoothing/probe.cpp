@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Whether the linearisation still holds where the estimates are by now.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 

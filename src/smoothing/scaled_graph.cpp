@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/smoothing/graph.h>
+#include <bole/graph.h>
 
 #include <cmath>
 #include <visp3/core/vpException.h>

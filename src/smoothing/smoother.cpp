@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The public face: checks what the caller gives, then hands on.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <visp3/core/vpException.h>
 

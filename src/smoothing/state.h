@@ -9,7 +9,7 @@
 /// that the parent, the first eliminated of the separator, takes into its own front. Every
 /// separator lies on the path from its node to the root.
 
-#include <bole/smoothing/smoother.h>
+#include <bole/smoother.h>
 
 #include <array>
 #include <deque>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Taking in what is new: which variables it affects, eliminating those again, and passing the
 // change down.
-#include "state.h"
+#include "smoothing/state.h"
 
 #include <algorithm>
 #include <limits>

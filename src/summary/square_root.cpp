@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/summary/square_root.h>
+#include "geometry/so3.h"
+#include "summary/square_root.h"
 
 #include <Eigen/Eigenvalues>
 

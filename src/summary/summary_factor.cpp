@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/summary/summary_factor.h>
+#include <bole/summary_factor.h>
 
 namespace bole
 {

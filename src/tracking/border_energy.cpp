@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "borders.h"
+#include "tracking/borders.h"
 
-#include <bole/tracking/border_energy.h>
+#include "tracking/border_energy.h"
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

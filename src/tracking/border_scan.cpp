@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/tracking/border_scan.h>
+#include "tracking/border_scan.h"
 
 #include <Eigen/LU>
 #include <algorithm>

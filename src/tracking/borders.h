@@ -3,7 +3,7 @@
 /// \file
 /// Both borders of a trunk, to go over.
 
-#include <bole/geometry/relative_trunk.h>
+#include <bole/trunk.h>
 
 #include <array>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/tracking/trunk_tracker.h>
+#include "tracking/trunk_tracker.h"
 
-#include <bole/geometry/require_range.h>
+#include "geometry/require_range.h"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -3,9 +3,9 @@
 /// \file
 /// A made-up flight with known motion, and an emulator that flies it.
 
-#include <bole/ardrone/ardrone_source.h>
-#include <bole/ardrone/emulator.h>
-#include <bole/geometry/so3.h>
+#include <bole/ardrone_source.h>
+#include "lab/emulator/emulator.h"
+#include "geometry/so3.h"
 
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/address.h>
-#include <bole/ardrone/at_command.h>
+#include "ardrone/address.h"
+#include "ardrone/at_command.h"
 
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>

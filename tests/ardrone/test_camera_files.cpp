@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/ardrone_source.h>
+#include <bole/ardrone_source.h>
 
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/drone_clock.h>
+#include "ardrone/drone_clock.h"
 
 #include <gtest/gtest.h>
 #include <random>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/flight_folder.h>
-#include <bole/input/asl_source.h>
+#include "ardrone/flight_folder.h"
+#include "input/asl_source.h"
 
 #include "flight.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/navdata.h>
+#include "ardrone/navdata.h"
 
 #include "files.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/h264.h>
-#include <bole/ardrone/pave.h>
+#include "ardrone/h264.h"
+#include "ardrone/pave.h"
 
 #include "files.h"
 

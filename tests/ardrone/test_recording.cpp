@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/ardrone/recording.h>
+#include "ardrone/recording.h"
 
 #include "flight.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
-#include <bole/ardrone/video_decoder.h>
+#include "ardrone/video_decoder.h"
 
 #include "flight.h"
 

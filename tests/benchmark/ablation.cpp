@@ -3,13 +3,13 @@
 // time. Usage: benchmark_ablation SEQUENCE... (folders with truth; the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
-#include <bole/geometry/median.h>
-#include <bole/input/asl_source.h>
-#include <bole/output/evaluation.h>
-#include <bole/output/trajectory_writer.h>
-#include <bole/output/trunks_csv.h>
-#include <bole/pipeline/config.h>
-#include <bole/pipeline/pipeline.h>
+#include "geometry/median.h"
+#include "input/asl_source.h"
+#include <bole/evaluation.h>
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
+#include <bole/config.h>
+#include <bole/pipeline.h>
 
 #include <cmath>
 #include <cstdio>

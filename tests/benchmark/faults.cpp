@@ -5,9 +5,9 @@
 //
 //   benchmark_faults [loss]     about six minutes, or the rows that say so; BOLE_FAULT_SECONDS=8
 //   flies only the first 8 s
-#include <bole/ardrone/ardrone_source.h>
-#include <bole/ardrone/emulator.h>
-#include <bole/input/open_source.h>
+#include <bole/ardrone_source.h>
+#include "lab/emulator/emulator.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <chrono>

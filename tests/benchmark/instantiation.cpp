@@ -4,11 +4,11 @@
 // Usage: benchmark_instantiation SEQUENCE... (the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
-#include <bole/geometry/median.h>
-#include <bole/input/asl_source.h>
-#include <bole/input/truth.h>
-#include <bole/output/visibility.h>
-#include <bole/pipeline/pipeline.h>
+#include "geometry/median.h"
+#include "input/asl_source.h"
+#include "input/truth.h"
+#include "evaluation/visibility.h"
+#include <bole/pipeline.h>
 
 #include <algorithm>
 #include <cstdio>

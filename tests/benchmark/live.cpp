@@ -2,9 +2,9 @@
 // Age of the frames of a live drone: an emulator flies there and back at twice real time, a
 // consumer works 15 ms on each frame. BOLE_LIVE_SECONDS (default 10) sets the length of the run, of
 // the host's clock.
-#include <bole/ardrone/ardrone_source.h>
-#include <bole/ardrone/emulator.h>
-#include <bole/input/open_source.h>
+#include <bole/ardrone_source.h>
+#include "lab/emulator/emulator.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <benchmark/benchmark.h>

@@ -5,12 +5,12 @@
 ///     benchmark_motion                 the tables of README, "Point features"
 ///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
 
-#include <bole/input/asl_source.h>
-#include <bole/input/open_source.h>
-#include <bole/motion/ground_plane.h>
-#include <bole/motion/point_motion.h>
-#include <bole/motion/point_odometry.h>
-#include <bole/motion/vertical.h>
+#include "input/asl_source.h"
+#include <bole/open_source.h>
+#include "motion/ground_plane.h"
+#include "motion/point_motion.h"
+#include "motion/point_odometry.h"
+#include "motion/vertical.h"
 
 #include <Eigen/Dense>
 #include <fmt/format.h>

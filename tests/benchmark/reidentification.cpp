@@ -4,10 +4,10 @@
 // after its confirmation on. Usage: benchmark_reidentification SEQUENCE... (the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
-#include <bole/geometry/relative_trunk.h>
-#include <bole/input/asl_source.h>
-#include <bole/input/truth.h>
-#include <bole/pipeline/pipeline.h>
+#include <bole/trunk.h>
+#include "input/asl_source.h"
+#include "input/truth.h"
+#include <bole/pipeline.h>
 
 #include <algorithm>
 #include <array>

@@ -3,8 +3,8 @@
 // for what may be known of the motion, ablateSaliency for the parts of the default, one taken away at a time.
 #include "support/forest_flight.h"
 
-#include <bole/saliency/roc.h>
-#include <bole/saliency/saliency.h>
+#include "saliency/roc.h"
+#include "saliency/saliency.h"
 
 #include <benchmark/benchmark.h>
 #include <iterator>

@@ -6,10 +6,10 @@
 // benchmark_smoothing_fidelity [sequence ...]
 #include "support/rendered_flights.h"
 
-#include <bole/input/open_source.h>
-#include <bole/input/truth.h>
-#include <bole/output/trajectory_metrics.h>
-#include <bole/pipeline/pipeline.h>
+#include <bole/open_source.h>
+#include "input/truth.h"
+#include "evaluation/trajectory_metrics.h"
+#include <bole/pipeline.h>
 
 #include <algorithm>
 #include <chrono>

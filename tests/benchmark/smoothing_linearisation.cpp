@@ -6,7 +6,7 @@
 #include "support/dense_reference.h"
 #include "support/line_chart.h"
 
-#include <bole/smoothing/smoother.h>
+#include <bole/smoother.h>
 
 #include <fmt/core.h>
 #include <random>

@@ -3,13 +3,13 @@
 // finds something aborts.
 #include "ardrone/files.h"
 
-#include <bole/ardrone/at_command.h>
-#include <bole/ardrone/h264.h>
-#include <bole/ardrone/navdata.h>
-#include <bole/ardrone/pave.h>
-#include <bole/ardrone/recording.h>
-#include <bole/ardrone/uvlc.h>
-#include <bole/smoothing/g2o.h>
+#include "ardrone/at_command.h"
+#include "ardrone/h264.h"
+#include "ardrone/navdata.h"
+#include "ardrone/pave.h"
+#include "ardrone/recording.h"
+#include "ardrone/uvlc.h"
+#include "smoothing/g2o.h"
 
 #include "support/flight.h"
 

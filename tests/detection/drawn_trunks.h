@@ -3,9 +3,9 @@
 /// \file
 /// Upright trunks drawn as flat areas of grey, near before far, their borders smooth over a pixel.
 
-#include <bole/detection/detector.h>
-#include <bole/geometry/so3.h>
-#include <bole/gradient/gradient.h>
+#include "detection/detector.h"
+#include "geometry/so3.h"
+#include "gradient/gradient.h"
 
 #include <algorithm>
 #include <cmath>

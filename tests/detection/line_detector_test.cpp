@@ -2,7 +2,7 @@
 // The paper's detector, which has one frame only, on drawn borders.
 #include "drawn_trunks.h"
 
-#include <bole/detection/line_detector.h>
+#include "detection/line_detector.h"
 
 #include <gtest/gtest.h>
 

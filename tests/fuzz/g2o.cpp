@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any bytes as a graph: refused with a line, or read, written and read again, and solved.
-#include <bole/smoothing/g2o.h>
-#include <bole/smoothing/smoother.h>
+#include "smoothing/g2o.h"
+#include <bole/smoother.h>
 
 #include <cstdlib>
 #include <cstring>

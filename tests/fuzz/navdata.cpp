@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any datagram as navdata, with its checksum put right so that the options are reached; what is
 // read must be read again from its own encoding, and the odometry must stay finite.
-#include <bole/ardrone/drone_clock.h>
-#include <bole/ardrone/navdata_odometry.h>
+#include "ardrone/drone_clock.h"
+#include "ardrone/navdata_odometry.h"
 
 #include <cstdlib>
 #include <numeric>

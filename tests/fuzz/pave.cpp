@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any bytes, cut anywhere, through the PaVE parser and the H.264 decoder behind it.
-#include <bole/ardrone/video_decoder.h>
+#include "ardrone/video_decoder.h"
 
 #include <cstdlib>
 

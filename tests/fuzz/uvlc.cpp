@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any datagram through the UVLC decoder.
-#include <bole/ardrone/uvlc.h>
+#include "ardrone/uvlc.h"
 
 #include <cstdlib>
 

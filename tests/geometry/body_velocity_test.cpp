@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/body_velocity.h>
-#include <bole/geometry/pose.h>
+#include "geometry/body_velocity.h"
+#include <bole/pose.h>
 
 #include <gtest/gtest.h>
 #include <limits>

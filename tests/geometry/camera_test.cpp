@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/camera.h>
+#include <bole/camera.h>
 
 #include <gtest/gtest.h>
 

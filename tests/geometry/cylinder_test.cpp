@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/cylinder.h>
-#include <bole/geometry/so3.h>
+#include "geometry/cylinder.h"
+#include "geometry/so3.h"
 
 #include <gtest/gtest.h>
 

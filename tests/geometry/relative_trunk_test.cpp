@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/camera.h>
-#include <bole/geometry/relative_trunk.h>
-#include <bole/geometry/so3.h>
+#include <bole/camera.h>
+#include <bole/trunk.h>
+#include "geometry/so3.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/gradient/border_line.h>
+#include "geometry/so3.h"
+#include "gradient/border_line.h"
 
 #include <gtest/gtest.h>
 

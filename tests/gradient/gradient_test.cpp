@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/gradient/gradient.h>
+#include "gradient/gradient.h"
 
 #include <gmock/gmock.h>
 

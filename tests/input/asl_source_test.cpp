@@ -2,7 +2,7 @@
 #include "flight_folder.h"
 #include "messages.h"
 
-#include <bole/input/asl_source.h>
+#include "input/asl_source.h"
 
 #include <gmock/gmock.h>
 

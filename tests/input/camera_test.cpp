@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "messages.h"
 
-#include <bole/input/camera_file.h>
-#include <bole/input/rectifier.h>
+#include "input/camera_file.h"
+#include "input/rectifier.h"
 
 #include <cmath>
 #include <cstdlib>

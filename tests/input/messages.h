@@ -3,7 +3,7 @@
 /// \file
 /// What tests of frame sources share.
 
-#include <bole/input/frame.h>
+#include <bole/frame.h>
 
 #include <functional>
 #include <string>

@@ -2,12 +2,12 @@
 #include "flight_folder.h"
 #include "messages.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/input/open_source.h>
-#include <bole/input/sequence_source.h>
-#include <bole/input/trajectory.h>
-#include <bole/input/truth.h>
-#include <bole/input/video_source.h>
+#include "geometry/so3.h"
+#include <bole/open_source.h>
+#include "input/sequence_source.h"
+#include "input/trajectory.h"
+#include "input/truth.h"
+#include "input/video_source.h"
 
 #include <gmock/gmock.h>
 #include <opencv2/videoio.hpp>

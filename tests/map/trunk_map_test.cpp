@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The life of a trunk: what it must show before it is confirmed, and what loses it.
-#include <bole/map/trunk_map.h>
+#include "map/trunk_map.h"
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "../../src/motion/bundle.h"
+#include "motion/bundle.h"
 
-#include <bole/geometry/relative_trunk.h>
-#include <bole/geometry/so3.h>
+#include <bole/trunk.h>
+#include "geometry/so3.h"
 
 #include <gtest/gtest.h>
 

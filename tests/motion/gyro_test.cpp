@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/motion/gyro.h>
+#include "motion/gyro.h"
 
 #include <Eigen/Dense>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/input/asl_source.h>
-#include <bole/motion/ground_plane.h>
-#include <bole/motion/point_odometry.h>
-#include <bole/motion/vertical.h>
+#include "geometry/so3.h"
+#include "input/asl_source.h"
+#include "motion/ground_plane.h"
+#include "motion/point_odometry.h"
+#include "motion/vertical.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

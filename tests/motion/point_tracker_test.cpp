@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/motion/point_motion.h>
+#include "geometry/so3.h"
+#include "motion/point_motion.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 /// A small textured world for the trackers: fronto-parallel walls of smooth random texture at
 /// several depths, drawn for a camera pose by casting one ray a pixel.
 
-#include <bole/geometry/camera.h>
-#include <bole/geometry/pose.h>
+#include <bole/camera.h>
+#include <bole/pose.h>
 
 #include <cmath>
 #include <cstdint>

@@ -3,8 +3,8 @@
 /// \file
 /// Clouds of points seen by two cameras, for the tests of this stage.
 
-#include <bole/geometry/so3.h>
-#include <bole/motion/relative_pose.h>
+#include "geometry/so3.h"
+#include "motion/relative_pose.h"
 
 #include <cmath>
 #include <random>

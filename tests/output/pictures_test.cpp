@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What people look at: the overlay, the videos, the map, the progress line.
-#include <bole/input/video_source.h>
-#include <bole/output/map_svg.h>
-#include <bole/output/overlay.h>
-#include <bole/output/progress.h>
-#include <bole/output/video_writer.h>
+#include "input/video_source.h"
+#include "output/map_svg.h"
+#include <bole/overlay.h>
+#include "output/progress.h"
+#include "output/video_writer.h"
 
 #include <gmock/gmock.h>
 

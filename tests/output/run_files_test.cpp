@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/output/atomic_file.h>
-#include <bole/output/trajectory_writer.h>
-#include <bole/output/trunks_csv.h>
+#include "geometry/so3.h"
+#include "output/atomic_file.h"
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/input/camera_file.h>
-#include <bole/pipeline/config.h>
+#include "input/camera_file.h"
+#include <bole/config.h>
 
 #include <gmock/gmock.h>
 

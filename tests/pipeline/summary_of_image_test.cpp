@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the summary factor stands for: the image energy round its optimum, looked up on a grid.
-#include <bole/summary/square_root.h>
-#include <bole/tracking/trunk_tracker.h>
+#include "summary/square_root.h"
+#include "tracking/trunk_tracker.h"
 
 #include <gtest/gtest.h>
 

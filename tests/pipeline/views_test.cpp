@@ -2,7 +2,7 @@
 // What views of a trunk count for. One that is darker than what is behind it, and then brighter: what a drone sees that flies round it.
 #include "support/drawn_trunks.h"
 
-#include <bole/pipeline/pipeline.h>
+#include <bole/pipeline.h>
 
 #include <cmath>
 #include <gtest/gtest.h>

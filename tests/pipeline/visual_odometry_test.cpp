@@ -2,8 +2,8 @@
 // What moves the pipeline when the pose filter, the points or both are missing.
 #include "motion/rendered_walls.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/pipeline/pipeline.h>
+#include "geometry/so3.h"
+#include <bole/pipeline.h>
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/forest_flight.h"
 
-#include <bole/saliency/roc.h>
-#include <bole/saliency/saliency.h>
+#include "saliency/roc.h"
+#include "saliency/saliency.h"
 
 #include <gtest/gtest.h>
 

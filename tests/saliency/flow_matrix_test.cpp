@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/saliency/flow_matrix.h>
+#include "geometry/so3.h"
+#include "saliency/flow_matrix.h"
 
 #include <gtest/gtest.h>
 #include <visp3/visual_features/vpFeaturePoint.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "synthetic.h"
 
-#include <bole/saliency/noise_learner.h>
-#include <bole/saliency/roc.h>
+#include "saliency/noise_learner.h"
+#include "saliency/roc.h"
 
 #include <gtest/gtest.h>
 

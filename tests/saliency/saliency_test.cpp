@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "synthetic.h"
 
-#include <bole/geometry/so3.h>
-#include <bole/saliency/saliency.h>
+#include "geometry/so3.h"
+#include "saliency/saliency.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

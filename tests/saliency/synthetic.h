@@ -3,8 +3,8 @@
 /// \file
 /// Images made for the saliency tests: a smooth random texture seen by a turning, moving camera.
 
-#include <bole/geometry/camera.h>
-#include <bole/geometry/pose.h>
+#include <bole/camera.h>
+#include <bole/pose.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/smoothing/smoother.h>
+#include "geometry/so3.h"
+#include <bole/smoother.h>
 
 #include <functional>
 #include <gmock/gmock.h>

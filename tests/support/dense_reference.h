@@ -3,7 +3,7 @@
 /// \file
 /// The yardstick of the smoother: dense Levenberg-Marquardt on a whole graph, short and slow.
 
-#include <bole/smoothing/graph.h>
+#include <bole/graph.h>
 
 #include <Eigen/Cholesky>
 

@@ -4,9 +4,9 @@
 /// Images of cylinders drawn flat before sky and ground, borders smooth over a pixel, with sensor noise: what a
 /// tracker sees when nothing but its model is there.
 
-#include <bole/geometry/camera.h>
-#include <bole/geometry/cylinder.h>
-#include <bole/geometry/so3.h>
+#include <bole/camera.h>
+#include "geometry/cylinder.h"
+#include "geometry/so3.h"
 
 #include <algorithm>
 #include <cmath>

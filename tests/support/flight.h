@@ -4,8 +4,8 @@
 /// Simulated flights past trunks, as factors alone: no image is drawn. Every measurement is the
 /// truth plus noise of exactly the covariance it claims.
 
-#include <bole/geometry/so3.h>
-#include <bole/smoothing/smoother.h>
+#include "geometry/so3.h"
+#include <bole/smoother.h>
 
 #include <cmath>
 #include <random>

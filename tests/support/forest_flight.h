@@ -3,9 +3,9 @@
 /// \file
 /// A rendered flight of the shared data, whole in memory, with its truth: for tests and benchmarks of one stage.
 
-#include <bole/geometry/camera.h>
-#include <bole/geometry/pose.h>
-#include <bole/geometry/so3.h>
+#include <bole/camera.h>
+#include <bole/pose.h>
+#include "geometry/so3.h"
 
 #include <algorithm>
 #include <cstdint>

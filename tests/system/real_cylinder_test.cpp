@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A real cylinder: ViSP's sequence of a cube and a cylinder that are pushed over a table by hand. ViSP's tracker
 // follows the cube alone, which gives the odometry of the camera in the cube's frame; bole maps the cylinder in it.
-#include <bole/geometry/pose.h>
-#include <bole/input/camera_file.h>
-#include <bole/output/trajectory_writer.h>
-#include <bole/output/trunks_csv.h>
+#include <bole/pose.h>
+#include "input/camera_file.h"
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/geometry/so3.h>
-#include <bole/tracking/trunk_tracker.h>
+#include "geometry/so3.h"
+#include "tracking/trunk_tracker.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
+#include "commands.h"
+
+#include "lab/baseline/comparison_report.h"
+#include "output/atomic_file.h"
+#include "mbt/cao_reader.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <fmt/format.h>
+#include <memory>
+#include <visp3/core/vpException.h>
+
+namespace bole::apps
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+struct Arguments
+{
+  std::string sequence, out, settings;
+  bool has_basin = false, has_faults = false, is_quick = false;
+  double range_m = 25, far_m = 25;
+};
+
+constexpr TrackerKind kVisp[] = {TrackerKind::visp_edge, TrackerKind::visp_generic_edge, TrackerKind::visp_generic_edge_klt};
+
+TestFlight readFlight(const std::string &path)
+{
+  if (fs::exists(fs::path(path) / "cube_and_cylinder.cao"))
+    return readCubeFlight(path);
+  return readAslFlight(path);
+}
+
+void say(const std::string &what) { std::fprintf(stderr, "bole: %s\n", what.c_str()); }
+
+EdgeSettings bestOf(const std::vector<SweepResult> &sweeps, TrackerKind kind, Help help)
+{
+  for (const SweepResult &sweep : sweeps)
+    if (sweep.kind == kind && sweep.help == help)
+      return sweep.best;
+  return {};
+}
+
+EdgeSettings ourSettings(const Arguments &arguments)
+{
+  EdgeSettings settings;
+  settings.far_m = arguments.far_m;
+  return settings;
+}
+
+void compareAll(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+{
+  std::vector<Contender> contenders;
+  for (const TrackerKind kind : kVisp)
+    for (const Help help : {Help::alone, Help::prior, Help::reinitialised}) {
+      if (!arguments.is_quick) {
+        say(fmt::format("settings of {}, {}", toString(kind), toString(help)));
+        report.sweeps.push_back(sweep(flight, cao, kind, help, report.limits));
+      }
+      contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
+    }
+  for (const Help help : {Help::alone, Help::prior})
+    contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
+  say(fmt::format("{} trackers over {} frames", contenders.size(), flight.frames.size()));
+  report.scores = compare(flight, cao, contenders, report.limits);
+
+  std::vector<Contender> timed;
+  EdgeSettings edge = bestOf(report.sweeps, TrackerKind::visp_generic_edge, Help::prior);
+  edge.far_m = arguments.far_m;
+  timed.emplace_back(TrackerKind::visp_generic_edge, Help::truth, edge);
+  timed.emplace_back(TrackerKind::trunk, Help::truth, ourSettings(arguments), arguments.settings);
+  report.timing = compare(flight, cao, timed, report.limits);
+}
+
+void measureBasin(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+{
+  BasinOptions options;
+  options.min_trunks = std::min(2, int(flight.trunks.size()));
+  options.range_m = arguments.far_m;
+  for (const bool has_clutter : {true, false}) {
+    for (const TrackerKind kind : kVisp) {
+      say(fmt::format("basin of {}{}", toString(kind), has_clutter ? "" : ", without clutter"));
+      BasinRow best;
+      double best_sum = -1;
+      for (const int range : {8, 16, 32}) { // the range that answers most steps right
+        EdgeSettings settings = bestOf(report.sweeps, kind, Help::alone);
+        settings.range = range;
+        Contender contender(kind, Help::alone, settings);
+        const BasinRow row = basin(flight, cao, contender, has_clutter, options);
+        double sum = 0;
+        for (const double share : row.success)
+          sum += share;
+        if (sum > best_sum)
+          best_sum = sum, best = row;
+      }
+      report.basin.push_back(best);
+    }
+    say(fmt::format("basin of {}{}", toString(TrackerKind::trunk), has_clutter ? "" : ", without clutter"));
+    Contender ours(TrackerKind::trunk, Help::alone, ourSettings(arguments), arguments.settings);
+    report.basin.push_back(basin(flight, cao, ours, has_clutter, options));
+  }
+}
+
+void measureFaults(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+{
+  std::vector<Contender> contenders;
+  for (const TrackerKind kind : kVisp)
+    for (const Help help : {Help::alone, Help::prior})
+      contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
+  for (const Help help : {Help::alone, Help::prior})
+    contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
+  say("faults");
+  report.faults = faults(flight, cao, contenders, {}, report.limits);
+}
+
+void run(const Arguments &arguments)
+{
+  const TestFlight flight = readFlight(arguments.sequence);
+  fs::create_directories(arguments.out);
+  const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
+  if (model.empty())
+    throw vpException(vpException::badValue, fmt::format("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m));
+  const std::string cao = (fs::path(arguments.out) / "truth.cao").string();
+  writeCao(cao, model, "the trunks of " + flight.name + " as they are");
+
+  ComparisonReport report;
+  report.sequence = flight.name;
+  report.command = fmt::format("bole compare {} -o {}{}{}", arguments.sequence, arguments.out,
+                               arguments.has_basin ? " --basin" : "", arguments.has_faults ? " --faults" : "");
+  if (!arguments.settings.empty())
+    report.command += " --settings " + arguments.settings;
+  report.frames = int(flight.frames.size());
+  report.trunks = int(model.size());
+  report.limits = flight.limits;
+  compareAll(arguments, flight, cao, report);
+  if (arguments.has_basin)
+    measureBasin(arguments, flight, cao, report);
+  if (arguments.has_faults)
+    measureFaults(arguments, flight, cao, report);
+  std::fputs(toTable(report).c_str(), stdout);
+  writeAtomically((fs::path(arguments.out) / "compare.json").string(), toJson(report));
+  writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
+  writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
+}
+} // namespace
+
+void addCompare(CLI::App &app)
+{
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App *command = app.add_subcommand("compare", "Compare vpMbTrunkTracker with ViSP's edge trackers on one flight");
+  command->add_option("SEQUENCE", arguments->sequence,
+                      "EuRoC/ASL folder with ground truth and trees.csv, or the folder `mbt` of visp-images-data")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("-o,--output", arguments->out, "Folder for the results")->required();
+  command->add_flag("--basin", arguments->has_basin, "Also: right answers against the size of a yaw step");
+  command->add_flag("--faults", arguments->has_faults, "Also: black, noisy, smeared, frozen and wrong-size frames");
+  command->add_flag("--quick", arguments->is_quick, "ViSP's trackers at the settings of its tutorials, without the sweep");
+  command->add_option("--settings", arguments->settings, "XML settings of our tracker (models/*.xml)")->check(CLI::ExistingFile);
+  command->add_option("--far", arguments->far_m, "Range up to which our tracker uses trunks [m]")
+      ->check(CLI::Range(0.5, 100.0))
+      ->capture_default_str();
+  command->footer("Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
+                  "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are used.\n"
+                  "Prints the table and writes OUT/compare.json, compare.html and compare.svg.\n"
+                  "Examples:\n"
+                  "  bole compare data/park-forward -o run/compare --basin --faults\n"
+                  "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");
+  command->callback([arguments] { run(*arguments); });
+}
+} // namespace bole::apps

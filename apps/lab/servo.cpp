@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole servo: flying by trunks, closed over rendered images and the tracker.
+#include "commands.h"
+#include "interrupt.h"
+#include "overlay_window.h"
+
+#include "output/atomic_file.h"
+#include <bole/overlay.h>
+#include "output/video_writer.h"
+#include <bole/config.h>
+#include "lab/trials/error_curves.h"
+#include "lab/trials/median_interval.h"
+#include "lab/trials/servo_trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fmt/format.h>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace bole::apps
+{
+namespace
+{
+struct Arguments
+{
+  ServoTrialOptions trial;
+  std::string folder, fault = "none", config;
+  std::vector<std::string> settings;
+  int runs = 1;
+  bool is_shown = false, has_video = true, is_ungated = false;
+};
+
+/// A figure of a run, for tables.
+struct Column
+{
+  const char *name;
+  double ServoTrialResult::*value;
+};
+const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::servoing_from_s},
+                                      {"duration [s]", &ServoTrialResult::duration_s},
+                                      {"bearing rms [deg]", &ServoTrialResult::bearing_rms_deg},
+                                      {"distance rms", &ServoTrialResult::distance_rms},
+                                      {"distance mean", &ServoTrialResult::distance_mean},
+                                      {"r/d rms", &ServoTrialResult::ratio_rms},
+                                      {"turned [deg]", &ServoTrialResult::turned_deg},
+                                      {"least clearance [m]", &ServoTrialResult::least_clearance},
+                                      {"gap [m]", &ServoTrialResult::gap_width},
+                                      {"progress [m]", &ServoTrialResult::progress},
+                                      {"mean speed [m/s]", &ServoTrialResult::mean_speed},
+                                      {"median loop [ms]", &ServoTrialResult::median_loop_ms},
+                                      {"95 % loop [ms]", &ServoTrialResult::p95_loop_ms},
+                                      {"hover after fault [s]", &ServoTrialResult::hover_after_s},
+                                      {"drift in fault [m]", &ServoTrialResult::drift}};
+
+vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const LoopSample &sample, const PinholeCamera &camera)
+{
+  Overlay overlay;
+  for (const TrackedTrunk &trunk : result.trunks)
+    if (trunk.map_status != TrunkStatus::merged && trunk.status != TrackingStatus::not_visible)
+      overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high, trunk.map_status,
+                                trunk.status == TrackingStatus::tracked});
+  overlay.is_warning = sample.is_lost;
+  overlay.text = fmt::format("{:.1f} s  {}", sample.time_s, sample.reason);
+  for (const auto &[name, value] : sample.real)
+    if (name.rfind("r/d", 0) != 0) // the line is as long as the picture is wide
+      overlay.text += fmt::format("  {} {:.1f}", name, value);
+  return drawOverlay(frame.image, camera, overlay);
+}
+
+nlohmann::json toJson(const ServoTrialResult &result)
+{
+  nlohmann::json json{{"seed", result.seed}, {"success", result.is_success}, {"outcome", result.outcome},
+                      {"other gap", result.is_other_gap}};
+  for (const Column &column : kColumns)
+    json[column.name] = std::isnan(result.*column.value) ? nlohmann::json() : nlohmann::json(result.*column.value);
+  return json;
+}
+
+std::string csvOf(const std::vector<ServoTrialResult> &results)
+{
+  std::string text = "seed,success,outcome";
+  for (const Column &column : kColumns)
+    text += fmt::format(",{}", column.name);
+  for (const ServoTrialResult &result : results) {
+    text += fmt::format("\n{},{:d},{}", result.seed, result.is_success, result.outcome);
+    for (const Column &column : kColumns)
+      text += std::isnan(result.*column.value) ? "," : fmt::format(",{:.4f}", result.*column.value);
+  }
+  return text + "\n";
+}
+
+std::map<std::string, int> failures(const std::vector<ServoTrialResult> &results)
+{
+  std::map<std::string, int> reasons;
+  for (const ServoTrialResult &result : results)
+    if (!result.is_success)
+      ++reasons[result.outcome.substr(0, 10) == "stopped at" ? "stopped" : result.outcome];
+  return reasons;
+}
+
+MedianInterval medianOf(const Column &column, const std::vector<ServoTrialResult> &results)
+{
+  std::vector<double> values;
+  for (const ServoTrialResult &result : results)
+    values.push_back(result.*column.value);
+  return bootstrapMedian(values);
+}
+
+template <class Is> int count(const std::vector<ServoTrialResult> &results, Is is)
+{
+  return static_cast<int>(std::count_if(results.begin(), results.end(), is));
+}
+int successes(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.is_success; });
+}
+int contacts(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.record.is_contact; });
+}
+int otherGaps(const std::vector<ServoTrialResult> &results)
+{
+  return count(results, [](const ServoTrialResult &r) { return r.is_success && r.is_other_gap; });
+}
+
+/// runs.csv and summary.json of the runs so far: written after each, so that what was flown is kept.
+void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+{
+  if (arguments.folder.empty())
+    return;
+  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)}, {"runs", results.size()},
+                      {"runs asked for", arguments.runs}, {"successes", successes(results)},
+                      {"contacts", contacts(results)}, {"other gaps", otherGaps(results)},
+                      {"failures", failures(results)}, {"gated", arguments.trial.pipeline.flow.use_saliency},
+                      {"fault", arguments.fault}, {"version", BOLE_VERSION}};
+  for (const Column &column : kColumns) {
+    const MedianInterval median = medianOf(column, results);
+    if (median.count > 0)
+      json["medians"][column.name] = {{"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
+  }
+  for (const ServoTrialResult &result : results)
+    json["each"].push_back(toJson(result));
+  writeAtomically(arguments.folder + "/runs.csv", csvOf(results));
+  writeAtomically(arguments.folder + "/summary.json", json.dump(1) + "\n");
+}
+
+/// Success, contacts, and medians with their 95 % intervals.
+void print(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+{
+  const int runs = static_cast<int>(results.size()), good = successes(results);
+  const ShareInterval share = wilson(good, runs);
+  fmt::print("{}: {} of {} runs succeeded (95 % interval {:.2f} to {:.2f}), {} touched a trunk\n",
+             toString(arguments.trial.scenario.kind), good, runs, share.low, share.high, contacts(results));
+  if (otherGaps(results) > 0)
+    fmt::print("  {:3} of them through another gap than the one set up\n", otherGaps(results));
+  for (const auto &[reason, number] : failures(results))
+    fmt::print("  {:3} {}\n", number, reason);
+  for (const Column &column : kColumns) {
+    const MedianInterval median = medianOf(column, results);
+    if (median.count > 0)
+      fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low, median.high,
+                 median.count);
+  }
+  if (!arguments.folder.empty())
+    fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
+}
+
+std::string runFolder(const Arguments &arguments, std::uint64_t seed)
+{
+  if (arguments.folder.empty())
+    return {};
+  const std::string folder = fmt::format("{}/seed-{}", arguments.folder, seed);
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw vpException(vpException::ioError, "%s: cannot be made: %s", folder.c_str(), error.message().c_str());
+  return folder;
+}
+
+ServoTrialResult fly(const Arguments &arguments, ServoTrialOptions trial, std::uint64_t seed, OverlayWindow &window)
+{
+  trial.scenario.seed = seed;
+  const std::string folder = runFolder(arguments, seed);
+  std::unique_ptr<VideoWriter> video;
+  if (arguments.has_video && !folder.empty())
+    video = std::make_unique<VideoWriter>(folder + "/overlay.mp4");
+  const PinholeCamera camera = trial.robot.renderer.camera.pinhole;
+  const auto watcher = [&](const Frame &frame, const FrameResult &result, const LoopSample &sample) {
+    if (video || arguments.is_shown) {
+      const vpImage<vpRGBa> picture = pictureOf(frame, result, sample, camera);
+      if (video)
+        video->write(picture, frame.stamp_ns);
+      window.show(picture);
+    }
+    return !interrupted();
+  };
+  const ServoTrialResult result = runServoTrial(trial, watcher);
+  if (video)
+    video->finish();
+  if (!folder.empty()) {
+    const std::string title = fmt::format("{}, seed {}: {}", toString(trial.scenario.kind), seed,
+                                          result.is_success ? "succeeded" : result.outcome);
+    writeAtomically(folder + "/errors.svg", errorCurves(result.record, title));
+    writeAtomically(folder + "/samples.csv", samplesCsv(result.record));
+  }
+  return result;
+}
+
+void run(Arguments &arguments)
+{
+  if (!arguments.config.empty())
+    readConfig(arguments.config, arguments.trial.pipeline);
+  for (const std::string &setting : arguments.settings)
+    setOption(setting, arguments.trial.pipeline);
+  if (arguments.is_ungated)
+    arguments.trial.pipeline.flow.use_saliency = false;
+  arguments.trial.loop.fault.kind = faultKindFromString(arguments.fault);
+  arguments.trial.loop.validate();
+  OverlayWindow window(arguments.is_shown, "bole servo");
+  endAtInterrupt();
+  std::vector<ServoTrialResult> results;
+  const std::uint64_t first = arguments.trial.scenario.seed;
+  for (int k = 0; k < arguments.runs && !interrupted(); ++k) {
+    ServoTrialResult result = fly(arguments, arguments.trial, first + static_cast<std::uint64_t>(k), window);
+    if (interrupted() && k > 0)
+      break; // half a run says nothing
+    std::fprintf(stderr, "run %d of %d, seed %llu: %s\n", k + 1, arguments.runs,
+                 static_cast<unsigned long long>(result.seed), result.is_success ? "succeeded" : result.outcome.c_str());
+    result.record.samples.clear(); // written already; a hundred of them would fill the memory
+    results.push_back(std::move(result));
+    writeTables(arguments, results);
+  }
+  print(arguments, results);
+}
+
+void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *example)
+{
+  const auto arguments = std::make_shared<Arguments>();
+  ServoTrialOptions &trial = arguments->trial;
+  trial.scenario.kind = kind;
+  trial.pipeline = ServoTrialOptions::defaultPipeline(kind);
+  CLI::App *task = servo.add_subcommand(toString(kind), what);
+  task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
+  task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();
+  task->add_option("--runs", arguments->runs, "Random starts, a seed each")->capture_default_str()->check(CLI::Range(1, 100000));
+  task->add_option("--density", trial.scenario.density, "Trunks a square metre (hold, circle .03, gap .04, slalom .05)");
+  if (kind == ServoKind::hold)
+    task->add_option("--distance", trial.distance, "To be kept [m]: as good as the map's radius")->capture_default_str()->check(CLI::Range(0.5, 20.0));
+  if (kind == ServoKind::hold || kind == ServoKind::circle)
+    task->add_option("--ratio", trial.ratio, "Radius over distance to be kept (circle .07; hold: instead of --distance)")->check(CLI::Range(0.01, 0.5));
+  if (kind != ServoKind::hold)
+    task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1)")->check(CLI::Range(0.05, 2.0));
+  if (kind == ServoKind::circle)
+    trial.loop.duration_s = 70; // round a trunk of 0.25 m at r/d .07
+  if (kind == ServoKind::slalom) {
+    trial.loop.duration_s = 90;
+    task->add_option("--length", trial.scenario.length, "[m]")->capture_default_str()->check(CLI::Range(1.0, 1000.0));
+  }
+  task->add_option("--duration", trial.loop.duration_s, "Of servoing, at most [s]")->capture_default_str();
+  task->add_option("--fault", arguments->fault, "black, freeze or noise: what the camera shows for a while");
+  task->add_option("--fault-at", trial.loop.fault.start_s, "After servoing began [s]")->capture_default_str();
+  task->add_option("--fault-for", trial.loop.fault.duration_s, "[s]")->capture_default_str();
+  task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();
+  task->add_option("--samples", trial.robot.renderer.samples_per_pixel, "Rays a pixel")->capture_default_str();
+  task->add_option("--gust", trial.robot.body.gust, "Standard deviation of the wind's push [m/s^2]")->capture_default_str();
+  task->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
+  task->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
+  task->add_flag("--ungated", arguments->is_ungated, "Without saliency: nothing says what is foreground");
+  task->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
+  task->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4");
+  task->footer(fmt::format("Example: {}", example));
+  task->callback([arguments] { run(*arguments); });
+}
+} // namespace
+
+void addServo(CLI::App &app)
+{
+  CLI::App *servo = app.add_subcommand("servo", "Fly by trunks in a simulated forest, through the tracker");
+  servo->require_subcommand(1);
+  addTask(*servo, ServoKind::hold, "Keep the bearing and the distance of a trunk", "bole servo hold --seed 1 --runs 20 -o run/hold");
+  addTask(*servo, ServoKind::circle, "Go round a trunk at constant r/d", "bole servo circle --ratio .08 --speed .5 -o run/circle --show");
+  addTask(*servo, ServoKind::gap, "Pass between two trunks", "bole servo gap --runs 50 --no-video -o run/gap");
+  addTask(*servo, ServoKind::slalom, "Through a stand of trees along a line", "bole servo slalom --length 40 --density .05 --runs 10 --ungated -o run/slalom");
+  servo->footer("The loop is closed over rendered images and the tracker; the truth only judges. The drone hovers where a frame\n"
+                "cannot be believed or the trunk it flies by is lost: try --fault black.\n"
+                "Example: bole servo hold --fault freeze --fault-at 8 --fault-for 3 -o run");
+}
+} // namespace bole::apps

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole show-saliency: the basis flows (Fig. 5 of the paper) and saliency beside its images (Fig. 8).
+#include "commands.h"
+#include "saliency_run.h"
+
+#include "output/atomic_file.h"
+#include "saliency/flow_matrix.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <fmt/format.h>
+#include <memory>
+#include <string>
+#include <visp3/io/vpImageIo.h>
+
+namespace bole::apps
+{
+namespace
+{
+struct ShowArguments
+{
+  std::string sequence, output = "saliency";
+  int first = 20, every = 20;
+};
+
+/// The three columns of V as arrows over the image, one panel an axis.
+std::string basisFlowsSvg(const PinholeCamera &camera)
+{
+  const char *axes[3] = {"turn about x (right)", "turn about y (down)", "turn about z (forward)"};
+  const double turn = 0.06; // [rad], for arrows of a length that can be seen
+  const int step = camera.width / 14;
+  std::string svg = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" "
+                                "font-size=\"14\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+                                3 * camera.width + 40, camera.height + 40);
+  for (int axis = 0; axis < 3; ++axis) {
+    svg += fmt::format("<g transform=\"translate({},10)\"><rect width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
+                       10 + axis * (camera.width + 10), camera.width, camera.height);
+    for (int v = step / 2; v < camera.height; v += step)
+      for (int u = step / 2; u < camera.width; u += step) {
+        const Eigen::Vector2d flow = turn * flowMatrix(camera, {u, v}).col(axis);
+        svg += fmt::format("<line x1=\"{}\" y1=\"{}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#1a5e20\"/>"
+                           "<circle cx=\"{}\" cy=\"{}\" r=\"1.6\" fill=\"#1a5e20\"/>\n",
+                           u, v, u + flow.x(), v + flow.y(), u, v);
+      }
+    svg += fmt::format("<text x=\"0\" y=\"{}\">{}</text></g>\n", camera.height + 20, axes[axis]);
+  }
+  return svg + "</svg>\n";
+}
+
+/// Image left, saliency right: white is near, black far, grey unknown.
+vpImage<unsigned char> beside(const vpImage<unsigned char> &image, const Saliency &saliency)
+{
+  vpImage<unsigned char> both(image.getHeight(), 2 * image.getWidth());
+  for (unsigned v = 0; v < image.getHeight(); ++v)
+    for (unsigned u = 0; u < image.getWidth(); ++u) {
+      both[v][u] = image[v][u];
+      const float near = saliency.isKnown(v, u) ? 1 - saliency.p_background[v][u] : 0.5f;
+      both[v][u + image.getWidth()] = static_cast<unsigned char>(255 * near);
+    }
+  return both;
+}
+
+void show(const ShowArguments &arguments)
+{
+  const auto source = openSource(arguments.sequence);
+  std::filesystem::create_directories(arguments.output);
+  writeAtomically(arguments.output + "/basis-flows.svg", basisFlowsSvg(source->camera()));
+  SaliencyRun run(*source, {});
+  int pictures = 0;
+  while (run.next()) {
+    const int index = static_cast<int>(run.frame.index);
+    if (index < arguments.first || (index - arguments.first) % arguments.every != 0)
+      continue;
+    const std::string path = fmt::format("{}/saliency-{:05d}.png", arguments.output, index);
+    const std::string part = fmt::format("{}/.part-{:05d}.png", arguments.output, index);
+    vpImageIo::write(beside(run.frame.image, run.saliency), part);
+    std::filesystem::rename(part, path);
+    std::printf("%s: %s, %s, %.0f %% unknown\n", path.c_str(), toString(run.saliency.status),
+                run.saliency.asks_for_range ? "nearer than 6 m" : "moves unlike the background",
+                100 * run.saliency.unknown_share);
+    ++pictures;
+  }
+  std::printf("%d pictures and basis-flows.svg in %s\n", pictures, arguments.output.c_str());
+}
+} // namespace
+
+void addShowSaliency(CLI::App &app)
+{
+  auto arguments = std::make_shared<ShowArguments>();
+  CLI::App *command =
+      app.add_subcommand("show-saliency", "Draw the basis flows and saliency beside the images of a sequence");
+  command->add_option("SEQUENCE", arguments->sequence, "ASL folder, video or numbered images")->required();
+  command->add_option("-o,--output", arguments->output, "Folder for the pictures")->capture_default_str();
+  command->add_option("--first", arguments->first, "First frame that is drawn")->capture_default_str()->check(CLI::NonNegativeNumber);
+  command->add_option("--every", arguments->every, "Frames from picture to picture")->capture_default_str()->check(CLI::PositiveNumber);
+  command->footer("White is near (or moves unlike the background), black is far, grey is unknown.\n"
+                  "Example:\n  bole show-saliency flights/park-forward -o pictures --every 40");
+  command->callback([arguments] { show(*arguments); });
+}
+} // namespace bole::apps

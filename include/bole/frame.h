@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What enters the pipeline: frames with a timestamp, a status, and the motion sensors' word on
+/// them.
+
+#include <bole/camera.h>
+#include <bole/pose.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+#include <visp3/core/vpImage.h>
+
+namespace bole
+{
+/// What is known of a frame before anyone looks at its pixels.
+enum class FrameStatus
+{
+  ok,
+  stale,   ///< the same image again: a frozen camera or a decoder that repeats its last picture
+  corrupt, ///< could not be decoded (whole or part): do not trust the pixels
+  missing, ///< the source says that a frame should be here, and it is not; the image is empty
+  resized  ///< not the size of the frames before: not used
+};
+const char *toString(FrameStatus status);
+
+/// Angular rate in the body frame [rad/s], timestamp in [ns].
+struct GyroSample
+{
+  std::int64_t stamp_ns = 0;
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+};
+
+struct Frame
+{
+  std::int64_t stamp_ns = 0;
+  std::size_t index = 0; ///< position in the source, counted with missing frames
+  FrameStatus status = FrameStatus::ok;
+  std::string message;          ///< why the status is not ok
+  vpImage<unsigned char> image; ///< grey, rectified: the pinhole of FrameSource::camera() applies
+  std::optional<Pose> wMb_odometry; ///< pose filter at this frame, where there is one
+  /// Covariance of the motion since the frame before, in the tangent (rho, phi) of wMb_odometry,
+  /// where the source knows it.
+  std::optional<Matrix6d> odometry_covariance;
+  /// [ns] of the host's steady clock when the last byte of the frame came; 0 for recordings.
+  std::int64_t arrival_ns = 0;
+  std::vector<GyroSample> gyro; ///< samples since the frame before, oldest first
+  std::optional<double> height; ///< of the body over the ground [m] (sonar), where there is one
+  std::optional<Pose>
+      wMb_truth; ///< ground truth, for pictures and evaluation only: no stage may read it
+};
+
+/// A stream of frames: a folder, a video, a live drone.
+class FrameSource
+{
+public:
+  virtual ~FrameSource() = default;
+  /// The next frame; false at the end. Broken frames come with a status, never as an exception; a
+  /// user's mistake (a missing folder, a bad calendar of stamps) throws vpException naming file and
+  /// line.
+  virtual bool next(Frame &frame) = 0;
+  /// Pinhole of the rectified images.
+  virtual PinholeCamera camera() const = 0;
+  /// Camera in the body frame.
+  virtual Pose bMc() const = 0;
+  /// Number of frames, 0 when not known (live, some videos).
+  virtual std::size_t size() const { return 0; }
+  virtual std::string name() const = 0;
+  virtual bool hasOdometry() const = 0;
+  virtual bool hasGyro() const = 0;
+  /// False where the focal length is a guess.
+  virtual bool isCameraKnown() const { return true; }
+  /// What the user should be told about how the input is read (an assumed camera); empty when
+  /// nothing.
+  virtual std::string note() const { return {}; }
+};
+} // namespace bole

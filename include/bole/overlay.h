@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Pictures of what the pipeline sees: trunks drawn into the image, and the saliency field.
+
+#include <bole/camera.h>
+#include <bole/trunk.h>
+#include <bole/trunk_record.h>
+
+#include <string>
+#include <vector>
+#include <visp3/core/vpImage.h>
+#include <visp3/core/vpRGBa.h>
+
+namespace bole
+{
+/// A trunk as the current camera sees it.
+struct OverlayTrunk
+{
+  int id = 0;
+  RelativeTrunk relative;
+  double distance = 0;             ///< camera to axis [m]; 0 when not known
+  double tan_low = -0.3;           ///< part of the borders to draw, tangents of elevation
+  double tan_high = 0.6;
+  TrunkStatus status = TrunkStatus::candidate;
+  bool is_observed = true;         ///< measured in this frame; else drawn dashed, as predicted
+};
+
+/// What goes into one picture.
+struct Overlay
+{
+  std::vector<OverlayTrunk> trunks;
+  vpImage<float> foreground;       ///< probability of being near, 0 .. 1, any size, for the inset; may be empty
+  std::string text;                ///< one line below the image
+  bool is_warning = false;         ///< the line is about a frame that is not ok
+};
+
+/// Draws \p overlay on \p image, enlarged by a whole number to about 640 columns or more, with a line of text below.
+/// Borders have a colour for each id (candidates are thin), labels say "id  r/d  distance", the saliency is an inset
+/// in the upper right corner. The size depends on that of the camera's image alone; an empty image is drawn grey.
+vpImage<vpRGBa> drawOverlay(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Overlay &overlay);
+
+/// The image and, beside it, the field \p foreground (0 .. 1, any size) in colours (the paper's Fig. 8).
+vpImage<vpRGBa> drawSaliency(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                             const vpImage<float> &foreground, const std::string &text);
+
+/// A colour that stays with an id: neighbours in number are far apart in hue.
+vpRGBa colourOf(int id);
+} // namespace bole

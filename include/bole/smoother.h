@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The smoother: all poses and all trunks from odometry and summary factors (paper, Section 4, Eq.
+/// 2), at a cost a frame that does not grow with the flight.
+///
+/// Idea: Gauss-Newton on the sparse normal equations, eliminated one variable at a time in the
+/// order of the flight, each trunk right after the last pose that saw it. What every elimination
+/// leaves to its later neighbours is kept, so a new frame eliminates again only the variables it
+/// touches and those after them; the change then runs back down the elimination tree until it is
+/// too small to matter; far back it waits for one of the passes that go deeper, each twice as deep
+/// as those before and four times as rare. A variable whose estimate left the point of its linearisation takes its
+/// factors, not the images, to the new point: nothing but the image is linearised for ever. Points
+/// that reach far back move the seldomer the farther. A loop that comes back to old trunks
+/// eliminates the part of the flight between again, once a returning trunk.
+///
+/// Frames: poses wMb, camera at wMb * bMc. Tangents (and the rows of covariances): Pose (rho [m],
+/// phi [rad]), Trunk (x [m], y [m], log r, lean x, lean y), RelativeTrunk (phi_x, phi_y, phi_z
+/// [rad], d log s).
+///
+/// Every trunk has a prior on all five numbers, weak on x and y: a trunk seen once, or through a
+/// rank-deficient F, stays on it, and its covariance says so. Errors of the caller (a covariance
+/// that is none, an unknown id) throw vpException(badValue); an F that is no minimum is an expected
+/// outcome and returns a status. One object is for one thread at a time; const functions use its
+/// work space too.
+///
+/// Cost: update() about a millisecond in steady flight past six trunks at a time (some 40
+/// eliminations of a front of 50 columns, 250 back-substitutions), see the benchmark
+/// smoothing_flat; covariances O(number of eliminations between the variable and the newest pose).
+/// Limit: fronts hold all trunks that come back later; and now and then a pass goes through the
+/// whole flight. The fixed lag bounds both.
+///
+/// Deviations from the paper: trunks may lean; robust loss on summary factors; the paper sums
+/// energies, we drop the part of them that no variable can change.
+///
+/// \code
+/// bole::Smoother smoother;                                        // default options
+/// std::size_t pose = smoother.addFirstPose(bole::Pose(), 1e-6 * bole::Matrix6d::Identity());
+/// std::size_t trunk = smoother.addTrunk(bole::trunkFromRelative(wMc, summary.optimum, 0.15));
+/// smoother.addObservation(pose, trunk, summary);
+/// pose = smoother.addPose(aMb, covariance);                       // odometry since the pose
+/// before smoother.addObservation(pose, trunk, next_summary); smoother.update(); bole::Pose wMb =
+/// smoother.pose(pose); \endcode
+
+#include <bole/graph.h>
+
+#include <memory>
+
+namespace bole
+{
+struct SmootherOptions
+{
+  /// Camera in the body frame. Default: forward-looking (z of the camera along x of the body).
+  Pose bMc = forwardCamera();
+
+  // Linearisation. A variable that moved less than this (its position against its neighbour's, since
+  // a common shift bends nothing) from where its linearisation was last found good is not looked
+  // at: > 0. Defaults: far below what curves a relative trunk, whose scale is the distance
+  // (metres) and a radian.
+  double relinearise_position = 0.02;   ///< [m], poses and trunks
+  double relinearise_rotation = 0.005;  ///< [rad]
+  double relinearise_log_radius = 0.02; ///< relative
+  double relinearise_lean = 0.005;      ///< tan
+  /// One that moved farther is linearised again when some factor's true residual is off its linear
+  /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
+  /// stretch of the flight, and changes no view in it, costs nothing. Default: views stay within a
+  /// tenth of their standard deviation of the batch optimum (rms).
+  double linearisation_tolerance = 0.1;
+  /// A variable is solved again when it stands farther than this from its solution given the
+  /// variables eliminated after it, in standard deviations of that solution: >= 0. Half the square
+  /// bounds what one variable adds to the cost of the linearised graph. 0 passes every change, to
+  /// the first pose. Default: no view notices.
+  double propagation_threshold = 0.1;
+  /// Gauss-Newton iterations in one update(), >= 1. Default: the next frame goes on with
+  /// what has not settled.
+  int max_iterations = 2;
+
+  /// Robust loss on summary factors. Default: a wrongly associated view pulls with a bounded force;
+  /// Cauchy forgets it altogether, but has local optima in which long flights were caught.
+  Loss summary_loss = {LossKind::huber, 3.0};
+  /// Robust loss on relative poses from points: their covariance does not know of moving branches.
+  Loss direction_loss = {LossKind::huber, 4.0};
+
+  // Priors of a new trunk; addTrunk() has a variant with its own.
+  double prior_radius =
+      0.15; ///< [m], median of the log-normal prior, > 0: forest trunks, 0.08 to 0.3
+  double prior_log_radius_sigma = 0.5; ///< > 0: a factor of 1.6 at one sigma
+  double prior_lean_sigma = 0.035;     ///< tan, > 0: 2 degrees; 1e-4 switches lean off
+  double prior_position_sigma =
+      50; ///< [m], > 0: about the first guess; only keeps unseen trunks somewhere
+
+  /// Poses kept open behind the newest; older ones are marginalised into a linear prior and keep
+  /// their estimate. 0: all stay open. Otherwise >= 2.
+  int fixed_lag = 0;
+
+  static Pose forwardCamera();
+  /// Throws vpException(badValue) "name = value, must be ...".
+  void validate() const;
+};
+
+enum class UpdateStatus
+{
+  ok,              ///< settled: no variable is further than the thresholds from its linearisation
+  iteration_limit, ///< still moving after max_iterations; the next update() goes on
+  degenerate       ///< a direction of some variable had no information beyond rounding and was held
+};
+const char *toString(UpdateStatus status);
+
+struct UpdateResult
+{
+  UpdateStatus status = UpdateStatus::ok;
+  int iterations = 0;
+  double cost = 0;              ///< of the linearised graph at its minimum
+  std::size_t relinearised = 0; ///< variables moved to a new point of linearisation
+  std::size_t eliminated = 0;   ///< variables eliminated again
+  std::size_t resolved = 0;     ///< variables whose estimate was computed again
+};
+
+class Smoother
+{
+public:
+  explicit Smoother(const SmootherOptions &options = SmootherOptions());
+  /// All of \p graph (validated; its bMc and losses replace those of \p options). Pose i and trunk
+  /// j are graph.poses[i] and graph.trunks[j]. Not settled yet: call update() or optimize().
+  Smoother(const Graph &graph, const SmootherOptions &options);
+  ~Smoother();
+  Smoother(Smoother &&) noexcept;
+  Smoother &operator=(Smoother &&) noexcept;
+
+  const SmootherOptions &options() const;
+
+  // Growing the graph. Ids count from 0 and stay valid for ever.
+
+  std::size_t addFirstPose(const Pose &wMb, const Matrix6d &covariance);
+  /// Next pose, \p aMb in the frame of the pose before, with the odometry factor between them.
+  std::size_t addPose(const Pose &aMb, const Matrix6d &covariance);
+  std::size_t addPose(const Pose &aMb, const Matrix6d &covariance, const Pose &wMb_guess);
+  std::size_t addTrunk(const Trunk &guess);
+  std::size_t addTrunk(const Trunk &guess, const TrunkPrior &prior);
+  /// Indefinite or non-finite summaries are not added. The energy's constant part is not kept.
+  SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
+  void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
+  /// Odometry between any two poses, e.g. a loop closed by other means.
+  void addOdometry(std::size_t a, std::size_t b, const Odometry &odometry);
+  void addHeight(std::size_t pose, double z, double sigma);
+  void addPosePrior(std::size_t pose, const PosePrior &prior);
+
+  /// Forgets a trunk and all that was seen of it.
+  void removeTrunk(std::size_t trunk);
+  /// What was seen of \p gone was \p keep all along; \p gone is forgotten, its prior too.
+  void mergeTrunks(std::size_t keep, std::size_t gone);
+
+  // Solving.
+
+  /// Takes in what was added or removed since, at a cost that does not depend on the length of the
+  /// flight.
+  UpdateResult update();
+  /// The optimum of the whole graph: Levenberg-Marquardt with everything linearised anew, until the
+  /// cost falls by less than \p tolerance (relative). O(length of the flight) an iteration.
+  UpdateResult optimize(double tolerance = 1e-9, int max_iterations = 100);
+
+  // Estimates, as of the last update().
+
+  Pose pose(std::size_t pose) const;
+  Trunk trunk(std::size_t trunk) const;
+  bool hasTrunk(std::size_t trunk) const; ///< false once removed or merged away
+  std::size_t poseCount() const;
+  std::size_t trunkCount() const;       ///< ids handed out, removed ones included
+  std::size_t observationCount() const; ///< summary factors in the graph
+  std::size_t observationCount(std::size_t trunk) const;
+  /// Exact cost of the open part of the graph at the estimates, as cost(graph()). O(graph).
+  double cost() const;
+
+  // Marginal covariances of the linearised graph as of the last update(): that of what was not yet
+  // taken in is not known. For a trunk closed by the fixed lag: its last one; for a pose: that of
+  // one at most 15 poses before it, when that was closed.
+
+  Matrix5d trunkCovariance(std::size_t trunk) const;
+  Matrix6d poseCovariance(std::size_t pose) const;
+  Matrix6d currentPoseCovariance() const;
+  /// The relative trunk that the newest pose should see.
+  RelativeTrunk predictedRelative(std::size_t trunk) const;
+  /// Its covariance, from the joint marginal of the newest pose and the trunk.
+  Matrix4d relativeCovariance(std::size_t trunk) const;
+
+  /// All that is open, at the estimates. Removed trunks are left out; ids: pose i is i, trunk j is
+  /// poseCount() + j.
+  Graph graph() const;
+  /// Bytes held for the graph, its linearisation and its factorisation.
+  std::size_t memoryBytes() const;
+
+private:
+  class State;
+  std::unique_ptr<State> m_state;
+};
+} // namespace bole

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Summary factor: a quadratic in the relative trunk that replaces the image of one trunk for ever.
+///
+/// Idea: the image energy of a trunk depends on pose and trunk only through the relative trunk theta^r.
+/// At its optimum it is well approximated by a quadratic there, while the map from (pose, trunk) to
+/// theta^r keeps all the non-linearity and is cheap to compute again. So past images need never be
+/// touched, and nothing but the image is linearised (paper, Section 4.2, Eq. 9).
+///
+/// Deviation: Eq. 9 prints `e + f d + d^T F d` with F "the Hessian"; here the consistent form
+/// e + f^T d + 1/2 d^T F d, with d = theta^r (-) optimum.
+
+#include <bole/trunk.h>
+
+namespace bole
+{
+/// Laws (each a test): energyAt(optimum) == energy; the gradient of energyAt at the optimum is f.
+/// Energy is a negative log-likelihood (calibrated: F is an information matrix in the tangent of theta^r).
+struct SummaryFactor
+{
+  RelativeTrunk optimum; ///< hat theta^r, the centre of the approximation
+  double energy = 0;     ///< e
+  Vector4d f = Vector4d::Zero();
+  Matrix4d F = Matrix4d::Identity(); ///< symmetric, positive semi-definite
+
+  double energyAt(const RelativeTrunk &relative) const;
+};
+} // namespace bole

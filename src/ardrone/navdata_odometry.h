@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Where the drone says it has flown: odometry from navdata.
+
+#include "ardrone/navdata.h"
+#include <bole/pose.h>
+#include <bole/frame.h>
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+namespace bole
+{
+/// What navdata say of the body at one instant, in SI units and the axes x forward, y left, z up.
+struct BodyState
+{
+  std::int64_t stamp_ns = 0;                          ///< drone's navdata clock, unwrapped
+  Pose wMb;                                           ///< see NavdataOdometry
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
+  std::optional<Eigen::Vector3d> rate; ///< [rad/s], body frame; with full navdata only
+  double height = 0;                   ///< over the ground [m], 0 while the sonar is blind
+  double battery = 0;                  ///< share of full, 0 to 1
+  std::uint32_t state = 0;             ///< bits of DroneState
+  std::uint32_t flight_phase = 0;      ///< Navdata::flightPhase()
+  bool has(DroneState bit) const { return (state & static_cast<std::uint32_t>(bit)) != 0; }
+};
+
+/// Attitude wRb from the drone's angles roll, pitch, yaw [rad].
+///
+/// The drone's frames have y to the right and z down, ours y left and z up; half a turn about x, F,
+/// takes one to the other, so wRb = F Rz(yaw) Ry(pitch) Rx(roll) F = Rz(-yaw) Ry(-pitch) Rx(roll).
+/// Law (a test): the drone turned about one of its axes turns the right way about ours, each axis
+/// alone.
+Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw);
+/// Roll, pitch, yaw [rad] as the drone counts them.
+Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb);
+/// A vector in the drone's axes (y right, z down) in ours, and back: y and z change their signs.
+inline Eigen::Vector3d flipDroneAxes(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
+
+/// Integrates navdata to poses wMb.
+///
+/// Idea: horizontal position by integrating the velocity (mm/s, drone's axes) turned by the
+/// attitude, by the trapezoid rule in the drone's own time, since packets come in bursts; z is the
+/// height that the sonar and the drone's filter report. Where the height jumps although the drone
+/// does not climb, the ground has a step (a bush, a wall): z goes on with the vertical velocity and
+/// the step is kept as an offset. The world stands on the ground below the first sample, z up; its
+/// x axis is where the drone's yaw is zero. After a reboot (restart()) the pose goes on where it
+/// was.
+///
+/// Noise (stepCovariance()): independent from step to step, growing with time, so that a step over
+/// t has the variance velocity_sigma^2 t tau + (scale_sigma |v| t)^2 per horizontal axis, tau = 0.1
+/// s; in the tangent (rho, phi) of the body at the end of the step.
+class NavdataOdometry
+{
+public:
+  struct Options
+  {
+    double velocity_sigma = 0.1; ///< [m/s], (0, 5): the drone's optical flow; 1 cm a step at 10 Hz
+    double scale_sigma = 0.03;   ///< (0, 1): error of the drone's speed in proportion; from flights
+    double height_sigma = 0.01;  ///< [m], (0, 1): the sonar's steps are 1 cm
+    double tilt_sigma = 0.005;   ///< [rad], (0, 0.5): error of roll and pitch of a step
+    double yaw_sigma = 0.005;    ///< [rad per square root of s], (0, 0.5): drift of the yaw
+    double ground_step =
+        0.15; ///< [m], (0.02, 5): a faster change of the height is a step in the ground
+    double largest_gap_s = 0.5; ///< [s], (0.05, 10): beyond, the velocity is not trusted to bridge
+    double extrapolation_s = 0.1; ///< [s], (0, 1): how far beyond the newest sample at() goes
+    double history_s = 10;        ///< [s], (1, 600)
+    void validate() const;
+  };
+
+  NavdataOdometry();
+  explicit NavdataOdometry(const Options &options);
+
+  /// Adds a packet with option "demo"; others, and stamps that do not rise, are ignored.
+  void add(std::int64_t stamp_ns, const Navdata &navdata);
+  /// The drone's clock and yaw start anew: the next sample takes on the last pose.
+  void restart();
+
+  /// State at \p stamp_ns, interpolated; nothing before the history, beyond the extrapolation, or
+  /// in a gap.
+  std::optional<BodyState> at(std::int64_t stamp_ns) const;
+  std::optional<BodyState> newest() const;
+  /// Angular rates in (from, to], oldest first.
+  std::vector<GyroSample> gyro(std::int64_t from_ns, std::int64_t to_ns) const;
+  /// Covariance of the motion between two instants.
+  Matrix6d stepCovariance(std::int64_t from_ns, std::int64_t to_ns) const;
+
+private:
+  Options m_options;
+  std::deque<BodyState> m_history;
+  double m_ground = 0;     ///< height of the ground below in the world [m]
+  double m_yaw_offset = 0; ///< ours minus the drone's, after a reboot [rad]
+  std::optional<BodyState> m_before_restart;
+};
+} // namespace bole

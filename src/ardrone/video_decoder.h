@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The drone's video from bytes to pictures with a status; knows nothing of sockets or clocks.
+
+#include "ardrone/h264.h"
+#include "ardrone/pave.h"
+#include <bole/frame.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace bole
+{
+struct DecodedFrame
+{
+  FrameStatus status = FrameStatus::ok;
+  std::string message;                       ///< why the status is not ok
+  YuvPicture picture;                        ///< empty when nothing could be decoded
+  std::uint32_t number = 0;                  ///< as the drone counts
+  std::optional<std::uint32_t> timestamp_ms; ///< PaVE; an AR.Drone 1 sends none
+  /// Hardly different from the picture that last was: the camera stands still, or is frozen (the
+  /// encoder's refinement of one picture changes block means by up to 0.65 grey levels, a slow
+  /// flight by several).
+  bool unchanged = false;
+};
+
+/// Decodes the video of either generation.
+///
+/// AR.Drone 2: frames that refer to others are `corrupt` from a gap or a damaged frame on until the
+/// next key frame. When several frames have piled up, those in front of the newest key frame are
+/// skipped and counted. AR.Drone 1: each datagram is a picture by itself. Both: a picture with the
+/// pixels of the one before is `stale`, one of another size than the first `resized`.
+///
+/// Neither stream has a checksum: damage that still reads as a picture is not seen here (see the
+/// README). Not thread-safe.
+class VideoDecoder
+{
+public:
+  struct Counters
+  {
+    std::size_t frames = 0; ///< given out, whatever their status
+    std::size_t ok = 0, corrupt = 0, stale = 0, resized = 0;
+    std::size_t skipped = 0;       ///< never decoded, since a newer key frame was there
+    std::size_t resyncs = 0;       ///< times that the stream had to be searched for a header
+    std::size_t skipped_bytes = 0; ///< bytes that belonged to no frame
+  };
+
+  /// \param generation 1 or 2.
+  explicit VideoDecoder(int generation);
+  /// Bytes of the stream (2) or one datagram (1), and the frames that they complete.
+  std::vector<DecodedFrame> decode(const std::uint8_t *data, std::size_t size);
+  /// For a new connection: the next frame must be a key frame.
+  void restart();
+  const Counters &counters() const { return m_counters; }
+
+private:
+  DecodedFrame decodePave(const PaveFrame &frame);
+  void judge(DecodedFrame &frame);
+
+  int m_generation;
+  PaveParser m_parser;
+  H264Decoder m_h264;
+  bool m_needs_key = true;
+  YuvPicture m_last; ///< the last whole picture
+  int m_width = 0, m_height = 0;
+  Counters m_counters;
+};
+} // namespace bole

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// How far a trajectory is from the truth.
+
+#include "input/trajectory.h"
+
+#include <string>
+#include <vector>
+
+namespace bole
+{
+/// What is taken from the estimate before it is compared with the truth.
+enum class Alignment
+{
+  none,       ///< both are taken in the world as they stand
+  first_pose, ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
+  xy_yaw,     ///< least squares over the trajectory in x, y and yaw; z stays
+  xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
+};
+const char *toString(Alignment alignment);
+
+/// p of the estimate becomes (scale * Rz(yaw) * p.xy + t, p.z + dz).
+struct PlanarTransform
+{
+  double scale = 1;
+  double yaw = 0;                              ///< [rad]
+  Eigen::Vector2d t = Eigen::Vector2d::Zero(); ///< [m]
+  double dz = 0;                               ///< [m]
+
+  Eigen::Vector2d operator*(const Eigen::Vector2d &xy) const;
+  Eigen::Vector3d operator*(const Eigen::Vector3d &p) const;
+  Eigen::Matrix2d linear() const; ///< scale * Rz(yaw)
+  Pose operator*(const Pose &wMb) const;
+};
+
+/// A pose of the estimate and the truth at the same stamp (the truth interpolated).
+struct PosePair
+{
+  std::int64_t stamp_ns = 0;
+  Pose estimate, truth;
+};
+
+/// Pairs at the stamps of \p estimate that lie within the range of \p truth.
+std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &truth);
+
+/// What must be added to the stamps of \p estimate [ns] for its motion to be that of \p truth: of
+/// the shifts within \p range_s of \p start_ns, the one with the least relative error (translation
+/// in m plus rotation in rad, over 0.3 s), to a millisecond. Where the two lie in the world does not
+/// matter; a flight that changes neither speed nor attitude says nothing of its time.
+std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
+                         std::int64_t start_ns, double range_s = 2);
+
+/// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products
+/// of the centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory
+/// that does not move keeps scale 1.
+PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
+
+struct TrajectoryErrors
+{
+  std::size_t poses = 0;
+  double ate = 0;          ///< absolute trajectory error: RMSE of the position in 3-D [m]
+  double ate_xy = 0;       ///< its horizontal part [m]
+  double rotation_deg = 0; ///< RMSE of the angle [degrees]
+};
+
+/// Errors after \p transform.
+TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
+                                const PlanarTransform &transform);
+
+struct RelativeErrors
+{
+  std::size_t intervals = 0;
+  double translation = 0;  ///< RMSE over \p delta_s [m]
+  double rotation_deg = 0; ///< [degrees]
+};
+
+/// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the
+/// first pose at least \p delta_s (less half a millisecond) after i and no later than twice that.
+RelativeErrors relativeErrors(const std::vector<PosePair> &pairs, double delta_s);
+} // namespace bole

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A cylinder of any direction and finite length, as a `.cao` model knows it.
+///
+/// Idea: RelativeTrunk is exact for every direction of the axis; only bole::Trunk (a map's upright trunk)
+/// is not. So a general cylinder becomes a RelativeTrunk straight from its axis in the camera frame: x from
+/// the camera centre to the nearest point of the axis, z along the axis from `foot` to `top`.
+
+#include <bole/trunk.h>
+
+#include <string>
+
+namespace bole
+{
+/// Cylinder of radius \p radius [m] round the segment from foot to top [m], in a frame that the variable names.
+struct Cylinder
+{
+  Eigen::Vector3d foot = Eigen::Vector3d::Zero();
+  Eigen::Vector3d top = Eigen::Vector3d::UnitZ();
+  double radius = 0.15;
+  std::string name;
+
+  /// Unit direction from foot to top.
+  Eigen::Vector3d axis() const { return (top - foot).normalized(); }
+};
+
+/// The cylinder \p b, given in frame b, in frame a.
+Cylinder operator*(const Pose &aMb, const Cylinder &b);
+
+/// Relative trunk of the cylinder \p c given in the camera frame. Not isFinite() when the camera centre is
+/// inside the (endless) cylinder or on its axis.
+///
+/// Law (a test): for the cylinder along a bole::Trunk it is relativeTrunk() of that trunk.
+RelativeTrunk relativeTrunk(const Cylinder &c);
+
+/// Where a silhouette plane touches the cylinder \p c of the camera frame: the segment [m] of the contact
+/// line beside foot and top. \p relative is relativeTrunk(c).
+struct ContactLine
+{
+  Eigen::Vector3d foot, top;
+};
+ContactLine contactLine(const Cylinder &c, const RelativeTrunk &relative, Border border);
+} // namespace bole

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Video files.
+
+#include <bole/frame.h>
+#include <bole/source_options.h>
+
+namespace bole
+{
+/// Reads a video file (any container and codec of libavformat and libavcodec) frame by frame.
+///
+/// Stamps are the container's, counted from the first frame. A packet that does not become a
+/// picture, or becomes one that the decoder had to conceal, is a frame with the status `corrupt`;
+/// the picture before again is `stale`; another size is `resized`; those that the container counts
+/// beyond the end of a file that was cut off are `missing` (AVI, MP4; Matroska does not count).
+/// vpVideoReader is not used: it gives no stamps and repeats the last picture when decoding fails.
+///
+/// Errors: vpException naming the file when it is no video, the camera is of another size, or the
+/// odometry is over before the video begins or begins after it is over.
+class VideoSource : public FrameSource
+{
+public:
+  explicit VideoSource(const std::string &path, const SourceOptions &options = {});
+  ~VideoSource() override;
+
+  bool next(Frame &frame) override;
+  PinholeCamera camera() const override;
+  Pose bMc() const override;
+  std::size_t size() const override;
+  std::string name() const override;
+  bool hasOdometry() const override;
+  bool hasGyro() const override;
+  bool isCameraKnown() const override;
+  std::string note() const override;
+
+private:
+  struct State;
+  std::unique_ptr<State> m_state;
+};
+} // namespace bole

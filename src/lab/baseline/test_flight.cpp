@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/baseline/test_flight.h"
+#include "geometry/so3.h"
+#include "input/asl_source.h"
+#include "input/csv_reader.h"
+
+#include <Eigen/Dense>
+
+#include <filesystem>
+#include <fmt/format.h>
+#include <random>
+#include <visp3/core/vpException.h>
+#include <visp3/io/vpImageIo.h>
+#include <visp3/mbt/vpMbGenericTracker.h>
+
+namespace bole
+{
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+namespace
+{
+double yawOf(const Eigen::Matrix3d &R) { return std::atan2(R(1, 0), R(0, 0)); }
+
+Eigen::Matrix3d turned(double yaw) { return expSo3({0, 0, yaw}); }
+
+/// Attitude of a body that looks forward along the camera's axis with its z up in a level camera.
+Eigen::Matrix3d forwardBody()
+{
+  Eigen::Matrix3d bRc;
+  bRc << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return bRc;
+}
+
+std::vector<Cylinder> readTrees(const std::string &path, double height_m)
+{
+  std::vector<Cylinder> trunks;
+  CsvReader csv(path, {5, ',', "id,x [m],y [m],radius [m],lean [deg]"});
+  while (csv.next()) {
+    Cylinder trunk;
+    trunk.name = "tree " + std::string(csv.text(0));
+    const double x = csv.number(1, "x"), y = csv.number(2, "y");
+    trunk.foot = {x, y, 0.1};
+    trunk.top = {x, y, height_m};
+    trunk.radius = csv.number(3, "radius");
+    if (!(trunk.radius > 0))
+      csv.fail("radius must be above 0");
+    trunks.push_back(trunk);
+  }
+  return trunks;
+}
+} // namespace
+
+std::vector<Cylinder> TestFlight::trunksWithin(double range_m) const
+{
+  std::vector<Cylinder> near;
+  for (const Cylinder &trunk : trunks) {
+    const Vector3d axis = trunk.axis();
+    for (const TestFrame &frame : frames) {
+      const Vector3d away = frame.cMo.inverse().t - trunk.foot;
+      if ((away - axis.dot(away) * axis).norm() < range_m) {
+        near.push_back(trunk);
+        break;
+      }
+    }
+  }
+  return near;
+}
+
+Pose TestFlight::predicted(std::size_t k, const Pose &cMo) const
+{
+  const auto &now = frames[k].odometry, &before = frames[k - 1].odometry;
+  if (!now || !before)
+    return cMo;
+  if (!upright)
+    return *now * before->inverse() * cMo;
+  const Eigen::Matrix3d cRb = forwardBody().transpose();
+  const Pose was = cMo.inverse(), odometry_was = before->inverse(), odometry_is = now->inverse();
+  const double yaw_was = yawOf(was.R * cRb), odometry_yaw_was = yawOf(odometry_was.R * cRb);
+  const Vector3d step = turned(yaw_was - odometry_yaw_was) * (odometry_is.t - odometry_was.t);
+  Pose is;
+  is.R = turned(yaw_was - odometry_yaw_was) * odometry_is.R;
+  is.t = {was.t.x() + step.x(), was.t.y() + step.y(), odometry_is.t.z()};
+  return is.inverse();
+}
+
+Matrix6d TestFlight::predictedCovariance(const Pose &predicted, const Pose &cMo_before, const Matrix6d &before) const
+{
+  const Matrix6d carry = adjoint(predicted * cMo_before.inverse());
+  Matrix6d A = Matrix6d::Zero(); // world axes to camera axes, both at the camera
+  A.topLeftCorner<3, 3>() = A.bottomRightCorner<3, 3>() = predicted.R;
+  const Matrix6d step = A * step_sigma.array().square().matrix().asDiagonal() * A.transpose();
+  const Matrix6d known = A * absolute_sigma.array().square().inverse().matrix().asDiagonal() * A.transpose();
+  return ((carry * before * carry.transpose() + step).inverse() + known).inverse();
+}
+
+TestFlight readAslFlight(const std::string &folder, double height_m)
+{
+  AslSource source(folder);
+  TestFlight flight;
+  flight.name = source.name();
+  flight.camera = source.camera();
+  flight.trunks = readTrees((fs::path(folder) / "trees.csv").string(), height_m);
+  const Pose bMc = source.bMc();
+  // the pose filter of the rendered flights: drifts by 1.2 cm a frame in the plane and slowly in yaw; its height
+  // (1.9 cm) and attitude (0.23 degrees) are noisy but do not drift
+  flight.step_sigma << 0.013, 0.013, 0.03, 0.006, 0.006, 0.002;
+  flight.absolute_sigma << 1e3, 1e3, 0.02, 0.004, 0.004, 1e3;
+  Frame frame;
+  while (source.next(frame)) {
+    if (!frame.wMb_truth)
+      throw vpException(vpException::badValue, fmt::format("{}: frame {} has no true pose", folder, frame.index));
+    if (frame.status != FrameStatus::ok)
+      throw vpException(vpException::badValue, fmt::format("{}: frame {}: {}", folder, frame.index, frame.message));
+    TestFrame test;
+    test.image = frame.image;
+    test.cMo = (*frame.wMb_truth * bMc).inverse();
+    if (frame.wMb_odometry)
+      test.odometry = (*frame.wMb_odometry * bMc).inverse();
+    flight.frames.push_back(std::move(test));
+  }
+  return flight;
+}
+
+TestFlight readCubeFlight(const std::string &folder, int max_frames)
+{
+  TestFlight flight;
+  flight.name = "cube-and-cylinder";
+  flight.camera = {547.7367575, 542.0744058, 338.7036994, 234.5083345, 640, 480};
+  Cylinder cylinder;
+  cylinder.foot = {-0.170, -0.030, 0};
+  cylinder.top = {-0.170, -0.030, 0.250};
+  cylinder.radius = 0.040;
+  cylinder.name = "cylinder";
+  flight.trunks = {cylinder};
+
+  vpMbGenericTracker cube(1, vpMbGenericTracker::EDGE_TRACKER | vpMbGenericTracker::KLT_TRACKER);
+  cube.loadConfigFile((fs::path(folder) / "cube.xml").string(), false);
+  cube.loadModel((fs::path(folder) / "cube.cao").string());
+  cube.setProjectionErrorComputation(true);
+  vpHomogeneousMatrix cMo(0.02231950571, 0.1071368004, 0.5071128378, 2.100485509, 1.146812236, -0.4560126437);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  const double sigma_m = 0.002, sigma_rad = 0.004;
+  for (int k = 0; k < max_frames; ++k) {
+    const fs::path path = fs::path(folder) / "cube" / fmt::format("image{:04d}.pgm", k);
+    if (!fs::exists(path))
+      break;
+    TestFrame frame;
+    vpImageIo::read(frame.image, path.string());
+    try {
+      if (flight.frames.empty())
+        cube.initFromPose(frame.image, cMo);
+      cube.track(frame.image);
+    }
+    catch (const vpException &) {
+      break;
+    }
+    if (cube.getProjectionError() > 30)
+      break;
+    cube.getPose(cMo);
+    frame.cMo = Pose::fromVisp(cMo);
+    if (flight.frames.empty())
+      frame.odometry = frame.cMo;
+    else {
+      Pose motion = frame.cMo * flight.frames.back().cMo.inverse();
+      motion.t += sigma_m * Vector3d(normal(random), normal(random), normal(random));
+      motion.R = motion.R * expSo3(sigma_rad * Vector3d(normal(random), normal(random), normal(random)));
+      frame.odometry = motion * *flight.frames.back().odometry;
+    }
+    flight.frames.push_back(std::move(frame));
+  }
+  if (flight.frames.empty())
+    throw vpException(vpException::ioError, fmt::format("{}: no cube/image0000.pgm that ViSP's tracker can follow", folder));
+  flight.upright = false;
+  flight.step_sigma << Vector3d::Constant(sigma_m), Vector3d::Constant(sigma_rad);
+  return flight;
+}
+} // namespace bole

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/emulator/emulator_packets.h"
+
+#include "ardrone/drone_clock.h"
+#include "ardrone/pave.h"
+#include "ardrone/uvlc.h"
+
+namespace bole
+{
+namespace
+{
+constexpr std::int64_t kSecond_ns = 1'000'000'000, kDemoEvery_ns = kSecond_ns / 15;
+constexpr std::int64_t kWrapSoon_ms = 3000;
+constexpr std::uint32_t kUsualState =
+    0x0f800080 | 0x10; // threads up, camera ready, altitude control
+constexpr std::uint32_t kLanded = 2, kFlying = 3;
+} // namespace
+
+DronePackets::DronePackets(const Options &options)
+    : m_options(options), m_last_demo_ns(-kSecond_ns)
+{
+  if (options.clock_wrap) {
+    m_clock_ms = kPaveTimePeriod_ms - kWrapSoon_ms;
+    m_navdata_clock_us = kNavdataTimePeriod_us - kWrapSoon_ms * 1000;
+  }
+}
+
+void DronePackets::configure(bool wants_full)
+{
+  m_configured = true;
+  m_wants_full = wants_full;
+}
+
+void DronePackets::reboot(std::int64_t boot_ns)
+{
+  m_configured = false;
+  m_boot_ns = boot_ns;
+  m_clock_ms = m_navdata_clock_us = 0;
+  m_navdata_sequence = 0;
+  forgetPicture();
+}
+
+void DronePackets::forgetPicture()
+{
+  m_frame_number = m_stream_position = 0;
+  m_force_key = true;
+}
+
+std::vector<std::uint8_t> DronePackets::picture(const vpImage<unsigned char> &image,
+                                                std::int64_t stamp_ns)
+{
+  ++m_frame_number;
+  return m_options.generation == 1 ? encodeUvlc(image, m_frame_number)
+                                   : pavePicture(image, stamp_ns);
+}
+
+std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char> &image,
+                                                    std::int64_t stamp_ns)
+{
+  if (!m_encoder)
+    m_encoder = std::make_unique<H264Encoder>(
+        static_cast<int>(image.getWidth()), static_cast<int>(image.getHeight()),
+        m_options.frame_rate_hz, m_options.bit_rate, m_options.key_interval);
+  const auto encoded = m_encoder->encode(image, m_force_key);
+  m_force_key = false;
+  PaveHeader header;
+  header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
+  header.coded_width = static_cast<std::uint16_t>(m_encoder->codedWidth());
+  header.coded_height = static_cast<std::uint16_t>(m_encoder->codedHeight());
+  header.display_width = static_cast<std::uint16_t>(image.getWidth());
+  header.display_height = static_cast<std::uint16_t>(image.getHeight());
+  header.frame_number = m_frame_number;
+  header.timestamp_ms = static_cast<std::uint32_t>(m_clock_ms + (stamp_ns - m_boot_ns) / 1'000'000);
+  header.frame_type = encoded.is_key ? PaveFrameType::idr : PaveFrameType::p;
+  header.stream_position = m_stream_position;
+  header.header1_size = encoded.sps_size;
+  header.header2_size = encoded.pps_size;
+  m_stream_position += header.payload_size;
+  auto bytes = encodePaveHeader(header);
+  bytes.insert(bytes.end(), encoded.bytes.begin(), encoded.bytes.end());
+  return bytes;
+}
+
+std::vector<std::uint8_t> DronePackets::status(Navdata navdata, std::int64_t stamp_ns,
+                                               const Condition &condition)
+{
+  const bool is_demo = m_configured && !m_wants_full;
+  if (is_demo && stamp_ns - m_last_demo_ns < kDemoEvery_ns)
+    return {};
+  m_last_demo_ns = stamp_ns;
+  navdata.state = kUsualState | (condition.on_ground ? 0u : 1u);
+  const auto raise = [&](DroneState bit, bool on) {
+    navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u;
+  };
+  raise(DroneState::bootstrap, !m_configured);
+  raise(DroneState::demo_mode, is_demo);
+  raise(DroneState::command_watchdog, condition.command_watchdog);
+  raise(DroneState::emergency, condition.emergency);
+  navdata.sequence = ++m_navdata_sequence;
+  if (!m_configured)
+    navdata.demo.reset();
+  if (!m_configured || is_demo)
+    navdata.physical.reset();
+  else
+    navdata.time = navdataTimeWord(m_navdata_clock_us + (stamp_ns - m_boot_ns) / 1000);
+  if (navdata.demo)
+    navdata.demo->control_state = (condition.on_ground ? kLanded : kFlying) << 16;
+  return encodeNavdata(navdata);
+}
+} // namespace bole

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/flight_sensors.h"
+
+#include "geometry/so3.h"
+
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+void requireRange(const char *name, double value, double low, double high)
+{
+  if (!(value >= low && value <= high)) {
+    throw vpException(vpException::badValue,
+                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+  }
+}
+} // namespace
+
+void SensorOptions::validate() const
+{
+  requireRange("gyro_noise", gyro_noise, 0, 1);
+  requireRange("gyro_bias", gyro_bias, 0, 1);
+  requireRange("accelerometer_noise", accelerometer_noise, 0, 10);
+  requireRange("odometry_step_noise", odometry_step_noise, 0, 1);
+  requireRange("odometry_scale", odometry_scale, 0, 0.5);
+  requireRange("height_noise", height_noise, 0, 1);
+  requireRange("attitude_noise", attitude_noise, 0, 0.5);
+  requireRange("yaw_walk", yaw_walk, 0, 0.5);
+}
+
+SimulatedImu::SimulatedImu(const SensorOptions &options)
+    : m_options(options), m_random(options.seed, 401), m_bias(m_random.normal3(options.gyro_bias))
+{
+  options.validate();
+}
+
+ImuSample SimulatedImu::measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
+                                const Eigen::Vector3d &acceleration)
+{
+  ImuSample sample;
+  sample.gyro = rate + m_bias + m_random.normal3(m_options.gyro_noise);
+  sample.accelerometer = wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) +
+                         m_random.normal3(m_options.accelerometer_noise);
+  return sample;
+}
+
+PoseFilter::PoseFilter(const SensorOptions &options)
+    : m_options(options),
+      m_random(options.seed, 402),
+      m_scale(1 + options.odometry_scale * m_random.normal())
+{
+  options.validate();
+}
+
+Pose PoseFilter::report(const Pose &wMb)
+{
+  const Eigen::Vector3d step_noise = m_random.normal3(m_options.odometry_step_noise);
+  const double walk = m_options.yaw_walk * m_random.normal();
+  const double height_noise = m_options.height_noise * m_random.normal();
+  const Eigen::Vector3d attitude_noise = m_random.normal3(m_options.attitude_noise);
+  if (!m_started) {
+    m_position = wMb.t;
+  }
+  else {
+    const Eigen::Matrix3d drift = expSo3({0, 0, m_yaw_error});
+    m_position += drift * (m_scale * (wMb.t - m_last_truth) + step_noise);
+    m_yaw_error += walk;
+  }
+  m_position.z() = wMb.t.z() + (m_started ? height_noise : 0);
+  m_last_truth = wMb.t;
+  m_started = true;
+  return {expSo3({0, 0, m_yaw_error}) * wMb.R * expSo3(attitude_noise), m_position};
+}
+} // namespace bole

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on
+/// board.
+
+#include <bole/pose.h>
+#include "lab/simulation/random.h"
+
+namespace bole
+{
+/// Noise of a small drone's sensors; the defaults are those of the recorded sequences this project
+/// is developed on.
+struct SensorOptions
+{
+  std::uint64_t seed = 1;
+  double gyro_noise = 0.01; ///< standard deviation a sample [rad/s], 0 to 1
+  double gyro_bias = 0.006; ///< standard deviation of the constant bias an axis [rad/s], 0 to 1
+  double accelerometer_noise = 0.1;   ///< standard deviation a sample [m/s^2], 0 to 10
+  double odometry_step_noise = 0.012; ///< of a frame's horizontal step, an axis [m], 0 to 1
+  double odometry_scale = 0.02;       ///< standard deviation of the scale error, 0 to 0.5
+  double height_noise = 0.019;        ///< of the height in one frame [m], 0 to 1
+  double attitude_noise = 0.004;      ///< of roll, pitch and yaw in one frame [rad], 0 to 0.5
+  double yaw_walk = 0.003;            ///< of the heading's drift in one frame [rad], 0 to 0.5
+
+  /// Throws vpException "name = value, must be ...".
+  void validate() const;
+};
+
+struct ImuSample
+{
+  Eigen::Vector3d gyro;          ///< [rad/s], body
+  Eigen::Vector3d accelerometer; ///< specific force [m/s^2], body: +9.81 on z at rest
+};
+
+class SimulatedImu
+{
+public:
+  explicit SimulatedImu(const SensorOptions &options);
+  /// \param rate angular rate in the body frame [rad/s]; \param acceleration of the body in the
+  /// world [m/s^2].
+  ImuSample measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
+                    const Eigen::Vector3d &acceleration);
+
+private:
+  SensorOptions m_options;
+  Random m_random;
+  Eigen::Vector3d m_bias;
+};
+
+/// The pose filter: dead reckoning in the plane with scale error, step noise and a drifting
+/// heading; height (sonar) and roll and pitch (gravity) noisy but without drift.
+class PoseFilter
+{
+public:
+  explicit PoseFilter(const SensorOptions &options);
+  /// Pose that the filter reports for the next frame; the first report is at the true position.
+  Pose report(const Pose &wMb);
+
+private:
+  SensorOptions m_options;
+  Random m_random;
+  double m_scale;
+  double m_yaw_error = 0;
+  bool m_started = false;
+  Eigen::Vector3d m_last_truth = Eigen::Vector3d::Zero(), m_position = Eigen::Vector3d::Zero();
+};
+} // namespace bole

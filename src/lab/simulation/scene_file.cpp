@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/simulated_flight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <set>
+#include <visp3/core/vpException.h>
+#include <yaml-cpp/yaml.h>
+
+namespace bole
+{
+namespace
+{
+const char *distortionName(Distortion distortion)
+{
+  switch (distortion) {
+  case Distortion::none:
+    return "none";
+  case Distortion::radial_tangential:
+    return "radial-tangential";
+  case Distortion::equidistant:
+    return "equidistant";
+  case Distortion::fov:
+    return "fov";
+  }
+  return "none";
+}
+
+/// Names every field of a scene to \p visit(section, key, field), for the reader and the writer
+/// alike.
+template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit)
+{
+  auto &forest = scene.forest;
+  visit("forest", "seed", forest.seed);
+  visit("forest", "density", forest.density);
+  visit("forest", "light", forest.light);
+  visit("forest", "bark", forest.bark);
+  visit("forest", "radius_median", forest.radius_median);
+  visit("forest", "radius_spread", forest.radius_spread);
+  visit("forest", "lean_deg", forest.lean_deg);
+  visit("forest", "bow", forest.bow);
+  visit("forest", "flare", forest.flare);
+  visit("forest", "crown_leaves", forest.crown_leaves);
+  visit("forest", "undergrowth", forest.undergrowth);
+  visit("forest", "saplings", forest.saplings);
+  visit("forest", "ground_amplitude", forest.ground_amplitude);
+  visit("forest", "margin", forest.margin);
+  visit("forest", "clearance", forest.clearance);
+  auto &flight = scene.flight;
+  visit("flight", "path", flight.kind);
+  visit("flight", "seed", flight.seed);
+  visit("flight", "speed", flight.speed);
+  visit("flight", "height", flight.height);
+  visit("flight", "wobble_deg", flight.wobble_deg);
+  auto &renderer = scene.renderer;
+  visit("camera", "width", renderer.camera.pinhole.width);
+  visit("camera", "height", renderer.camera.pinhole.height);
+  visit("camera", "fx", renderer.camera.pinhole.fx);
+  visit("camera", "fy", renderer.camera.pinhole.fy);
+  visit("camera", "cx", renderer.camera.pinhole.cx);
+  visit("camera", "cy", renderer.camera.pinhole.cy);
+  visit("camera", "distortion", renderer.camera.distortion);
+  visit("camera", "coefficients", renderer.camera.coefficients);
+  visit("camera", "rate_hz", scene.rate_hz);
+  visit("camera", "exposure_ms", scene.exposure_ms);
+  visit("camera", "samples_per_pixel", renderer.samples_per_pixel);
+  visit("camera", "exposure_target", renderer.exposure_target);
+  visit("camera", "exposure_lag_frames", renderer.exposure_lag_frames);
+  visit("camera", "gain_step", renderer.gain_step);
+  visit("camera", "read_noise", renderer.read_noise);
+  visit("camera", "shot_noise", renderer.shot_noise);
+  visit("camera", "noise_seed", renderer.noise_seed);
+  visit("camera", "h264_kbps", scene.h264_kbps);
+  auto &sensors = scene.sensors;
+  visit("sensors", "seed", sensors.seed);
+  visit("sensors", "gyro_noise", sensors.gyro_noise);
+  visit("sensors", "gyro_bias", sensors.gyro_bias);
+  visit("sensors", "accelerometer_noise", sensors.accelerometer_noise);
+  visit("sensors", "odometry_step_noise", sensors.odometry_step_noise);
+  visit("sensors", "odometry_scale", sensors.odometry_scale);
+  visit("sensors", "height_noise", sensors.height_noise);
+  visit("sensors", "attitude_noise", sensors.attitude_noise);
+  visit("sensors", "yaw_walk", sensors.yaw_walk);
+}
+
+template <class Trunk, class Visit> void visitTrunk(Trunk &trunk, Visit &&visit)
+{
+  visit("trunks", "x", trunk.foot.x());
+  visit("trunks", "y", trunk.foot.y());
+  visit("trunks", "radius", trunk.radius);
+  visit("trunks", "lean_x", trunk.lean.x());
+  visit("trunks", "lean_y", trunk.lean.y());
+  visit("trunks", "bow_x", trunk.bow.x());
+  visit("trunks", "bow_y", trunk.bow.y());
+  visit("trunks", "taper", trunk.taper);
+  visit("trunks", "flare", trunk.flare);
+  visit("trunks", "height", trunk.height);
+  visit("trunks", "crown_base", trunk.crown_base);
+  visit("trunks", "crown_radius", trunk.crown_radius);
+  visit("trunks", "shade", trunk.shade);
+  visit("trunks", "bright", trunk.bright);
+}
+
+/// Reads one mapping; every key that nobody asked for is an error.
+class Section
+{
+public:
+  Section(const std::string &file, const YAML::Node &node, const std::string &name)
+      : m_file(file), m_node(node), m_name(name)
+  {
+    if (node && !node.IsMap()) {
+      fail(node, name, "a mapping of keys to values");
+    }
+  }
+  template <class T> void read(const char *key, T &field)
+  {
+    m_known.insert(key);
+    const YAML::Node node = m_node ? m_node[key] : YAML::Node(YAML::NodeType::Undefined);
+    if (node) {
+      assign(node, key, field);
+    }
+  }
+  void finish() const
+  {
+    std::set<std::string> seen;
+    for (const auto &entry : m_node) {
+      const std::string key = entry.first.as<std::string>();
+      if (!m_known.count(key)) {
+        fail(entry.first, key, fmt::format("a key of the section {}", m_name));
+      }
+      if (!seen.insert(key).second) {
+        fail(entry.first, key, "given once");
+      }
+    }
+  }
+  [[noreturn]] void fail(const YAML::Node &node, const std::string &key,
+                         const std::string &wanted) const
+  {
+    const std::string value = node.IsScalar() && node.Scalar() != key ? " = " + node.Scalar() : "";
+    throw vpException(vpException::badValue, fmt::format("{}:{}: {}{}, must be {}", m_file,
+                                                         node.Mark().line + 1, key, value, wanted));
+  }
+
+private:
+  template <class T>
+  void number(const YAML::Node &node, const char *key, T &field, const char *wanted) const
+  {
+    T value{};
+    if (!node.IsScalar() || !YAML::convert<T>::decode(node, value)) {
+      fail(node, key, wanted);
+    }
+    field = value;
+  }
+  void assign(const YAML::Node &node, const char *key, double &field) const
+  {
+    number(node, key, field, "a number");
+    if (!std::isfinite(field)) {
+      fail(node, key, "a finite number");
+    }
+  }
+  void assign(const YAML::Node &node, const char *key, int &field) const
+  {
+    number(node, key, field, "a whole number");
+  }
+  void assign(const YAML::Node &node, const char *key, std::uint64_t &field) const
+  {
+    number(node, key, field, "a whole number, 0 or more");
+  }
+  void assign(const YAML::Node &node, const char *key, bool &field) const
+  {
+    number(node, key, field, "true or false");
+  }
+  void assign(const YAML::Node &node, const char *key, std::array<double, 4> &field) const
+  {
+    if (!node.IsSequence() || node.size() != 4) {
+      fail(node, key, "a list of four numbers");
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      assign(node[k], key, field[k]);
+    }
+  }
+  template <class T, std::size_t N>
+  void oneOf(const YAML::Node &node, const char *key, T &field,
+             const std::array<std::pair<const char *, T>, N> &words) const
+  {
+    std::string wanted;
+    for (const auto &[word, value] : words) {
+      if (node.IsScalar() && node.Scalar() == word) {
+        field = value;
+        return;
+      }
+      wanted += (wanted.empty() ? "" : ", ") + std::string(word);
+    }
+    fail(node, key, "one of " + wanted);
+  }
+  void assign(const YAML::Node &node, const char *key, Light &field) const
+  {
+    oneOf<Light, 2>(node, key, field, {{{"sun", Light::sun}, {"overcast", Light::overcast}}});
+  }
+  void assign(const YAML::Node &node, const char *key, Bark &field) const
+  {
+    oneOf<Bark, 3>(node, key, field,
+                   {{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}}});
+  }
+  void assign(const YAML::Node &node, const char *key, PathKind &field) const
+  {
+    oneOf<PathKind, 4>(node, key, field,
+                       {{{"forward", PathKind::forward},
+                         {"lateral", PathKind::lateral},
+                         {"loop", PathKind::loop},
+                         {"slalom", PathKind::slalom}}});
+  }
+  void assign(const YAML::Node &node, const char *key, Distortion &field) const
+  {
+    oneOf<Distortion, 4>(node, key, field,
+                         {{{"none", Distortion::none},
+                           {"radial-tangential", Distortion::radial_tangential},
+                           {"equidistant", Distortion::equidistant},
+                           {"fov", Distortion::fov}}});
+  }
+
+  std::string m_file;
+  YAML::Node m_node;
+  std::string m_name;
+  std::set<std::string> m_known;
+};
+
+std::string text(double value) { return fmt::format("{}", value); }
+std::string text(int value) { return fmt::format("{}", value); }
+std::string text(std::uint64_t value) { return fmt::format("{}", value); }
+std::string text(bool value) { return value ? "true" : "false"; }
+std::string text(Light value) { return toString(value); }
+std::string text(Bark value) { return toString(value); }
+std::string text(PathKind value) { return toString(value); }
+std::string text(Distortion value) { return distortionName(value); }
+std::string text(const std::array<double, 4> &value)
+{
+  return fmt::format("[{}, {}, {}, {}]", value[0], value[1], value[2], value[3]);
+}
+
+void readTrunks(const std::string &path, const YAML::Node &node,
+                std::vector<SimulatedTrunk> &trunks)
+{
+  if (node && !node.IsSequence()) {
+    Section(path, {}, "trunks").fail(node, "trunks", "a list");
+  }
+  for (const YAML::Node &entry : node) {
+    Section section(path, entry, "trunks");
+    SimulatedTrunk trunk;
+    visitTrunk(trunk,
+               [&](const char *, const char *key, auto &field) { section.read(key, field); });
+    section.finish();
+    if (!(trunk.radius >= 0.01 && trunk.radius <= 2) ||
+        !(trunk.height >= 1 && trunk.height <= 100)) {
+      section.fail(entry, "trunk", "of a radius of 0.01 to 2 and a height of 1 to 100");
+    }
+    trunks.push_back(trunk);
+  }
+}
+} // namespace
+
+SceneOptions readScene(const std::string &path)
+{
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  }
+  catch (const YAML::BadFile &) {
+    throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
+  }
+  catch (const YAML::ParserException &error) {
+    throw vpException(vpException::badValue,
+                      fmt::format("{}:{}: {}", path, error.mark.line + 1, error.msg));
+  }
+  SceneOptions scene;
+  if (!root.IsMap()) {
+    throw vpException(vpException::badValue,
+                      fmt::format("{}:1: a scene must be a mapping of sections", path));
+  }
+  const char *names[] = {"forest", "flight", "camera", "sensors"};
+  Section top(path, root, "scene");
+  YAML::Node trunks;
+  for (const auto &entry : root) {
+    const std::string name = entry.first.as<std::string>();
+    if (name == "trunks") {
+      readTrunks(path, entry.second, scene.trunks);
+      continue;
+    }
+    if (std::find(std::begin(names), std::end(names), name) == std::end(names)) {
+      top.fail(entry.first, name, "one of the sections forest, flight, camera, sensors, trunks");
+    }
+    Section section(path, entry.second, name);
+    visitFields(scene, [&](const char *of, const char *key, auto &field) {
+      if (name == of) {
+        section.read(key, field);
+      }
+    });
+    section.finish();
+  }
+  try {
+    scene.validate();
+  }
+  catch (const vpException &error) {
+    throw vpException(vpException::badValue, fmt::format("{}: {}", path, error.getStringMessage()));
+  }
+  return scene;
+}
+
+std::string sceneText(const SceneOptions &scene)
+{
+  std::string out = "# A scene of `bole simulate --scene`. Lengths in metres.\n", current;
+  visitFields(scene, [&](const char *section, const char *key, const auto &field) {
+    if (current != section) {
+      out += fmt::format("{}:\n", section);
+      current = section;
+    }
+    out += fmt::format("  {}: {}\n", key, text(field));
+  });
+  if (!scene.trunks.empty()) {
+    out += "trunks:\n";
+  }
+  for (const SimulatedTrunk &trunk : scene.trunks) {
+    std::string line;
+    visitTrunk(trunk, [&](const char *, const char *key, const auto &field) {
+      line += fmt::format("{}{}: {}", line.empty() ? "" : ", ", key, text(field));
+    });
+    out += fmt::format("  - {{{}}}\n", line);
+  }
+  return out;
+}
+} // namespace bole

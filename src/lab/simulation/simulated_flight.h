@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A whole recorded flight from a few options: forest, path, camera, sensors; and its file.
+
+#include "input/camera_file.h"
+#include "lab/simulation/flight_path.h"
+#include "lab/simulation/flight_sensors.h"
+#include "lab/simulation/forest_renderer.h"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace bole
+{
+struct SceneOptions
+{
+  ForestOptions forest;
+  FlightOptions flight;
+  RendererOptions renderer;
+  SensorOptions sensors;
+  std::vector<SimulatedTrunk> trunks; ///< planted first, as they are
+  double rate_hz = 10;                ///< of the camera, 1 to 120
+  double exposure_ms = 6;             ///< time of exposure: motion blur, 0 to 100
+  double h264_kbps = 0; ///< bit rate of the drone's video link, 0 = uncompressed, to 20000
+
+  /// One seed for forest, path, sensor noise and image noise.
+  void setSeed(std::uint64_t seed);
+  /// Throws vpException "name = value, must be ...".
+  void validate() const;
+};
+
+/// Reads a scene: YAML with the sections forest, flight, camera, sensors, video and trunks, every
+/// key optional. Unknown keys and values out of range throw vpException "file:line: key = value,
+/// must be ...".
+SceneOptions readScene(const std::string &path);
+/// The text that readScene() would read back.
+std::string sceneText(const SceneOptions &scene);
+
+struct RecordOptions
+{
+  std::string folder;
+  int frames = 120;
+  bool truth_images = false; ///< depth and trunk ids
+  bool overwrite = false;
+};
+
+/// Flies \p scene and writes it as an ASL folder (sequence_writer.h), with the scene beside it as
+/// scene.yaml. Gyro and accelerometer at 200 Hz. \p progress is called after each frame with the
+/// number of frames done. Law (a test): same scene, same bytes.
+void recordFlight(const SceneOptions &scene, const RecordOptions &options,
+                  const std::function<void(int)> &progress = {});
+
+} // namespace bole

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/body_velocity.h"
+#include "geometry/require_range.h"
+#include "geometry/so3.h"
+#include "input/camera_file.h"
+#include "lab/simulation/h264_link.h"
+#include "lab/simulation/vpSimulatorArDrone.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <visp3/robot/vpRobotException.h>
+
+namespace
+{
+constexpr double kTick = 0.005;        ///< of the gyro and of the motion [s]
+constexpr int kTicksPerCommand = 6;    ///< the velocity loop, as vpRobotArDrone's
+
+std::int64_t nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
+} // namespace
+
+struct vpSimulatorArDrone::State
+{
+  State(const bole::Forest &f, const Options &o)
+    : options(o), forest(f), body(o.body, o.start, o.heading, f.terrain.height(o.start.x(), o.start.y())),
+      imu(o.sensors), filter(o.sensors), renderer(f, o.renderer), bMc(bole::Pose::fromVisp(o.bMc)), last(body.pose())
+  {
+    if (options.h264_kbps > 0)
+      link.emplace(options.renderer.camera.pinhole.width, options.renderer.camera.pinhole.height, options.rate_hz,
+                   options.h264_kbps);
+  }
+
+  const Options options;
+  bole::Forest forest;
+  bole::Quadrotor body;
+  bole::SimulatedImu imu;
+  bole::PoseFilter filter;
+  bole::ForestRenderer renderer;
+  std::optional<bole::H264Link> link;
+  const bole::Pose bMc;
+
+  bool is_open = false, in_air = false, has_wanted = false;
+  Eigen::Vector4d wanted = Eigen::Vector4d::Zero(); // vx, vy, vz, wz of the body
+  double renewed = 0;
+  Watchdog watchdog = Watchdog::idle;
+
+  long ticks = 0;
+  bole::Pose last; // of the body, one tick ago
+  std::vector<bole::GyroSample> gyro;
+  std::size_t frames = 0;
+  double next_exposure = 0;
+  std::optional<bole::Pose> reported, displaced; // by the pose filter
+  double least_clearance = std::numeric_limits<double>::infinity();
+
+  double time() const { return kTick * static_cast<double>(ticks); }
+
+  double share(double value) const { return std::clamp(value, -options.largest_share, options.largest_share); }
+
+  /// vpRobotArDrone's loop, one step of it.
+  void control()
+  {
+    bole::QuadrotorCommand command;
+    const double age = time() - renewed;
+    watchdog = Watchdog::idle;
+    if (in_air && age > options.land_after_s) {
+      watchdog = Watchdog::lands;
+      in_air = has_wanted = false;
+    }
+    if (in_air) {
+      const bool fresh = has_wanted && age <= options.hover_after_s;
+      watchdog = fresh || !has_wanted ? Watchdog::content : Watchdog::hovers;
+      command.is_flying = true;
+      command.is_hovering = !fresh;
+      const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body.measuredVelocity());
+      command.tilt = {share(tilt.x()), share(tilt.y())};
+      command.climb = options.largest_climb * share(wanted.z() / options.largest_climb);
+      command.turn = options.largest_turn * share(wanted.w() / options.largest_turn);
+    }
+    body.command(command);
+  }
+
+  void tick()
+  {
+    if (ticks % kTicksPerCommand == 0)
+      control();
+    last = body.pose();
+    body.step(0.5 * kTick);
+    body.step(0.5 * kTick);
+    ++ticks;
+    const bole::Pose now = body.pose();
+    const Eigen::Vector3d rate = bole::logSo3(last.R.transpose() * now.R) / kTick;
+    const bole::ImuSample sample = imu.measure(now.R, rate, body.acceleration());
+    gyro.push_back({nanoseconds(time() - 0.5 * kTick), sample.gyro}); // the mean of the tick stands in its middle
+    if (body.isInAir())
+      least_clearance = std::min(least_clearance, forest.distanceToBark(now.t));
+  }
+
+  /// Time passes until \p t; the pose there.
+  bole::Pose poseAt(double t)
+  {
+    while (time() < t - 1e-9)
+      tick();
+    const bole::Pose now = body.pose();
+    const double back = std::clamp((time() - t) / kTick, 0.0, 1.0);
+    return now.plus(back * last.minus(now));
+  }
+
+  void requireOpen() const
+  {
+    if (!is_open)
+      throw vpRobotException(vpRobotException::notInitialized,
+                             "the robot was not opened with the permission to fly: nothing was sent");
+  }
+
+  const bole::Pose &position() const
+  {
+    if (!reported)
+      throw vpRobotException(vpRobotException::communicationError, "no frame yet: the pose filter has said nothing");
+    return *reported;
+  }
+};
+
+vpSimulatorArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) { renderer.samples_per_pixel = 3; }
+
+void vpSimulatorArDrone::Options::setSeed(std::uint64_t seed)
+{
+  body.seed = sensors.seed = renderer.noise_seed = seed;
+}
+
+void vpSimulatorArDrone::Options::validate() const
+{
+  bole::requireRange("hover_after_s", hover_after_s, 0.05, 2);
+  bole::requireRange("land_after_s", land_after_s, hover_after_s, 60);
+  bole::requireRange("gain", gain, 1e-3, 2);
+  bole::requireRange("largest_share", largest_share, 1e-3, 1);
+  bole::requireRange("largest_climb", largest_climb, 1e-3, 5);
+  bole::requireRange("largest_turn", largest_turn, 1e-3, 7);
+  bole::requireRange("rate_hz", rate_hz, 1, 60);
+  bole::requireRange("exposure_s", exposure_s, 0, 0.1);
+  bole::requireRange("video_delay_s", video_delay_s, 0, 1);
+  bole::requireRange("h264_kbps", h264_kbps, 0, 20000);
+  if (renderer.camera.distortion != bole::Distortion::none)
+    throw vpException(vpException::badValue, "distortion, must be none: frames are taken as a pinhole's");
+  body.validate();
+  sensors.validate();
+  renderer.validate();
+}
+
+vpSimulatorArDrone::vpSimulatorArDrone(const bole::Forest &forest, const Options &options)
+{
+  options.validate();
+  nDof = 4;
+  m_state = std::make_unique<State>(forest, options);
+}
+
+vpSimulatorArDrone::~vpSimulatorArDrone() = default;
+
+void vpSimulatorArDrone::open(Permission permission) { m_state->is_open |= permission == Permission::fly; }
+
+void vpSimulatorArDrone::close()
+{
+  m_state->in_air = m_state->has_wanted = m_state->is_open = false;
+}
+
+bool vpSimulatorArDrone::isOpen() const { return m_state->is_open; }
+
+void vpSimulatorArDrone::takeOff()
+{
+  m_state->requireOpen();
+  m_state->in_air = true;
+  m_state->has_wanted = false;
+  m_state->renewed = m_state->time();
+}
+
+void vpSimulatorArDrone::land()
+{
+  m_state->requireOpen();
+  m_state->in_air = m_state->has_wanted = false;
+}
+
+void vpSimulatorArDrone::hover()
+{
+  m_state->requireOpen();
+  m_state->has_wanted = false;
+  m_state->renewed = m_state->time();
+}
+
+void vpSimulatorArDrone::emergency()
+{
+  m_state->requireOpen();
+  m_state->in_air = m_state->has_wanted = false;
+  const bole::Pose wMb = m_state->body.pose();
+  m_state->body = bole::Quadrotor(m_state->options.body, wMb.t.head<2>(), std::atan2(wMb.R(1, 0), wMb.R(0, 0)),
+                                  m_state->forest.terrain.height(wMb.t.x(), wMb.t.y()));
+}
+
+void vpSimulatorArDrone::trim() { m_state->requireOpen(); }
+
+void vpSimulatorArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
+{
+  m_state->requireOpen();
+  m_state->wanted = bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
+  m_state->has_wanted = true;
+  m_state->renewed = m_state->time();
+}
+
+vpSimulatorArDrone::Watchdog vpSimulatorArDrone::watchdog() const { return m_state->watchdog; }
+
+void vpSimulatorArDrone::get_eJe(vpMatrix &jacobian)
+{
+  jacobian.resize(6, 4, true);
+  jacobian[0][0] = jacobian[1][1] = jacobian[2][2] = jacobian[5][3] = 1;
+}
+
+void vpSimulatorArDrone::get_fJe(vpMatrix &)
+{
+  throw vpRobotException(vpRobotException::notImplementedError, "a flying body has no fixed frame to be moved in");
+}
+
+void vpSimulatorArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector &q)
+{
+  const vpHomogeneousMatrix wMb = m_state->position().toVisp();
+  const vpThetaUVector turn(wMb.getRotationMatrix());
+  q.resize(6, false);
+  for (unsigned i = 0; i < 3; ++i) {
+    q[i] = wMb[i][3];
+    q[i + 3] = turn[i];
+  }
+}
+
+void vpSimulatorArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVector &q)
+{
+  const bole::Pose now = m_state->position();
+  const bole::Vector6d moved = m_state->displaced ? now.minus(*m_state->displaced) : bole::Vector6d::Zero().eval();
+  m_state->displaced = now;
+  q.resize(6, false);
+  for (unsigned i = 0; i < 6; ++i)
+    q[i] = moved[i];
+}
+
+void vpSimulatorArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)
+{
+  throw vpRobotException(vpRobotException::notImplementedError, "an AR.Drone obeys velocities, not positions");
+}
+
+bool vpSimulatorArDrone::next(bole::Frame &frame)
+{
+  State &state = *m_state;
+  const double period = 1 / state.options.rate_hz, half = 0.5 * state.options.exposure_s;
+  while (state.next_exposure - half < state.time()) // time passed without pictures
+    state.next_exposure += period;
+  const double t = state.next_exposure;
+  const bole::Pose open = state.poseAt(t - half), middle = state.poseAt(t), shut = state.poseAt(t + half);
+  bole::RenderedFrame rendered;
+  state.renderer.render(open * state.bMc, shut * state.bMc, rendered);
+  if (state.link)
+    state.link->pass(rendered.image);
+
+  frame.stamp_ns = nanoseconds(t);
+  frame.index = state.frames++;
+  frame.status = bole::FrameStatus::ok;
+  frame.message.clear();
+  frame.image = rendered.image;
+  state.reported = state.filter.report(middle);
+  frame.wMb_odometry = state.reported;
+  frame.wMb_truth = middle;
+  const auto later = std::find_if(state.gyro.begin(), state.gyro.end(),
+                                  [&](const bole::GyroSample &sample) { return sample.stamp_ns > frame.stamp_ns; });
+  frame.gyro.assign(state.gyro.begin(), later);
+  state.gyro.erase(state.gyro.begin(), later);
+  state.poseAt(t + std::max(half, state.options.video_delay_s));
+  state.next_exposure += period;
+  return true;
+}
+
+bole::PinholeCamera vpSimulatorArDrone::camera() const { return m_state->options.renderer.camera.pinhole; }
+bole::Pose vpSimulatorArDrone::bMc() const { return m_state->bMc; }
+
+void vpSimulatorArDrone::advance(double seconds)
+{
+  bole::requireRange("seconds", seconds, 0, 3600);
+  m_state->poseAt(m_state->time() + seconds);
+}
+
+double vpSimulatorArDrone::time() const { return m_state->time(); }
+bool vpSimulatorArDrone::isInAir() const { return m_state->body.isInAir(); }
+const bole::Quadrotor &vpSimulatorArDrone::body() const { return m_state->body; }
+double vpSimulatorArDrone::leastClearance() const { return m_state->least_clearance; }

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/drone_response.h"
+
+#include "geometry/require_range.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+void ResponseOptions::validate() const
+{
+  requireRange("delay", delay, 0, 1);
+  requireRange("speed_lag", speed_lag, 0, 3);
+  requireRange("turn_lag", turn_lag, 0, 3);
+}
+
+DroneResponse::DroneResponse(const ResponseOptions &options) : m_options(options) { m_options.validate(); }
+
+void DroneResponse::send(double frame_time_s, const Eigen::Vector4d &velocity)
+{
+  m_sent.emplace_back(frame_time_s + m_options.delay, velocity);
+}
+
+Eigen::Vector4d DroneResponse::advance(double time_s)
+{
+  Eigen::Vector4d path = Eigen::Vector4d::Zero();
+  if (!m_has_time)
+    m_time_s = time_s;
+  m_has_time = true;
+  while (m_time_s < time_s) {
+    while (m_sent.size() > 1 && m_sent[1].first <= m_time_s)
+      m_sent.pop_front();
+    const bool acts = !m_sent.empty() && m_sent.front().first <= m_time_s;
+    const Eigen::Vector4d wanted = acts ? m_sent.front().second : Eigen::Vector4d::Zero();
+    double until = time_s;
+    if (m_sent.size() > (acts ? 1u : 0u))
+      until = std::min(until, m_sent[acts ? 1 : 0].first);
+    const double dt = until - m_time_s;
+    for (int axis = 0; axis < 4; ++axis) {
+      const double lag = axis == 3 ? m_options.turn_lag : m_options.speed_lag;
+      const double keep = lag > 0 ? std::exp(-dt / lag) : 0, ahead = m_velocity(axis) - wanted(axis);
+      path(axis) += wanted(axis) * dt + ahead * lag * (1 - keep);
+      m_velocity(axis) = wanted(axis) + ahead * keep;
+    }
+    m_time_s = until;
+  }
+  return path;
+}
+} // namespace bole

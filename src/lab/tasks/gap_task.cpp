@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/gap_task.h"
+
+#include "geometry/require_range.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+constexpr double kSweep_s = 9;     ///< one sidestep to and fro before a gap is chosen
+constexpr double kSearchAgain = 0.35; ///< amplitude of the sidestep once it has left its start [m]
+constexpr double kAcrossGain = 0.8; ///< [1/s]
+constexpr double kLinedUp = 0.2;   ///< across the axis, at the entry [m]
+constexpr double kInView = 1.2;    ///< nearer to the middle the trunks leave the image [m]
+constexpr int kViews = 8;          ///< of a candidate that counts as in the way
+constexpr double kNearRange = 2.5; ///< points beyond this do not matter yet [m]
+
+Eigen::Vector2d leftOf(const Eigen::Vector2d &v) { return {-v.y(), v.x()}; }
+
+double distanceToSegment(const Eigen::Vector2d &p, const Eigen::Vector2d &a, const Eigen::Vector2d &b)
+{
+  const Eigen::Vector2d ab = b - a;
+  const double t = std::clamp((p - a).dot(ab) / std::max(ab.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (a + t * ab - p).norm();
+}
+
+bool isFree(const Gap &gap, const std::vector<Obstacle> &trunks, const Eigen::Vector2d &from,
+            const GapTaskOptions &options)
+{
+  const Eigen::Vector2d entry = gap.middle - options.entry * gap.along, exit = gap.middle + options.beyond * gap.along;
+  for (const Obstacle &other : trunks) {
+    if (other.id == gap.left || other.id == gap.right)
+      continue;
+    const double near = std::min(distanceToSegment(other.xy, from, entry), distanceToSegment(other.xy, entry, exit));
+    if (near - other.radius < options.body_radius + 0.15)
+      return false;
+  }
+  return true;
+}
+} // namespace
+
+void GapTaskOptions::validate() const
+{
+  requireRange("width_min", width_min, 0.3, 5);
+  requireRange("width_max", width_max, width_min, 20);
+  requireRange("range", range, 1, 20);
+  requireRange("evidence", evidence, -20, 20);
+  requireRange("angle", angle, 0.05, 0.7);
+  requireRange("body_radius", body_radius, 0.05, 2);
+  requireRange("entry", entry, 0.3, 5);
+  requireRange("beyond", beyond, 0.3, 5);
+  requireRange("speed", speed, 0.05, 3);
+  requireRange("search_s", search_s, 1, 600);
+  safety.validate();
+}
+
+Gap gapBetween(const Obstacle &one, const Obstacle &other, const Eigen::Vector2d &from)
+{
+  const Eigen::Vector2d across = (other.xy - one.xy).normalized();
+  const double free = (other.xy - one.xy).norm() - one.radius - other.radius;
+  Gap gap;
+  gap.middle = one.xy + (one.radius + 0.5 * free) * across;
+  gap.along = leftOf(across);
+  if (gap.along.dot(gap.middle - from) < 0)
+    gap.along = -gap.along;
+  gap.width = free;
+  const bool one_is_left = leftOf(gap.along).dot(one.xy - gap.middle) > 0;
+  gap.left = one_is_left ? one.id : other.id;
+  gap.right = one_is_left ? other.id : one.id;
+  return gap;
+}
+
+std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::Vector2d &from, double heading,
+                             double evidence, const GapTaskOptions &options)
+{
+  std::optional<Gap> best;
+  double best_angle = options.angle;
+  for (const Obstacle &one : trunks)
+    for (const Obstacle &other : trunks) {
+      if (one.id >= other.id || !one.is_confirmed || !other.is_confirmed ||
+          std::min(one.evidence, other.evidence) < evidence)
+        continue;
+      const Gap gap = gapBetween(one, other, from);
+      const Eigen::Vector2d w = gap.middle - from;
+      const double angle = std::abs(std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI));
+      const double turned = std::abs(std::remainder(std::atan2(gap.along.y(), gap.along.x()) - heading, 2 * M_PI));
+      if (gap.width < options.width_min || gap.width > options.width_max || w.norm() > options.range ||
+          w.dot(gap.along) < 1 || turned > 1 || angle >= best_angle || !isFree(gap, trunks, from, options))
+        continue;
+      best = gap;
+      best_angle = angle;
+    }
+  return best;
+}
+
+GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety), m_options(options)
+{
+  m_options.validate();
+}
+
+ServoTask::Values GapTask::errors() const
+{
+  if (!m_gap)
+    return {};
+  return {{"across [m]", m_across}, {"to go [m]", -m_ahead}};
+}
+
+/// Before the gap at least one of its trunks is in view; in it nothing can be asked for.
+bool GapTask::sees(const FrameResult &result, const Pipeline &) const
+{
+  if (!m_gap || m_ahead > -kInView)
+    return true;
+  return trackedTrunk(result, m_gap->left) || trackedTrunk(result, m_gap->right);
+}
+
+TaskCommand GapTask::search(const FrameResult &result, const Pipeline &pipeline)
+{
+  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
+  TaskCommand command{false, m_sidestep.velocity(result.wMb, time_s), "sidesteps to find a gap"};
+  const double elapsed = m_sidestep.elapsed(time_s);
+  if (elapsed > m_options.search_s) {
+    enter(TaskPhase::failed);
+    return {true, Eigen::Vector4d::Zero(), "no gap found"};
+  }
+  if (elapsed > kSweep_s)
+    m_gap = chooseGap(obstacles(pipeline, result.wMb, 12, kViews), m_sidestep.start().t.head<2>(),
+                      yawOf(m_sidestep.start()), elapsed > 2 * kSweep_s ? -100 : m_options.evidence, m_options);
+  if (m_gap)
+    enter(TaskPhase::servoing);
+  return command;
+}
+
+/// The gap where the map has it now; while one of its trunks is gone from the map, where it was last.
+void GapTask::refresh(const std::vector<Obstacle> &trunks, const Pose &wMb)
+{
+  std::optional<Obstacle> left, right;
+  for (const Obstacle &trunk : trunks) {
+    if (trunk.id == m_gap->left)
+      left = trunk;
+    if (trunk.id == m_gap->right)
+      right = trunk;
+  }
+  if (left && right)
+    m_gap = gapBetween(*left, *right, m_gap->middle - m_gap->along);
+  const Eigen::Vector2d from_middle = wMb.t.head<2>() - m_gap->middle;
+  m_ahead = from_middle.dot(m_gap->along);
+  m_across = from_middle.dot(leftOf(m_gap->along));
+}
+
+TaskCommand GapTask::fly(const std::vector<Obstacle> &around, const Pose &wMb)
+{
+  if (m_is_lined_up && m_ahead > m_options.beyond) {
+    enter(TaskPhase::done);
+    return {true, Eigen::Vector4d::Zero(), "through"};
+  }
+  m_is_lined_up |= m_ahead > -m_options.entry - 0.3 && std::abs(m_across) < kLinedUp;
+  const Eigen::Vector2d to_middle = m_gap->middle - wMb.t.head<2>();
+  const Eigen::Vector2d ahead = m_is_lined_up ? m_gap->along : to_middle; // keeps both trunks in view
+  const double heading = std::atan2(ahead.y(), ahead.x());
+  Eigen::Vector2d velocity;
+  if (m_is_lined_up)
+    velocity = m_options.speed * m_gap->along - kAcrossGain * m_across * leftOf(m_gap->along);
+  else {
+    const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
+    velocity = limited(kAcrossGain * to_entry, m_options.speed);
+  }
+  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), around, m_options.body_radius,
+                       m_options.evidence);
+  return {false, towards(wMb, velocity, heading),
+          m_is_lined_up ? "passes the gap" : "lines up"};
+}
+
+/// It may stand between trunks now, and the last search was straight behind: sweeps less.
+void GapTask::giveUpTarget()
+{
+  m_gap.reset();
+  m_is_lined_up = false;
+  m_sidestep.restart(kSearchAgain);
+  enter(TaskPhase::searching);
+}
+
+TaskCommand GapTask::act(const FrameResult &result, const Pipeline &pipeline)
+{
+  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, 1e-9 * static_cast<double>(result.stamp_ns));
+  if (!m_gap)
+    return search(result, pipeline);
+  std::vector<Obstacle> around = obstacles(pipeline, result.wMb, 20, 1);
+  refresh(around, result.wMb);
+  m_near_points.addTo(around, result.wMb, kNearRange);
+  return fly(around, result.wMb);
+}
+} // namespace bole

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+constexpr double kMisread = 0.3; ///< of the radius: a border read inside the bark, where light and shade meet
+constexpr double kDoubted = -2;  ///< log odds below which a candidate is taken for nothing
+constexpr double kSeenThrough = 4; ///< MapTrunk::lookedThrough from which nothing stands there
+constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
+constexpr double kWidth = 0.15;       ///< of a column of points [m]
+constexpr double kRemembered_s = 3;   ///< of what is out of view
+constexpr int kSeen = 6;              ///< points in a column before it counts
+constexpr double kUpright = 0.5;      ///< and their least extent in height [m]
+constexpr double kPointRadius = 0.05; ///< of the bark round a point [m]
+constexpr double kCell = 0.2;         ///< of the space seen [m]
+constexpr int kRays = 12;             ///< through a cell before it counts as seen
+constexpr double kSeenFor_s = 10;     ///< and how long it does
+} // namespace
+
+double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
+{
+  const Eigen::Vector2d away = p - xy;
+  const double distance = away.norm();
+  if (distance < 1e-9)
+    return -radius;
+  const Eigen::Vector2d u = away / distance;
+  return distance - radius - sigmas * std::sqrt(std::max(0.0, u.dot(covariance * u)));
+}
+
+std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations)
+{
+  std::vector<Obstacle> near;
+  for (const MapTrunk &trunk : pipeline.mapTrunks()) {
+    const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
+    const bool counts = is_confirmed || (trunk.status == TrunkStatus::candidate && trunk.observations >= observations);
+    if (trunk.removed || !counts) // most of a long flight's
+      continue;
+    if (trunk.lookedThrough() > kSeenThrough)
+      continue;
+    const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
+    const double d = w.norm();
+    const double evidence = pipeline.evidence(trunk);
+    if (d > range || d < trunk.trunk.radius() + kFlownThrough || (!is_confirmed && evidence < kDoubted))
+      continue;
+    const Matrix4d relative = pipeline.smoother().relativeCovariance(trunk.smoother_id);
+    const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
+    const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
+    const double misread = kMisread * trunk.trunk.radius();
+    near.push_back({trunk.id, is_confirmed, xy, trunk.trunk.radius(),
+                    across * n * n.transpose() + along * u * u.transpose() + misread * misread * Eigen::Matrix2d::Identity(),
+                    evidence});
+  }
+  return near;
+}
+
+void NearPoints::see(const std::vector<Eigen::Vector3d> &points, const Pose &wMb, double time_s)
+{
+  constexpr double kLow = 0.8, kHigh = 0.8; // below and above the drone [m]
+  for (auto column = m_columns.begin(); column != m_columns.end();)
+    column = time_s - column->second.last_s > kRemembered_s ? m_columns.erase(column) : std::next(column);
+  for (const Eigen::Vector3d &point : points) {
+    if (point.z() < wMb.t.z() - kLow || point.z() > wMb.t.z() + kHigh)
+      continue;
+    Column &column = m_columns[{static_cast<int>(std::floor(point.x() / kWidth)), static_cast<int>(std::floor(point.y() / kWidth))}];
+    column.sum += point.head<2>();
+    ++column.count;
+    column.low = std::min(column.low, point.z());
+    column.high = std::max(column.high, point.z());
+    column.last_s = time_s;
+  }
+}
+
+void NearPoints::addTo(std::vector<Obstacle> &obstacles, const Pose &wMb, double range) const
+{
+  constexpr double kSure = 100; // log odds that something is there
+  for (const auto &[place, column] : m_columns) {
+    const Eigen::Vector2d xy = column.sum / column.count;
+    if (column.count >= kSeen && column.high - column.low > kUpright && (xy - wMb.t.head<2>()).norm() < range)
+      obstacles.push_back({-1, true, xy, kPointRadius, Eigen::Matrix2d::Zero(), kSure});
+  }
+}
+
+namespace
+{
+std::int32_t cellNumber(double metres) { return static_cast<std::int32_t>(std::floor(metres / kCell)); }
+
+std::size_t placeIn(std::int32_t side, std::int32_t x, std::int32_t y)
+{
+  const auto wrapped = [side](std::int32_t k) { return static_cast<std::size_t>((k % side + side) % side); };
+  return wrapped(y) * static_cast<std::size_t>(side) + wrapped(x);
+}
+} // namespace
+
+/// That of \p p, emptied where it was another's.
+SeenSpace::Cell &SeenSpace::cellAt(const Eigen::Vector2d &p)
+{
+  const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
+  Cell &cell = m_cells[placeIn(kSide, x, y)];
+  if (cell.x != x || cell.y != y)
+    cell = {x, y, 0, 0};
+  return cell;
+}
+
+void SeenSpace::see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s)
+{
+  constexpr double kFar = 6;      // nothing beyond matters [m]
+  constexpr double kHeight = 0.5; // of a ray above or below the camera [m]
+  m_time_s = time_s;
+  for (const Pipeline::Sight &sight : sights) {
+    const double level = sight.ray.head<2>().norm();
+    const double surely_free = level / (std::max(sight.inverse_distance, 0.0) + 2 * sight.sigma) - kCell;
+    const double end = std::min({surely_free, kFar, kHeight * level / std::max(std::abs(sight.ray.z()), 1e-6)});
+    for (double range = 0; range < end; range += 0.7 * kCell) {
+      Cell &cell = cellAt(from.head<2>() + range / level * sight.ray.head<2>());
+      ++cell.rays;
+      cell.last_s = time_s;
+    }
+  }
+}
+
+bool SeenSpace::isSeen(const Eigen::Vector2d &p) const
+{
+  const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
+  const Cell &cell = m_cells[placeIn(kSide, x, y)];
+  return cell.x == x && cell.y == y && cell.rays >= kRays && m_time_s - cell.last_s < kSeenFor_s;
+}
+
+Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
+                          double body_radius, double evidence)
+{
+  constexpr double kDamping = 0.7; // [1/s]: the drone's lag is about half a second
+  constexpr double kLeast = 0.12;  // free way at which nothing more leads nearer [m]
+  for (const Obstacle &trunk : trunks) {
+    const Eigen::Vector2d w = trunk.xy - p;
+    const double distance = w.norm();
+    if (!trunk.is_confirmed || trunk.evidence < evidence || distance < 1e-6)
+      continue;
+    const Eigen::Vector2d u = w / distance;
+    const double most = std::max(0.0, kDamping * (distance - trunk.radius - body_radius - kLeast));
+    velocity -= std::max(0.0, velocity.dot(u) - most) * u;
+  }
+  return velocity;
+}
+} // namespace bole

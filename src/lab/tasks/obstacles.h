@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The map as something to keep away from.
+
+#include <bole/pipeline.h>
+
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace bole
+{
+/// A trunk at the height of the drone, with how well its place *relative to the drone* is known: across the line of
+/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is seen well),
+/// either way by as much as a border may have been read inside the bark.
+/// The covariance in the world would count the drone's own drift, which moves drone and trunk alike.
+struct Obstacle
+{
+  int id = 0;
+  bool is_confirmed = false;
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero(); ///< [m], world
+  double radius = 0;                            ///< [m]
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< [m^2], world axes
+  double evidence = 0;                          ///< log odds to be a trunk (TrunkMap::evidence)
+
+  /// Distance of \p p to the bark less \p sigmas standard deviations in that direction [m].
+  double clearance(const Eigen::Vector2d &p, double sigmas) const;
+};
+
+/// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
+/// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
+/// below -2, looked through, or where the drone is.
+std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
+
+/// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it, has
+/// bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are forgotten
+/// after some seconds.
+class NearPoints
+{
+public:
+  /// \p points of one frame, world [m]; those well below or above the drone at \p wMb are left out.
+  void see(const std::vector<Eigen::Vector3d> &points, const Pose &wMb, double time_s);
+  /// As obstacles without a radius to speak of, those within \p range [m] of \p wMb.
+  void addTo(std::vector<Obstacle> &obstacles, const Pose &wMb, double range) const;
+
+private:
+  struct Column
+  {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    int count = 0;
+    double low = 1e9, high = -1e9; ///< [m]
+    double last_s = 0;
+  };
+  std::map<std::pair<int, int>, Column> m_columns;
+};
+
+/// Where the camera has seen that nothing stands: what it sees a point through is free. What it has not seen through may
+/// hold anything: dark bark has no corners and may have but one border in the image, and beside the image nothing is seen.
+class SeenSpace
+{
+public:
+  /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
+  void see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s);
+  /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
+  bool isSeen(const Eigen::Vector2d &p) const;
+
+private:
+  struct Cell
+  {
+    std::int32_t x = 0, y = 0;
+    int rays = 0;
+    double last_s = 0;
+  };
+  Cell &cellAt(const Eigen::Vector2d &p);
+
+  static constexpr std::int32_t kSide = 64; ///< of a map that goes round: what is left behind makes room
+  std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
+  double m_time_s = 0;
+};
+
+/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that
+/// dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no trunk
+/// must not drive the drone into one.
+Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
+                          double body_radius, double evidence);
+} // namespace bole

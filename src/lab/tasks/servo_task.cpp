@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/servo_task.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr double kPlaceGain = 0.7;  ///< [1/s]
+constexpr double kTurnGain = 1.0;   ///< [1/s]
+constexpr double kLargestTurn = 0.6; ///< [rad/s]
+} // namespace
+
+const char *toString(TaskPhase phase)
+{
+  switch (phase) {
+  case TaskPhase::searching: return "searching";
+  case TaskPhase::servoing: return "servoing";
+  case TaskPhase::done: return "done";
+  case TaskPhase::failed: return "failed";
+  }
+  return "?";
+}
+
+void SafetyOptions::validate() const
+{
+  const auto require = [](const char *name, int value, int high) {
+    if (value < 1 || value > high)
+      throw vpException(vpException::badValue, "%s = %d, must be in [1, %d]", name, value, high);
+  };
+  require("lost_frames", lost_frames, 100);
+  require("sure_frames", sure_frames, 100);
+  require("patience_frames", patience_frames, 10000);
+}
+
+ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
+
+TaskCommand ServoTask::step(const FrameResult &result, const Pipeline &pipeline)
+{
+  const bool is_ok = result.frame_status == FrameStatus::ok;
+  const bool is_seen = is_ok && sees(result, pipeline);
+  if (is_ok)
+    m_missed = is_seen ? 0 : m_missed + 1;
+  if (m_missed > m_safety.patience_frames) {
+    giveUpTarget();
+    m_missed = 0;
+  }
+  m_seen = is_seen ? m_seen + 1 : 0;
+  m_unseen = is_seen ? 0 : m_unseen + 1;
+  if (!is_ok || m_unseen >= m_safety.lost_frames)
+    m_is_lost = true;
+  else if (m_seen >= m_safety.sure_frames)
+    m_is_lost = false;
+  TaskCommand hover;
+  if (m_phase == TaskPhase::done || m_phase == TaskPhase::failed) {
+    hover.reason = toString(m_phase);
+    return hover;
+  }
+  if (m_is_lost) {
+    hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(result.frame_status) + ": hovers";
+    return hover;
+  }
+  return act(result, pipeline);
+}
+
+double yawOf(const Pose &wMb) { return std::atan2(wMb.R(1, 0), wMb.R(0, 0)); }
+
+Eigen::Vector2d limited(const Eigen::Vector2d &v, double largest)
+{
+  const double size = v.norm();
+  return size > largest ? Eigen::Vector2d(v * (largest / size)) : v;
+}
+
+Eigen::Vector4d towards(const Pose &wMb, const Eigen::Vector2d &velocity, double heading)
+{
+  const double yaw = yawOf(wMb);
+  const Eigen::Vector2d body = Eigen::Rotation2Dd(-yaw) * velocity;
+  const double turn = kTurnGain * std::remainder(heading - yaw, 2 * M_PI);
+  return {body.x(), body.y(), 0, std::clamp(turn, -kLargestTurn, kLargestTurn)};
+}
+
+Eigen::Vector4d Sidestep::velocity(const Pose &wMb, double time_s)
+{
+  if (!m_started) {
+    m_start = wMb;
+    m_start_s = time_s;
+    m_started = true;
+  }
+  const double heading = yawOf(m_start), w = 2 * M_PI / m_period, t = time_s - m_start_s;
+  const Eigen::Vector2d left(-std::sin(heading), std::cos(heading));
+  const Eigen::Vector2d place = m_start.t.head<2>() + m_amplitude * std::sin(w * t) * left;
+  return towards(wMb, m_amplitude * w * std::cos(w * t) * left + kPlaceGain * (place - wMb.t.head<2>()), heading);
+}
+
+const MapTrunk *liveTrunk(const Pipeline &pipeline, int id)
+{
+  for (const MapTrunk &trunk : pipeline.mapTrunks())
+    if (trunk.id == id && !trunk.removed && trunk.status != TrunkStatus::lost)
+      return &trunk;
+  return nullptr;
+}
+
+const TrackedTrunk *trackedTrunk(const FrameResult &result, int id)
+{
+  for (const TrackedTrunk &trunk : result.trunks)
+    if (trunk.id == id && trunk.status == TrackingStatus::tracked)
+      return &trunk;
+  return nullptr;
+}
+} // namespace bole

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/require_range.h"
+#include "lab/tasks/trunk_task.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+constexpr double kSweep_s = 9;          ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
+constexpr double kPause_s = 0.25;       ///< without a command it hovered: what was sent before is over
+constexpr double kFirstDrift = 0.3;     ///< standard deviation of the velocity nobody ordered, at first [m/s]
+constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
+constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
+constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
+constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
+constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
+constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
+constexpr int kPatience = 10;           ///< frames that the way round is blocked before it goes round the other way
+constexpr double kClearRange = 3;       ///< of trunks to keep clear of, or that stand in the way round [m]
+constexpr double kSureTrunk = 0;        ///< log odds from which on a trunk is kept clear of
+constexpr double kLargestTurn = 0.8;    ///< [rad/s]
+} // namespace
+
+void TrunkTaskOptions::validate() const
+{
+  requireRange("ratio", ratio, 0, 0.5);
+  requireRange("distance", distance, 0.5, 20);
+  requireRange("bearing", bearing, -0.5, 0.5);
+  requireRange("speed", speed, -2, 2);
+  requireRange("gain", gain, 0.05, 3);
+  requireRange("bearing_noise", bearing_noise, 1e-5, 0.1);
+  requireRange("ratio_noise", ratio_noise, 1e-5, 0.5);
+  requireRange("unrest", unrest, 1e-3, 2);
+  requireRange("largest_speed", largest_speed, 0.05, 3);
+  requireRange("sway", sway, 0, 2);
+  requireRange("sway_climb", sway_climb, 0, 1);
+  requireRange("sway_period", sway_period, 1, 60);
+  requireRange("body_radius", body_radius, 0.05, 2);
+  requireRange("free_way", free_way, 0, 5);
+  requireRange("choice_evidence", choice_evidence, -20, 20);
+  requireRange("choice_angle", choice_angle, 0.02, 0.6);
+  requireRange("choice_range", choice_range, 1, 20);
+  requireRange("choice_views", choice_views, 1, 1000);
+  requireRange("search_s", search_s, 1, 600);
+  response.validate();
+  safety.validate();
+}
+
+TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
+  : ServoTask(options.safety), m_bMc(bMc), m_options(options), m_sidestep(0.7, kSweep_s),
+    m_response(options.response)
+{
+  m_options.validate();
+  m_servo.setServo(vpServo::EYEINHAND_L_cVe_eJe);
+  m_servo.setInteractionMatrixType(vpServo::CURRENT, vpServo::PSEUDO_INVERSE);
+  m_servo.setLambda(m_options.gain);
+  m_servo.addFeature(m_current, m_desired, vpFeatureTrunk::selectBearing() | vpFeatureTrunk::selectLogRatio());
+  m_servo.set_cVe(vpVelocityTwistMatrix(m_bMc.inverse().toVisp()));
+  vpMatrix eJe(6, 2);
+  eJe[0][0] = eJe[5][1] = 1; // vx, wz
+  m_servo.set_eJe(eJe);
+}
+
+TrunkTask::~TrunkTask() { m_servo.kill(); }
+
+ServoTask::Values TrunkTask::errors() const
+{
+  if (!m_has_feature)
+    return {};
+  return {{"bearing [deg]", (m_bearing.value() - m_options.bearing) * 180 / M_PI},
+          {"distance [%]", 100 * (m_ratio * std::exp(-m_log_ratio.value()) - 1)}};
+}
+
+bool TrunkTask::sees(const FrameResult &result, const Pipeline &) const
+{
+  return m_target < 0 || trackedTrunk(result, m_target) != nullptr;
+}
+
+/// The nearest trunk straight ahead of where the search began that is surely one; after two sweeps without such a one,
+/// the surest that is confirmed.
+int TrunkTask::choose(const Pipeline &pipeline, double elapsed_s) const
+{
+  const MapTrunk *nearest = nullptr, *surest = nullptr;
+  double least_range = m_options.choice_range;
+  const double heading = yawOf(m_sidestep.start());
+  for (const MapTrunk &trunk : pipeline.mapTrunks()) {
+    if (trunk.removed || trunk.status != TrunkStatus::confirmed || trunk.observations < m_options.choice_views)
+      continue;
+    const Pose &start = m_sidestep.start();
+    const Eigen::Vector2d w = trunk.trunk.axisAt(start.t.z()).head<2>() - start.t.head<2>();
+    const double angle = std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI), range = w.norm();
+    if (std::abs(angle) > m_options.choice_angle || range > m_options.choice_range)
+      continue;
+    const double evidence = pipeline.evidence(trunk);
+    if (!surest || evidence > pipeline.evidence(*surest))
+      surest = &trunk;
+    if (evidence >= m_options.choice_evidence && range < least_range) {
+      nearest = &trunk;
+      least_range = range;
+    }
+  }
+  if (nearest)
+    return nearest->id;
+  return surest && elapsed_s > 2 * kSweep_s ? surest->id : -1;
+}
+
+/// The trunk that stands where the target stood: ids change when trunks merge.
+int TrunkTask::successor(const Pipeline &pipeline) const
+{
+  for (const MapTrunk &trunk : pipeline.mapTrunks())
+    if (!trunk.removed && trunk.status != TrunkStatus::lost && (trunk.trunk.xy - m_place).norm() < kSameTrunk)
+      return trunk.id;
+  return -1;
+}
+
+TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipeline, double time_s)
+{
+  TaskCommand command;
+  command.velocity = m_sidestep.velocity(result.wMb, time_s);
+  command.is_hovering = false;
+  command.reason = "sidesteps to find a trunk";
+  const double elapsed = m_sidestep.elapsed(time_s);
+  if (elapsed > m_options.search_s) {
+    enter(TaskPhase::failed);
+    return {true, Eigen::Vector4d::Zero(), "no trunk found"};
+  }
+  if (elapsed > kSweep_s)
+    m_target = choose(pipeline, elapsed);
+  if (m_target >= 0) {
+    enter(TaskPhase::servoing);
+    m_has_feature = false;
+  }
+  return command;
+}
+
+void TrunkTask::desire(double radius)
+{
+  m_ratio = m_options.ratio > 0 ? m_options.ratio : std::min(0.5, radius / m_options.distance);
+  m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
+}
+
+/// The bearing as tracked in this image. The distance as the map has it: pose and place in it rest on all images, while
+/// what one image takes for a border wanders by a tenth of the width. A ratio that is asked for is the image's, but for
+/// misread widths; the trunk as seen from here may be wider or narrower than in the map, which has it from all sides:
+/// m_log_radius.
+RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
+{
+  RelativeTrunk seen = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
+  const TrackedTrunk *tracked = trackedTrunk(result, m_target);
+  if (!tracked || !seen.isFinite() || !tracked->relative.isFinite())
+    return seen;
+  seen.cRt = tracked->relative.cRt;
+  if (m_options.ratio <= 0)
+    return seen;
+  const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
+  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisread;
+  m_misread = is_misread ? m_misread + 1 : 0;
+  if (!m_has_feature || m_misread > kBelieved) // it does look like that from here
+    m_log_radius = radius;
+  else if (!is_misread)
+    m_log_radius += kRadiusWeight * (radius - m_log_radius);
+  seen.log_ratio = is_misread ? seen.log_ratio + m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
+  return seen;
+}
+
+void TrunkTask::giveUpTarget()
+{
+  m_target = -1;
+  m_has_feature = false;
+  m_sway_start_s = -1;
+  m_ratio = 0;
+  m_sidestep.restart();
+  enter(TaskPhase::searching);
+}
+
+TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
+{
+  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
+  if (m_target >= 0 && !liveTrunk(pipeline, m_target))
+    m_target = successor(pipeline);
+  const MapTrunk *trunk = liveTrunk(pipeline, m_target);
+  const std::vector<Obstacle> around = obstacles(pipeline, result.wMb, kClearRange, 1);
+  if (!trunk) {
+    if (phase() == TaskPhase::servoing)
+      giveUpTarget();
+    TaskCommand command = search(result, pipeline, time_s);
+    keepClear(command, around, result.wMb);
+    m_response.send(time_s, command.velocity);
+    return command;
+  }
+  m_place = trunk->trunk.xy;
+  const RelativeTrunk seen = look(result, *trunk);
+  if (!seen.isFinite())
+    return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
+  vpFeatureTrunk feature;
+  feature.buildFrom(seen, trunk->trunk.radius());
+  const double sway = swayNow(time_s);
+  const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
+  const bool is_free = isFree(trunk->id, around, result.wMb, wanted);
+  m_blocked = is_free ? 0 : m_blocked + 1;
+  if (m_blocked > kPatience) {
+    m_turned_back = -m_turned_back;
+    m_blocked = 0;
+  }
+  const double round = is_free ? wanted : 0;
+  TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
+  command.velocity.z() = m_options.sway_climb * sway;
+  if (keepClear(command, around, result.wMb))
+    m_response.send(time_s, command.velocity);
+  if (sway != 0)
+    command.reason = "holds, swaying";
+  else if (m_options.speed != 0)
+    command.reason = round != 0 ? "circles" : "way blocked: waits";
+  return command;
+}
+
+/// -1 to 1; 0 where no distance is asked for.
+double TrunkTask::swayNow(double time_s)
+{
+  if (m_options.speed != 0 || m_options.ratio > 0)
+    return 0;
+  if (m_sway_start_s < 0)
+    m_sway_start_s = time_s;
+  return std::cos(2 * M_PI * (time_s - m_sway_start_s) / m_options.sway_period);
+}
+
+/// Cuts what leads to a trunk: the camera looks neither behind nor aside, the map does. True where it had to.
+bool TrunkTask::keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const
+{
+  const Eigen::Rotation2Dd heading(yawOf(wMb));
+  const Eigen::Vector2d wanted = heading * Eigen::Vector2d(command.velocity.head<2>());
+  const Eigen::Vector2d velocity = keptClear(wanted, wMb.t.head<2>(), around, m_options.body_radius, kSureTrunk);
+  command.velocity.head<2>() = heading.inverse() * velocity;
+  return velocity != wanted;
+}
+
+/// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
+bool TrunkTask::isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const
+{
+  const Eigen::Vector2d way = (speed > 0 ? 1 : -1) * wMb.R.col(1).head<2>().normalized();
+  for (const Obstacle &other : around)
+    if (other.id != target && other.is_confirmed && way.dot(other.xy - wMb.t.head<2>()) > 0 &&
+        other.clearance(wMb.t.head<2>(), 1) < m_options.free_way)
+      return false;
+  return true;
+}
+
+/// How bearing and log r/d of \p feature move with (vx, vy, vz, wz) of the body.
+Eigen::Matrix<double, 2, 4> TrunkTask::interactionOf(vpFeatureTrunk feature) const
+{
+  const vpMatrix L = feature.interaction(vpFeatureTrunk::selectBearing() | vpFeatureTrunk::selectLogRatio()) *
+                     vpMatrix(vpVelocityTwistMatrix(m_bMc.inverse().toVisp()));
+  Eigen::Matrix<double, 2, 4> J;
+  for (unsigned row = 0; row < 2; ++row)
+    J.row(row) << L[row][0], L[row][1], L[row][2], L[row][5];
+  return J;
+}
+
+/// Brings the filters to the frame of \p time_s, in which \p feature was seen.
+void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
+{
+  const double dt = time_s - m_time_s, d = feature.distance();
+  if (dt > kPause_s) {
+    m_response = DroneResponse(m_options.response);
+    m_has_feature = false;
+  }
+  const Eigen::Vector4d path = m_response.advance(time_s);
+  if (m_has_feature) {
+    const Eigen::Vector2d moved = interactionOf(feature) * path;
+    m_bearing.predict(moved(0), dt, m_options.unrest / d);
+    m_log_ratio.predict(moved(1), dt, m_options.unrest / d);
+    m_bearing.correct(feature.bearing(), m_options.bearing_noise);
+    m_log_ratio.correct(feature.logRatio(), m_options.ratio_noise);
+  }
+  else {
+    m_bearing.start(feature.bearing(), m_options.bearing_noise, kFirstDrift / d);
+    m_log_ratio.start(feature.logRatio(), m_options.ratio_noise, kFirstDrift / d);
+  }
+  m_has_feature = true;
+  m_time_s = time_s;
+}
+
+/// m_current as it would come to stand if the drone's lags ran out from when the command acts; how it will move besides
+/// [1/s]: by its drift, and by flying sideways at \p round.
+Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, double time_s, double round)
+{
+  const ResponseOptions &response = m_options.response;
+  const Eigen::Matrix<double, 2, 4> J = interactionOf(feature);
+  const double most = kLargestDrift / feature.distance();
+  const Eigen::Vector2d drift(std::clamp(m_bearing.drift(), -most, most), std::clamp(m_log_ratio.drift(), -most, most));
+  DroneResponse ahead = m_response;
+  const Eigen::Vector2d there = J * ahead.advance(time_s + response.delay) + response.delay * drift;
+  const Eigen::Vector2d rate = J * ahead.velocity() + drift;
+  m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * rate(0), feature.inclination(), feature.tip(),
+                      m_log_ratio.value() + there(1) + response.speed_lag * rate(1), radius);
+  ahead.send(time_s, {0, round, 0, 0});
+  ahead.advance(time_s + response.delay + response.turn_lag); // the turn lags too: it is to match what is flown then
+  return drift + J.col(1) * ahead.velocity().y();
+}
+
+Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round)
+{
+  filter(feature, time_s);
+  desire(radius);
+  round = std::clamp(round, -m_options.largest_speed, m_options.largest_speed);
+  const Eigen::Vector2d besides = lead(feature, radius, time_s, round);
+  vpColVector v = m_servo.computeControlLaw(), against(2);
+  against[0] = -besides(0);
+  against[1] = -besides(1);
+  v += m_servo.getTaskJacobianPseudoInverse() * against;
+  const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
+  Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
+  m_response.send(time_s, velocity);
+  return velocity;
+}
+} // namespace bole

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Image-based servoing on one trunk: hold its bearing and distance, or circle round it.
+///
+/// Idea: two of vpFeatureTrunk's four numbers, bearing and log r/d, are what a drone that keeps its own roll, pitch and
+/// height can choose. vpServo drives both to their desired values over the drone's Jacobian: the bearing by turning,
+/// log r/d by flying ahead, one axis each, since their lags differ. What is left is sideways: `hold` leaves it at rest,
+/// `circle` gives it a speed, and what that does to the two is fed forward.
+///
+/// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
+/// has none: it drifts by several per cent in half a minute, since it takes what is wrong in how the trunk looks from
+/// one side for a distance. So `hold` by distance sways sideways, features held. The way is a slant: the drone's height
+/// has no error of scale as its steps have, and the points tell the direction of flight, so that the metre of the height
+/// becomes the map's. The distance is the map's: pose and map rest on all images, while the borders that one image shows
+/// wander with light and background.
+///
+/// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
+/// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
+/// decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is told) shows as a
+/// drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
+///
+/// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed for
+/// a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
+
+#include "lab/tasks/drone_response.h"
+#include "lab/tasks/feature_filter.h"
+#include "lab/tasks/obstacles.h"
+#include "lab/tasks/servo_task.h"
+#include <bole/vpFeatureTrunk.h>
+
+#include <visp3/vs/vpServo.h>
+
+namespace bole
+{
+struct TrunkTaskOptions
+{
+  double ratio = 0;            ///< r/d to be kept, 0 (by distance) to 0.5
+  double distance = 3;         ///< camera to axis, where no ratio is given [m], 0.5 to 20
+  double bearing = 0;          ///< to be kept, positive right [rad], -0.5 to 0.5
+  double speed = 0;            ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
+  double gain = 2;             ///< of vpServo [1/s], 0.05 to 3
+  double bearing_noise = 0.0015; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
+  double ratio_noise = 0.025;  ///< of its log r/d, 1e-5 to 0.5
+  double unrest = 0.15;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
+  double largest_speed = 0.9;  ///< [m/s], 0.05 to 3
+  double sway = 0.8;           ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
+  double sway_climb = 0.4;     ///< largest rate of climb meanwhile [m/s], 0 to 1
+  double sway_period = 6;      ///< [s], 1 to 60
+  double body_radius = 0.28;   ///< of the drone with its hull [m], 0.05 to 2
+  double free_way = 0.5;       ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
+  double choice_angle = 0.35;  ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
+  double choice_range = 7;     ///< nor those beyond this [m], 1 to 20
+  double choice_evidence = 2;  ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
+  int choice_views = 25;       ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
+  double search_s = 40;        ///< gives up after [s], 1 to 600
+  ResponseOptions response;
+  SafetyOptions safety;
+
+  void validate() const; ///< \throw vpException naming the option, its value and the range
+};
+
+/// Laws (each a test, on exact features): the error decays at the gain, with a drone that obeys at once and with one
+/// that is late and slow; circling keeps bearing and log r/d; a steady push moves neither.
+class TrunkTask : public ServoTask
+{
+public:
+  TrunkTask(const Pose &bMc, const TrunkTaskOptions &options);
+  ~TrunkTask() override;
+
+  int target() const { return m_target; } ///< id in the map, -1 while searching
+  double desiredRatio() const { return m_ratio; } ///< r/d to be kept, by the radius as it is known now
+  const TrunkTaskOptions &options() const { return m_options; }
+  Values errors() const override;
+
+  /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for the \p feature of the frame of \p time_s [s],
+  /// going round at \p round [m/s], positive to the left.
+  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round);
+
+protected:
+  bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
+  void giveUpTarget() override;
+  TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
+
+private:
+  TaskCommand search(const FrameResult &result, const Pipeline &pipeline, double time_s);
+  int choose(const Pipeline &pipeline, double elapsed_s) const;
+  int successor(const Pipeline &pipeline) const;
+  RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk);
+  void desire(double radius);
+  double swayNow(double time_s);
+  bool keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const;
+  bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
+  void filter(const vpFeatureTrunk &feature, double time_s);
+  Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
+  Eigen::Matrix<double, 2, 4> interactionOf(vpFeatureTrunk feature) const;
+
+  Pose m_bMc;
+  TrunkTaskOptions m_options;
+  Sidestep m_sidestep;
+  vpServo m_servo;
+  vpFeatureTrunk m_current, m_desired; ///< as it will stand when the command acts; as it should
+  DroneResponse m_response;
+  FeatureFilter m_bearing, m_log_ratio; ///< at the frame
+  int m_target = -1;
+  Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
+  double m_time_s = 0, m_ratio = 0;
+  double m_log_radius = 0; ///< as seen from here: of distance by the map times r/d in the image, over a second
+  int m_misread = 0;       ///< frames in a row
+  double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
+  int m_blocked = 0;          ///< frames in a row
+  double m_sway_start_s = -1; ///< -1: has not begun
+  bool m_has_feature = false;
+};
+} // namespace bole

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/image_health.h"
+#include "geometry/require_range.h"
+#include "lab/trials/closed_loop.h"
+
+#include <algorithm>
+#include <ctime>
+#include <limits>
+
+namespace bole
+{
+namespace
+{
+constexpr double kTakeOff_s = 4; ///< until the height is reached and the body at rest
+constexpr double kRest_s = 2;    ///< flown on after the task is done
+
+/// Processor time of all threads of this process: what the loop costs, however busy the machine is.
+double processMs()
+{
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+double quantile(const std::vector<LoopSample> &samples, double share)
+{
+  std::vector<double> ms;
+  for (const LoopSample &sample : samples)
+    ms.push_back(sample.loop_ms);
+  if (ms.empty())
+    return 0;
+  const auto at = ms.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(ms.size() - 1));
+  std::nth_element(ms.begin(), at, ms.end());
+  return *at;
+}
+
+void takeOff(vpSimulatorArDrone &robot, const LoopOptions &options)
+{
+  robot.setMaxTranslationVelocity(options.translation_max);
+  robot.setMaxRotationVelocity(options.rotation_max);
+  robot.open(vpSimulatorArDrone::Permission::fly);
+  robot.takeOff();
+  for (double t = 0; t < kTakeOff_s; t += 0.1) {
+    robot.hover();
+    robot.advance(0.1);
+  }
+}
+
+void markBroken(Frame &frame, ImageHealth &health)
+{
+  if (frame.status != FrameStatus::ok)
+    return;
+  if (frame.index == 0)
+    return health.start(frame.image);
+  const ImageFault fault = health.check(frame.image);
+  if (fault == ImageFault::none)
+    return;
+  frame.status = fault == ImageFault::frozen ? FrameStatus::stale : FrameStatus::corrupt;
+  frame.message = toString(fault);
+}
+
+void give(vpSimulatorArDrone &robot, const TaskCommand &command)
+{
+  if (command.is_hovering)
+    return robot.hover();
+  vpColVector v(6, 0.0);
+  v[0] = command.velocity(0), v[1] = command.velocity(1), v[2] = command.velocity(2), v[5] = command.velocity(3);
+  robot.setVelocity(vpRobot::REFERENCE_FRAME, v);
+}
+} // namespace
+
+void LoopOptions::validate() const
+{
+  requireRange("duration_s", duration_s, 1, 3600);
+  requireRange("search_most_s", search_most_s, 1, 3600);
+  requireRange("contact", contact, 0.05, 2);
+  requireRange("translation_max", translation_max, 0.05, 5);
+  requireRange("rotation_max", rotation_max, 0.05, 5);
+  fault.validate();
+}
+
+double LoopRecord::leastClearance() const
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const LoopSample &sample : samples)
+    least = std::min(least, sample.clearance);
+  return least;
+}
+
+double LoopRecord::medianLoop_ms() const { return quantile(samples, 0.5); }
+double LoopRecord::percentile95Loop_ms() const { return quantile(samples, 0.95); }
+
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
+                         const Judge &judge, const LoopWatcher &watcher)
+{
+  options.validate();
+  LoopRecord record;
+  ImageHealth health;
+  FaultInjector injector(options.fault);
+  takeOff(robot, options);
+  const double begin_s = robot.time();
+  double rest_from_s = -1;
+  for (;;) {
+    Frame frame;
+    if (!robot.next(frame))
+      break;
+    LoopSample sample;
+    sample.time_s = 1e-9 * static_cast<double>(frame.stamp_ns) - begin_s;
+    sample.truth = *frame.wMb_truth;
+    frame.wMb_truth.reset(); // nobody below may see it
+    const double servoing_s = record.servoing_from_s < 0 ? -1 : sample.time_s - record.servoing_from_s;
+    sample.is_spoilt = injector.apply(frame, servoing_s);
+
+    const double start_ms = processMs();
+    markBroken(frame, health);
+    const FrameResult result = pipeline.process(frame);
+    const TaskCommand command = task.step(result, pipeline);
+    sample.loop_ms = processMs() - start_ms;
+    give(robot, command);
+
+    if (record.servoing_from_s < 0 && task.phase() == TaskPhase::servoing)
+      record.servoing_from_s = sample.time_s;
+    sample.phase = task.phase();
+    sample.is_lost = task.isLost();
+    sample.is_hovering = command.is_hovering;
+    sample.frame_status = frame.status;
+    sample.estimate = result.wMb;
+    sample.command = command.velocity;
+    sample.speed = robot.body().velocity().head<2>().norm();
+    sample.clearance = robot.leastClearance(); // least so far, of every 5 ms
+    sample.believed = task.errors();
+    sample.reason = command.reason;
+    if (judge)
+      sample.real = judge(sample.truth, sample.estimate);
+    record.samples.push_back(sample);
+
+    record.is_contact = robot.leastClearance() < options.contact;
+    record.is_finished = task.phase() == TaskPhase::done;
+    const bool is_over = task.phase() == TaskPhase::done || task.phase() == TaskPhase::failed;
+    if (is_over && rest_from_s < 0)
+      rest_from_s = sample.time_s;
+    if (watcher && !watcher(frame, result, sample))
+      break;
+    if (record.is_contact || (is_over && sample.time_s > rest_from_s + kRest_s) || servoing_s > options.duration_s ||
+        (record.servoing_from_s < 0 && sample.time_s > options.search_most_s))
+      break;
+  }
+  return record;
+}
+} // namespace bole

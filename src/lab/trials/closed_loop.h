@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// One flight of a task in the simulated forest: camera, tracker, task, drone; and its record.
+///
+/// Idea: the task gets what the pipeline makes of rendered images and nothing else. The truth goes into the record
+/// only, through a judge that is asked after the command has been given.
+
+#include "lab/tasks/servo_task.h"
+#include "lab/trials/injected_fault.h"
+#include "lab/simulation/vpSimulatorArDrone.h"
+
+#include <functional>
+
+namespace bole
+{
+/// What was true and what was done at one frame.
+struct LoopSample
+{
+  double time_s = 0; ///< of the frame, from take-off
+  TaskPhase phase = TaskPhase::searching;
+  bool is_lost = false, is_hovering = false, is_spoilt = false;
+  FrameStatus frame_status = FrameStatus::ok;
+  Pose truth, estimate;                               ///< wMb at the frame
+  Eigen::Vector4d command = Eigen::Vector4d::Zero();  ///< of the body
+  double speed = 0;                                   ///< true, horizontal [m/s]
+  double clearance = 0;                               ///< true, body's origin to bark [m]
+  double loop_ms = 0;                                 ///< of processor time: tracker, health of the image and task
+  ServoTask::Values believed, real;                   ///< errors by the task, by the truth
+  std::string reason;
+};
+
+struct LoopOptions
+{
+  double duration_s = 40;      ///< of servoing, at most, 1 to 3600
+  double search_most_s = 60;   ///< before it, at most, 1 to 3600
+  double contact = 0.28;       ///< body's origin to bark that is a contact: ends the flight [m], 0.05 to 2
+  double translation_max = 1.5; ///< given to the robot [m/s], 0.05 to 5
+  double rotation_max = 1;      ///< [rad/s], 0.05 to 5
+  FaultOptions fault;
+
+  void validate() const; ///< \throw vpException naming the option, its value and the range
+};
+
+struct LoopRecord
+{
+  std::vector<LoopSample> samples;
+  double servoing_from_s = -1; ///< first time the task servoed, -1: never
+  bool is_contact = false;     ///< touched a trunk
+  bool is_finished = false;    ///< the task said done
+
+  double leastClearance() const; ///< of the samples [m]
+  double medianLoop_ms() const;
+  double percentile95Loop_ms() const;
+};
+
+/// The truth about a task's errors: \p truth and \p estimate of the body at the frame. The task is asked for what it
+/// chose, not told anything.
+using Judge = std::function<ServoTask::Values(const Pose &truth, const Pose &estimate)>;
+/// Called after each frame; false ends the flight.
+using LoopWatcher = std::function<bool(const Frame &, const FrameResult &, const LoopSample &)>;
+
+/// Takes off and flies. \p robot stands on the ground. Frames whose pixels cannot be believed (ImageHealth) reach the
+/// pipeline as corrupt or stale, as those of a live source do.
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
+                         const Judge &judge = {}, const LoopWatcher &watcher = {});
+} // namespace bole

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/random.h"
+#include "lab/trials/median_interval.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bole
+{
+namespace
+{
+double medianOf(std::vector<double> &values)
+{
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  const double upper = *middle;
+  return values.size() % 2 ? upper : 0.5 * (upper + *std::max_element(values.begin(), middle));
+}
+} // namespace
+
+MedianInterval bootstrapMedian(std::vector<double> values, int resamples, std::uint64_t seed)
+{
+  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return std::isnan(v); }), values.end());
+  MedianInterval interval;
+  interval.count = values.size();
+  if (values.empty()) {
+    interval.median = interval.low = interval.high = std::numeric_limits<double>::quiet_NaN();
+    return interval;
+  }
+  std::sort(values.begin(), values.end()); // the order of the runs must not matter
+  Random random(seed, 801);
+  std::vector<double> medians, drawn(values.size());
+  for (int k = 0; k < resamples; ++k) {
+    for (double &value : drawn)
+      value = values[static_cast<std::size_t>(random.uniform() * static_cast<double>(values.size()))];
+    medians.push_back(medianOf(drawn));
+  }
+  interval.median = medianOf(values);
+  if (medians.empty())
+    medians.push_back(interval.median);
+  std::sort(medians.begin(), medians.end());
+  const auto quantile = [&medians](double share) {
+    return medians[static_cast<std::size_t>(std::lround(share * static_cast<double>(medians.size() - 1)))];
+  };
+  interval.low = std::min(interval.median, quantile(0.025));
+  interval.high = std::max(interval.median, quantile(0.975));
+  return interval;
+}
+
+ShareInterval wilson(int successes, int runs)
+{
+  if (runs <= 0)
+    return {};
+  constexpr double z = 1.959964;
+  const double n = runs, p = successes / n, scale = 1 / (1 + z * z / n);
+  const double middle = scale * (p + z * z / (2 * n));
+  const double half = scale * z * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return {p, std::max(0.0, middle - half), std::min(1.0, middle + half)};
+}
+} // namespace bole

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A servoing task from one random start, and what came of it.
+
+#include "lab/trials/closed_loop.h"
+#include "lab/trials/scenario.h"
+
+namespace bole
+{
+struct ServoTrialOptions
+{
+  ScenarioOptions scenario;    ///< with the task and the seed
+  double distance = 3;         ///< hold [m], 0.5 to 20
+  double ratio = 0;            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
+  double speed = 0;            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
+  PipelineOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
+  LoopOptions loop;
+  vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
+
+  /// vpSimulatorArDrone's defaults with a stiffer velocity loop (gain 0.6) and 2 samples a pixel.
+  static vpSimulatorArDrone::Options defaultRobot();
+  /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by one
+  /// trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from one
+  /// place would make each frame dearer than the last. That counts but once, and where it goes round trunks (all but
+  /// hold) their borders may turn over.
+  static PipelineOptions defaultPipeline(ServoKind kind);
+};
+
+/// What came of it. Figures that a task does not have are NaN.
+struct ServoTrialResult
+{
+  std::uint64_t seed = 0;
+  bool is_success = false;
+  std::string outcome; ///< one line: why not, where it failed
+  double servoing_from_s = -1, duration_s = 0;
+  double bearing_rms_deg, distance_rms; ///< hold, circle: true errors over the last 5 s; distance relative
+  double distance_mean;                 ///< of the same: what does not average out
+  double ratio_rms;                     ///< of r/d against the one asked for: the image's share of distance_rms
+  double turned_deg;                    ///< circle: how far round
+  double least_clearance = 0;           ///< body's origin to bark [m]
+  double gap_width;                     ///< gap: true free width of the one passed [m]
+  bool is_other_gap = false;            ///< gap: not the one that the scenario has set up
+  double progress, mean_speed;          ///< slalom [m], [m/s]
+  double median_loop_ms = 0, p95_loop_ms = 0;
+  double hover_after_s, drift;          ///< fault: until it hovered [s]; how far it moved while it lasted [m]
+  LoopRecord record;
+
+  ServoTrialResult();
+};
+
+/// Flies it. Success: hold and circle: right trunk, rms of the true bearing within 0.5 degrees and of the distance
+/// within 3 % over the last 5 s (circle: once round too); gap: through one that is wide enough; slalom: to the end of the line; all without
+/// touching a trunk.
+ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatcher &watcher = {});
+} // namespace bole

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Rotation of the body between two stamps from its gyro, with a covariance that knows the bias,
+/// and the bias itself, learnt from rotations that are better than the gyro's.
+///
+/// Idea: over a frame the white noise of a MEMS gyro averages out and what is left is its bias (0.2
+/// to 0.6 deg/s on the rendered flights). So the bias is a state with a covariance: every rotation
+/// says how much of its uncertainty is common to all of them, and a rotation refined by points
+/// gives the bias back.
+///
+/// Laws (each a test): a constant rate over dt integrates to Exp(rate dt); rotations of adjoining
+/// intervals multiply; refining with the rotation that the gyro itself gave leaves the bias where
+/// it was.
+
+#include "geometry/so3.h"
+#include <bole/frame.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace bole
+{
+struct GyroOptions
+{
+  /// White noise of the rate [rad/s/sqrt(Hz)], > 0. Measured on the rendered flights: 0.0022 rad/s
+  /// over 0.1 s.
+  double noise_density = 8e-4;
+  /// Standard deviation of the unknown bias at the start [rad/s], >= 0.
+  double bias_sigma = 0.008;
+  /// Random walk of the bias [rad/s/sqrt(s)], >= 0.
+  double bias_walk = 1e-4;
+  /// A gap between samples longer than this [s], > 0, is not bridged as known: the rate in it is
+  /// taken to have the standard deviation gap_rate_sigma.
+  double max_gap = 0.1;
+  double gap_rate_sigma = 0.5; ///< [rad/s], > 0
+
+  /// Throws vpException: "gyro.name = value, must be ...".
+  void validate() const;
+};
+
+/// Bias of the gyro [rad/s] in the body frame.
+struct GyroBias
+{
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+
+  static GyroBias unknown(const GyroOptions &options);
+};
+
+/// Rotation b0Rb1 of the body over an interval, covariance in the right tangent of b0Rb1.
+struct GyroRotation
+{
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d white =
+      Eigen::Matrix3d::Zero(); ///< covariance by the white noise and by gaps [rad^2]
+  Eigen::Matrix3d bias = Eigen::Matrix3d::Zero(); ///< covariance by the uncertain bias [rad^2]
+  double duration = 0;                            ///< [s]
+  bool complete = false;                          ///< samples covered the interval without a gap
+
+  Eigen::Matrix3d covariance() const { return white + bias; }
+  /// This interval followed by the next one, under the same bias.
+  GyroRotation then(const GyroRotation &next) const;
+};
+
+/// Integrates \p samples (oldest first; those outside of the interval only help its ends) from \p
+/// from_ns to \p to_ns, rates less the bias, linear between samples, held at the ends. Without any
+/// sample: identity, not complete, with the covariance of a gap. Cost: 0.1 us a sample.
+GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns,
+                           std::int64_t to_ns, const GyroBias &bias = {},
+                           const GyroOptions &options = {});
+
+/// Bias after the rotation \p prior was refined to \p R with the covariance \p covariance [rad^2],
+/// the prior having been used in the refinement (a conditional Gaussian: exact to first order).
+/// Feed intervals that do not overlap.
+GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,
+                    const Eigen::Matrix3d &covariance, const GyroOptions &options = {});
+} // namespace bole

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The stage: from each frame to the relative rotation and direction of motion since earlier
+/// frames.
+///
+/// Idea: PointTracker follows corners, integrateGyro() and the pose filter say what to expect,
+/// estimateRelativePose() joins the three. The rotation it finds gives the gyro's bias back, so
+/// that after a few frames the gyro alone is several times better than at the start, also on frames
+/// without a single point.
+///
+/// Every missing part is allowed: no gyro, no odometry (a plain video), no points (a white wall);
+/// the status of each RelativePoseEstimate says what it rests on.
+///
+/// \code
+/// PointMotion motion(source.camera(), source.bMc());
+/// while (source.next(frame)) {
+///   for (const RelativeMotion &step : motion.process(frame)) {
+///     if (step.estimate.hasDirection()) { ... step.frames_back, step.estimate.aRb,
+///     step.estimate.direction ... }
+///   }
+/// }
+/// \endcode
+
+#include "motion/gyro.h"
+#include "motion/relative_pose.h"
+
+#include <deque>
+
+namespace bole
+{
+struct PointMotionOptions
+{
+  PointOptions points;
+  RelativePoseOptions relative_pose;
+  GyroOptions gyro;
+  bool use_gyro = true;
+  bool use_odometry = true;
+  std::vector<int> frames_back{1, 3}; ///< each 1 .. points.history - 1
+  /// The pose filter's errors. Measured on the rendered flights (120 frames of 0.1 s, three seeds):
+  /// in the horizontal plane they walk, 11 mm a frame; the height has white noise, 27 mm between
+  /// any two frames; and the same holds of the attitude (roll, pitch 0.006 rad between any two
+  /// frames, white, yaw 0.0065 rad and walking).
+  double odometry_walk = 0.036;          ///< horizontal [m/sqrt(s)], > 0
+  double odometry_height_sigma = 0.027;  ///< of the difference of two heights [m], > 0
+  double odometry_relative_sigma = 0.03; ///< error in proportion to the path (scale, heading), > 0
+
+  /// Throws vpException: "name = value, must be ...".
+  void validate() const;
+};
+
+/// Motion of the camera from frame a (\p frames_back before) to the current frame b.
+struct RelativeMotion
+{
+  int frames_back = 1; ///< counted in frames that were processed
+  std::int64_t a_ns = 0, b_ns = 0;
+  std::size_t a_index = 0, b_index = 0; ///< Frame::index
+  RelativePoseEstimate estimate;
+  std::optional<GyroRotation> gyro; ///< of the body, the prior that was used
+  std::optional<Eigen::Vector3d>
+      odometry; ///< aMb's translation by the pose filter, camera axes [m]
+};
+
+class PointMotion
+{
+public:
+  PointMotion(const PinholeCamera &camera, const Pose &bMc, const PointMotionOptions &options = {});
+
+  /// One RelativeMotion for each entry of frames_back that the video reaches. Frames that are not
+  /// ok are passed over: the next one is tracked from the last good one.
+  std::vector<RelativeMotion> process(const Frame &frame);
+
+  const PointTracker &tracker() const { return m_tracker; }
+  /// How many frames back it remembers, and Frame::index of the one \p back frames before the current one.
+  int framesBack() const { return static_cast<int>(m_seen.size()) - 1; }
+  std::size_t frameIndex(int back) const { return (m_seen.rbegin() + back)->index; }
+  const GyroBias &gyroBias() const { return m_bias; }
+
+private:
+  struct Seen
+  {
+    std::int64_t stamp_ns;
+    std::size_t index;
+    std::optional<Pose> wMb;
+  };
+  std::optional<GyroRotation> gyroSince(std::int64_t from_ns, std::int64_t to_ns) const;
+  RelativeMotion relativeTo(int frames_back) const;
+  void learnBias(const RelativeMotion &step);
+
+  PinholeCamera m_camera;
+  Pose m_bMc;
+  PointMotionOptions m_options;
+  PointTracker m_tracker;
+  GyroBias m_bias;
+  std::deque<Seen> m_seen;          ///< oldest first, the current frame last
+  std::vector<GyroSample> m_gyro;   ///< since the oldest frame of m_seen
+  std::int64_t m_bias_until_ns = 0; ///< end of the last interval that taught the bias
+};
+} // namespace bole

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A few corners, spread over the image and tracked from frame to frame: the paper's own future
+/// work
+/// ("track a small number of point features to aid in pose estimation", Section 9).
+///
+/// Idea: Shi-Tomasi corners, the strongest of each cell of a grid, followed by pyramidal
+/// Lucas-Kanade (both OpenCV's). A track lives as long as it, followed forward and back again, ends
+/// where it began. Lost tracks are replaced where the image is empty of them, so a wall in view
+/// costs tracks there and nowhere else.
+///
+/// Positions are pixels of the rectified image, pixel centres whole. One instance a video; not
+/// thread-safe. Cost: about 2 ms a frame at 320x240 with 150 points in one thread
+/// (benchmark_motion).
+
+#include <bole/camera.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+#include <visp3/core/vpImage.h>
+
+namespace bole
+{
+struct PointOptions
+{
+  int max_points = 150; ///< tracks at a time, 8 .. 5000; more cost time and add little below 0.1 px
+  int columns = 8, rows = 6;  ///< cells of the grid that spreads the corners, >= 1
+  double min_distance_px = 8; ///< between a new corner and any other, >= 1
+  double quality = 0.01;      ///< of a corner against the strongest of the image, 0 .. 1
+  double min_response =
+      1e-5; ///< smallest eigenvalue of the gradient moments of a corner, grey 0 .. 1, >= 0
+  int window_px = 11;  ///< side of the Lucas-Kanade window, odd, 5 .. 51
+  int levels = 3;      ///< pyramid levels above the image, 0 .. 6: 3 follow 20 px a frame and more
+  int iterations = 10; ///< of Lucas-Kanade a level, 1 .. 100
+  double max_backward_px = 0.3; ///< forward-backward error above which a track ends, > 0
+  double margin_px = 4;         ///< from the border of the image, >= 0
+  int history = 32;             ///< frames a track remembers, 2 .. 1000
+
+  /// Throws vpException: "points.name = value, must be ...".
+  void validate() const;
+};
+
+/// A corner over the last frames.
+struct PointTrack
+{
+  std::uint64_t id = 0;                      ///< never used twice
+  std::vector<Eigen::Vector2d> positions_px; ///< oldest first; the last one is in the current frame
+  double response = 0;                       ///< of the corner where it was found
+
+  const Eigen::Vector2d &current() const { return positions_px.back(); }
+  /// Number of frames back to which the track reaches: 0 for a new one.
+  int age() const { return static_cast<int>(positions_px.size()) - 1; }
+};
+
+/// One corner in two frames, a (earlier) and b (later).
+struct PointMatch
+{
+  Eigen::Vector2d a_px, b_px;
+  std::uint64_t id = 0;
+};
+
+/// Example:
+/// \code
+/// PointTracker points(camera);
+/// while (source.next(frame)) {
+///   points.track(frame.image);
+///   const auto matches = points.matches(3); // between the current frame and the third before it
+/// }
+/// \endcode
+class PointTracker
+{
+public:
+  explicit PointTracker(const PinholeCamera &camera, const PointOptions &options = {});
+  ~PointTracker();
+  PointTracker(PointTracker &&) noexcept;
+  PointTracker &operator=(PointTracker &&) noexcept;
+
+  /// Follows the tracks into \p image and replenishes them. \p aRb is the expected rotation from
+  /// this frame (b) to the one before (a), camera axes: it moves the start of the search. An image
+  /// of another size than the camera's throws vpException.
+  void track(const vpImage<unsigned char> &image,
+             const Eigen::Matrix3d &aRb = Eigen::Matrix3d::Identity());
+
+  const std::vector<PointTrack> &tracks() const;
+  /// Tracks seen in the current frame and in the one \p frames_back before it (1: the last one).
+  std::vector<PointMatch> matches(int frames_back) const;
+  /// Frames seen since the start or the last reset().
+  std::size_t frames() const;
+  /// Forgets all tracks: after a jump of the video.
+  void reset();
+
+private:
+  struct State;
+  std::unique_ptr<State> m_state;
+};
+} // namespace bole

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Relative rotation and direction of translation of one camera between two frames, from point
+/// matches.
+///
+/// Idea: a static point seen along x_a from frame a and x_b from frame b lies in a plane with both
+/// camera centres: x_a . (d x aRb x_b) = 0. The distance of each match from fulfilling it
+/// (Sampson's form: pixels of noise in both images, to first order) is minimised jointly over the
+/// rotation and the direction d on their manifold, five degrees of freedom, by Gauss-Newton with
+/// redescending weights: what moves by itself, and what was matched wrongly, loses its say. Gyro
+/// and pose filter enter as Gaussian priors; without them the start comes from a rotation-only fit
+/// and two-point directions drawn at random.
+///
+/// Frames: camera axes (x right, y down, z forward). `aRb` takes coordinates of b to a; `direction`
+/// is the unit vector from a's centre to b's, in frame a: aMb = (aRb, scale * direction), the scale
+/// is not seen. Covariance: order (phi, tau), phi [rad] in the right tangent aRb * Exp(phi), tau
+/// [rad] in the tangent plane of the direction: directionPlus(direction, tau) in the basis
+/// directionBasis(direction).
+///
+/// Laws (each a test): the Jacobian of sampsonResidual() agrees with central differences; exact
+/// matches give the exact motion; swapping a and b inverts it; a camera that only turns gets the
+/// rotation and the status no_parallax.
+///
+/// Cost: about 0.3 ms for 150 matches with a gyro, 1 ms without.
+
+#include <bole/camera.h>
+#include "geometry/direction.h"
+#include <bole/trunk.h>
+#include "motion/point_tracker.h"
+
+#include <optional>
+#include <vector>
+
+namespace bole
+{
+struct RelativePoseOptions
+{
+  int min_matches = 12;       ///< below it nothing is estimated, >= 6
+  double min_sigma_px = 0.05; ///< floor of the residual noise, > 0
+  double max_sigma_px = 1.5;  ///< above it the matches do not agree on one motion, > min_sigma_px
+  double kernel = 3;          ///< residuals lose half their weight near this many sigmas, > 0
+  int iterations = 12;        ///< of Gauss-Newton, 1 .. 100
+  int hypotheses = 48;        ///< two-point directions tried without a prior, 1 .. 10000
+  double min_parallax_ratio =
+      2; ///< variance of the flow along over across the epipolar lines for a translation, > 1
+  /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent.
+  /// Chosen so that the normalised error squared of the rendered flights is near its degrees of
+  /// freedom.
+  double inflation = 3;
+  unsigned seed = 1; ///< of the draws
+
+  /// Throws vpException: "relative_pose.name = value, must be ...".
+  void validate() const;
+};
+
+/// What is known before the matches are looked at.
+struct RelativePosePrior
+{
+  std::optional<Eigen::Matrix3d> aRb;                            ///< gyro
+  Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero(); ///< right tangent of aRb [rad^2]
+  std::optional<Eigen::Vector3d> translation; ///< pose filter: b's centre in a [m]
+  Eigen::Matrix3d translation_covariance = Eigen::Matrix3d::Zero(); ///< [m^2]
+};
+
+enum class RelativePoseStatus
+{
+  ok,
+  too_few_points, ///< nothing estimated: rotation and direction are the prior's
+  no_parallax,    ///< rotation only: the direction is the prior's (or z), with the covariance that
+                  ///< says so
+  ambiguous,      ///< two motions explain the matches equally well (a plane in view, no prior)
+  inconsistent    ///< the matches do not agree on a motion: rotation and direction are the prior's
+};
+const char *toString(RelativePoseStatus status);
+
+struct RelativePoseEstimate
+{
+  RelativePoseStatus status = RelativePoseStatus::too_few_points;
+  Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  Matrix5d covariance = Matrix5d::Identity(); ///< (phi, tau) [rad^2]
+  double sigma_px = 0;                        ///< noise of a match, one coordinate
+  double parallax_px = 0;                     ///< median flow left when the rotation is taken out
+  double parallax_ratio = 0;                  ///< see RelativePoseOptions::min_parallax_ratio
+  std::vector<double> weights;                ///< of the matches, 0 .. 1
+
+  bool hasRotation() const
+  {
+    return status == RelativePoseStatus::ok || status == RelativePoseStatus::no_parallax;
+  }
+  bool hasDirection() const { return status == RelativePoseStatus::ok; }
+};
+
+/// Sampson's distance [normalised image units] of the match (x_a, x_b), both (x, y, 1), from the
+/// epipolar geometry of (aRb, direction). \p J 1x5 by (phi, tau), or nullptr.
+double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b,
+                       const Eigen::Matrix3d &aRb, const Eigen::Vector3d &direction,
+                       Eigen::Matrix<double, 1, 5> *J = nullptr);
+
+/// The motion between the frames of \p matches. Never throws on data; see the status.
+RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches,
+                                          const PinholeCamera &camera,
+                                          const RelativePosePrior &prior = {},
+                                          const RelativePoseOptions &options = {});
+} // namespace bole

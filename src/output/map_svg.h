@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The map seen from above as an SVG picture (the paper's Fig. 6).
+
+#include "input/trajectory.h"
+#include "input/truth.h"
+#include <bole/trunk_record.h>
+
+#include <string>
+#include <vector>
+
+namespace bole
+{
+/// What is drawn; empty parts are left out. World frame, [m].
+struct MapPicture
+{
+  std::string title;
+  std::string caption;                 ///< under the title: where the metre and up come from
+  std::vector<TrunkRecord> trunks;     ///< confirmed: filled circle to scale with its 2-sigma ellipse; candidates: outline
+  Trajectory smoothed, online, odometry, truth;
+  std::vector<TruthTrunk> truth_trunks; ///< within the frame of the picture
+};
+
+/// One metre is 40 px; the picture holds the trajectories and the confirmed trunks.
+std::string toSvg(const MapPicture &picture);
+
+/// Writes toSvg() atomically.
+void writeMap(const std::string &path, const MapPicture &picture);
+} // namespace bole

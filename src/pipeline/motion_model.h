@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the sensors say of the motion between two frames, as the smoother wants it.
+///
+/// Idea: a pose filter's errors are not one random walk. Its horizontal steps are (optical flow on the ground: noise of
+/// a centimetre a frame, a scale that is off by some per cent), but its height (sonar) and its roll and pitch (gravity)
+/// scatter round the truth and do not drift, and its yaw scatters too where a gyro hardly moves. So the rotation of a
+/// step comes from the gyro where there is one, the translation from the filter, and height, roll and pitch enter as
+/// measurements of the pose itself.
+///
+/// Frames: a the body at the frame before, b the body now, w world.
+
+#include <bole/frame.h>
+#include "motion/gyro.h"
+#include "smoothing/factors.h"
+
+#include <optional>
+
+namespace bole
+{
+struct MotionModelOptions
+{
+  double step_sigma = 0.012;           ///< horizontal noise of a step of the pose filter [m], 1e-4 to 1
+  double step_scale_sigma = 0.03;      ///< error of a step in proportion to its length, 0 to 1
+  double scale_sigma = 0.03;           ///< of the one scale by which all steps of the filter are off, 0 to 1
+  double step_sigma_vertical = 0.03;   ///< [m], 1e-4 to 1
+  double height_sigma = 0.02;          ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
+  double tilt_sigma = 0.005;           ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
+  double turn_sigma = 0.006;           ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
+  double gyro_turn_sigma = 0.0008;     ///< least noise of the gyro's rotation between frames [rad], 1e-6 to 1
+  double free_step_sigma = 0.15;       ///< of a step that nothing measured (constant velocity) [m], 1e-3 to 10
+  double free_turn_sigma = 0.02;       ///< of a turn that nothing measured [rad], 1e-4 to 1
+
+  void validate() const; ///< \throw vpException naming the option, its value and the range
+};
+
+/// One step: what the smoother is given for a new frame.
+struct MotionStep
+{
+  Pose aMb;
+  Matrix6d covariance = Matrix6d::Identity(); ///< of (rho, phi) at aMb
+  std::optional<PosePrior> absolute;          ///< height, roll and pitch of b in the world
+  bool turn_from_gyro = false;
+  bool step_from_odometry = false;
+};
+
+class MotionModel
+{
+public:
+  explicit MotionModel(const MotionModelOptions &options = {}, const GyroOptions &gyro = {});
+
+  /// Pose and covariance of the first frame.
+  PosePrior first(const Frame &frame) const;
+
+  /// The step from the frame of the last call (or of first()) to \p frame. \p wMa: the pose there as it is known now;
+  /// \p velocity: of the body in its own frame as it is known, for what nothing measured.
+  MotionStep step(const Frame &frame, const Pose &wMa, const GyroBias &bias, const Vector6d &velocity);
+
+  /// Remembers \p frame as the one the next step starts from.
+  void advance(const Frame &frame);
+
+private:
+  MotionModelOptions m_options;
+  GyroOptions m_gyro;
+  std::optional<Pose> m_odometry; ///< at the last frame
+  std::int64_t m_stamp_ns = 0;
+};
+} // namespace bole

@@ -1,0 +1,411 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/so3.h"
+#include "input/asl_source.h"
+#include "evaluation/assignment.h"
+#include <bole/evaluation.h>
+#include "evaluation/trajectory_metrics.h"
+#include "output/trajectory_writer.h"
+#include "evaluation/trunk_metrics.h"
+#include "output/trunks_csv.h"
+#include "evaluation/visibility.h"
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <numeric>
+#include <random>
+#include <visp3/core/vpException.h>
+
+using namespace bole;
+
+namespace
+{
+constexpr double kDegree = M_PI / 180;
+
+Pose poseAt(double x, double y, double z, double yaw) { return {expSo3({0, 0, yaw}), {x, y, z}}; }
+
+/// A curve that is not a line, one pose each 0.1 s.
+Trajectory curve(std::size_t poses)
+{
+  Trajectory trajectory;
+  for (std::size_t i = 0; i < poses; ++i) {
+    const double s = 0.1 * static_cast<double>(i);
+    trajectory.push_back(
+        {static_cast<std::int64_t>(i) * 100000000, poseAt(s, std::sin(s), 1.2, 0.3 * s)});
+  }
+  return trajectory;
+}
+
+/// The trajectory whose image under \p transform is \p truth.
+Trajectory undone(const PlanarTransform &transform, const Trajectory &truth)
+{
+  Trajectory estimate = truth;
+  for (StampedPose &pose : estimate) {
+    const Eigen::Vector2d xy = transform.linear().inverse() * (pose.wMb.t.head<2>() - transform.t);
+    pose.wMb.t.head<2>() = xy;
+    pose.wMb.R = expSo3({0, 0, -transform.yaw}) * pose.wMb.R;
+  }
+  return estimate;
+}
+
+TrunkRecord confirmed(int id, double x, double y, double radius = 0.2, double variance = 0.01)
+{
+  TrunkRecord trunk;
+  trunk.id = id;
+  trunk.xy = {x, y};
+  trunk.radius = radius;
+  trunk.covariance_xy = variance * Eigen::Matrix2d::Identity();
+  trunk.status = TrunkStatus::confirmed;
+  return trunk;
+}
+
+TruthTrunk tree(int id, double x, double y, double radius = 0.2) { return {id, {x, y}, radius, 0}; }
+
+TrunkVisibility expected() { return {20, 15, 3, true}; }
+
+const Alignments kIdentity{};
+} // namespace
+
+TEST(Assignment, IsAsGoodAsTheBestOfAllPermutations)
+{
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Index n = 1 + trial % 6, m = 1 + (trial / 6) % 6;
+    Eigen::MatrixXd cost(n, m);
+    for (Eigen::Index i = 0; i < n * m; ++i)
+      cost.data()[i] = uniform(random);
+    const double gate = 0.6;
+
+    const std::vector<int> pairs = assign(cost, gate);
+
+    int count = 0;
+    double sum = 0;
+    std::vector<int> used(static_cast<std::size_t>(m), 0);
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (pairs[static_cast<std::size_t>(i)] >= 0) {
+        const int column = pairs[static_cast<std::size_t>(i)];
+        EXPECT_LE(cost(i, column), gate);
+        EXPECT_EQ(used[static_cast<std::size_t>(column)]++, 0);
+        ++count;
+        sum += cost(i, column);
+      }
+    std::vector<int> order(static_cast<std::size_t>(std::max(n, m)));
+    std::iota(order.begin(), order.end(), 0);
+    int best_count = 0;
+    double best_sum = 0;
+    do {
+      int c = 0;
+      double s = 0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const int column = order[static_cast<std::size_t>(i)];
+        if (column < m && cost(i, column) <= gate) {
+          ++c;
+          s += cost(i, column);
+        }
+      }
+      if (c > best_count || (c == best_count && s < best_sum)) {
+        best_count = c;
+        best_sum = s;
+      }
+    } while (std::next_permutation(order.begin(), order.end()));
+    EXPECT_EQ(count, best_count);
+    EXPECT_NEAR(sum, best_sum, 1e-12);
+  }
+}
+
+TEST(Assignment, GivesNobodyAPartnerInAnEmptySet)
+{
+  EXPECT_EQ(assign(Eigen::MatrixXd(2, 0), 1), (std::vector<int>{-1, -1}));
+  EXPECT_TRUE(assign(Eigen::MatrixXd(0, 3), 1).empty());
+}
+
+TEST(TrajectoryMetrics, AlignmentRecoversAPlanarTransformExactly)
+{
+  const Trajectory truth = curve(60);
+  const PlanarTransform transform{1.3, 2.5, {4, -7}, 0};
+  const auto pairs = pairPoses(undone(transform, truth), truth);
+
+  const PlanarTransform scaled = align(pairs, Alignment::xy_yaw_scale);
+
+  EXPECT_NEAR(scaled.scale, 1.3, 1e-12);
+  EXPECT_NEAR(std::remainder(scaled.yaw - 2.5, 2 * M_PI), 0, 1e-12);
+  EXPECT_LT((scaled.t - transform.t).norm(), 1e-10);
+  EXPECT_NEAR(absoluteErrors(pairs, scaled).ate, 0, 1e-10);
+  EXPECT_NEAR(absoluteErrors(pairs, scaled).rotation_deg, 0, 1e-6);
+  EXPECT_GT(absoluteErrors(pairs, align(pairs, Alignment::xy_yaw)).ate, 0.1);
+}
+
+TEST(TrajectoryMetrics, AlignmentIsTheLeastSquaresOptimum)
+{
+  const Trajectory truth = curve(40);
+  Trajectory estimate = truth;
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(0, 0.2);
+  for (StampedPose &pose : estimate)
+    pose.wMb.t += Eigen::Vector3d(noise(random) + 1, noise(random), 0);
+  const auto pairs = pairPoses(estimate, truth);
+  const PlanarTransform best = align(pairs, Alignment::xy_yaw_scale);
+  const double least = absoluteErrors(pairs, best).ate;
+  for (const double step : {-1e-3, 1e-3}) {
+    PlanarTransform other = best;
+    other.scale += step;
+    EXPECT_GT(absoluteErrors(pairs, other).ate, least);
+    other = best;
+    other.yaw += step;
+    EXPECT_GT(absoluteErrors(pairs, other).ate, least);
+    other = best;
+    other.t.x() += step;
+    EXPECT_GT(absoluteErrors(pairs, other).ate, least);
+  }
+}
+
+TEST(TrajectoryMetrics, FirstPoseAlignmentPutsTheFirstPoseOnTheTruth)
+{
+  const Trajectory truth = curve(10);
+  const auto pairs = pairPoses(undone({1, 0.4, {2, 3}, 0}, truth), truth);
+  const PlanarTransform transform = align(pairs, Alignment::first_pose);
+  EXPECT_LT(((transform * pairs[0].estimate).minus(pairs[0].truth)).norm(), 1e-12);
+  EXPECT_NEAR(absoluteErrors(pairs, transform).ate, 0, 1e-12);
+}
+
+TEST(TrajectoryMetrics, AConstantOffsetIsTheAbsoluteErrorAndNoRelativeError)
+{
+  const Trajectory truth = curve(30);
+  Trajectory estimate = truth;
+  for (StampedPose &pose : estimate)
+    pose.wMb.t += Eigen::Vector3d(0.3, 0.4, 1.2);
+  const auto pairs = pairPoses(estimate, truth);
+  const TrajectoryErrors errors = absoluteErrors(pairs, {});
+  EXPECT_EQ(errors.poses, 30u);
+  EXPECT_NEAR(errors.ate, 1.3, 1e-12);
+  EXPECT_NEAR(errors.ate_xy, 0.5, 1e-12);
+  EXPECT_NEAR(relativeErrors(pairs, 1).translation, 0, 1e-12);
+  EXPECT_EQ(relativeErrors(pairs, 1).intervals, 20u);
+}
+
+TEST(TrajectoryMetrics, ADriftOfScaleIsTheRelativeErrorOfOneSecond)
+{
+  Trajectory truth, estimate;
+  for (int i = 0; i < 30; ++i) {
+    truth.push_back({i * 100000000LL, poseAt(0.1 * i, 0, 1, 0)});
+    estimate.push_back({i * 100000000LL, poseAt(0.11 * i, 0, 1, 0.01 * kDegree * i)});
+  }
+  const RelativeErrors errors = relativeErrors(pairPoses(estimate, truth), 1);
+  EXPECT_NEAR(errors.translation, 0.1, 1e-3);
+  EXPECT_NEAR(errors.rotation_deg, 0.1, 1e-9);
+}
+
+TEST(TrajectoryMetrics, IgnoresPosesOutsideTheTruth)
+{
+  const Trajectory truth = curve(10);
+  Trajectory estimate = truth;
+  estimate.push_back({5000000000LL, Pose()});
+  EXPECT_EQ(pairPoses(estimate, truth).size(), 10u);
+}
+
+TEST(TrunkMetrics, CountsMatchesMissesDuplicatesAndFalsePositives)
+{
+  const std::vector<TruthTrunk> truth = {
+      tree(0, 5, 0), tree(1, 5, 3), tree(2, 8, -2), {10000, {40, 0}, 0, 0}};
+  const std::vector<TrunkVisibility> seen = {expected(), expected(), expected(), {}};
+  std::vector<TrunkRecord> map = {confirmed(7, 5.1, 0), confirmed(8, 5, 0.3), confirmed(9, 40, 0.2),
+                                  confirmed(10, 20, 20), confirmed(11, 8, -2)};
+  map.back().status = TrunkStatus::candidate;
+
+  const TrunkMetrics metrics = trunkMetrics(map, truth, seen, kIdentity);
+
+  EXPECT_EQ(metrics.confirmed, 4u);
+  EXPECT_DOUBLE_EQ(metrics.precision, 0.5);
+  EXPECT_DOUBLE_EQ(metrics.duplicates, 0.25);
+  EXPECT_DOUBLE_EQ(metrics.recall, 1.0 / 3);
+  EXPECT_NEAR(metrics.f1, 2 * 0.5 / 3 / (0.5 + 1.0 / 3), 1e-12);
+  ASSERT_EQ(metrics.matches.size(), 2u);
+  EXPECT_EQ(metrics.matches[0].estimate.id, 7);
+  ASSERT_EQ(metrics.misses.size(), 2u);
+  EXPECT_EQ(metrics.misses[1].id, 2);
+  EXPECT_EQ(metrics.misses[1].nearest_id, 11);
+  ASSERT_EQ(metrics.false_positives.size(), 2u);
+  EXPECT_TRUE(metrics.false_positives[0].is_duplicate);
+  EXPECT_EQ(metrics.false_positives[0].nearest_id, 0);
+  EXPECT_FALSE(metrics.false_positives[1].is_duplicate);
+}
+
+TEST(TrunkMetrics, MeasuresPositionRadiusAndHonesty)
+{
+  const std::vector<TruthTrunk> truth = {tree(0, 5, 0, 0.2), tree(1, 5, 3, 0.3),
+                                         tree(2, 9, 9, 0.1)};
+  const std::vector<TrunkVisibility> seen(3, expected());
+  const std::vector<TrunkRecord> map = {confirmed(0, 5.1, 0, 0.21, 0.01),
+                                        confirmed(1, 5, 3.2, 0.27, 0.01),
+                                        confirmed(2, 9, 9.3, 0.1, 0.01)};
+
+  const TrunkErrors errors = trunkMetrics(map, truth, seen, kIdentity).all;
+
+  EXPECT_NEAR(errors.median[0], 0.2, 1e-12);
+  EXPECT_NEAR(errors.rmse[0], std::sqrt((0.01 + 0.04 + 0.09) / 3), 1e-12);
+  EXPECT_NEAR(errors.nees_half, (1 + 4 + 9) / 6.0, 1e-9);
+  EXPECT_NEAR(errors.predicted_sigma, std::sqrt(0.02), 1e-12);
+  EXPECT_NEAR(errors.radius_rmse, std::sqrt((1e-4 + 9e-4) / 3), 1e-12);
+  EXPECT_NEAR(errors.radius_bias, -0.02 / 3, 1e-12);
+}
+
+TEST(TrunkMetrics, TurnsTheCovarianceWithTheGauge)
+{
+  TrunkRecord trunk = confirmed(0, 0, 0);
+  trunk.covariance_xy = Eigen::Vector2d(0.04, 0.0001).asDiagonal();
+  Alignments alignments{};
+  alignments[static_cast<std::size_t>(Alignment::first_pose)] = {1, M_PI / 2, {5, 0.2}, 0};
+  alignments[static_cast<std::size_t>(Alignment::xy_yaw)] = {1, M_PI / 2, {5, 0.2}, 0};
+
+  const TrunkMetrics metrics = trunkMetrics({trunk}, {tree(0, 5, 0)}, {expected()}, alignments);
+
+  ASSERT_EQ(metrics.matches.size(), 1u);
+  EXPECT_NEAR(metrics.matches[0].nees_half, 0.5, 1e-9);
+}
+
+TEST(TrunkMetrics, BinsAddUpToTheWhole)
+{
+  std::vector<TruthTrunk> truth;
+  std::vector<TrunkVisibility> seen;
+  std::vector<TrunkRecord> map;
+  for (int i = 0; i < 12; ++i) {
+    truth.push_back(tree(i, 3 * i, 0));
+    seen.push_back({20, 5.0 * i + 3, 0.6 * i + 0.5, true});
+    if (i % 3 != 0)
+      map.push_back(confirmed(i, 3 * i, 0.1));
+  }
+  const TrunkMetrics metrics = trunkMetrics(map, truth, seen, kIdentity);
+  for (const auto *bins : {&metrics.by_range, &metrics.by_parallax}) {
+    std::size_t expected_sum = 0, found = 0;
+    for (const TrunkBin &bin : *bins) {
+      expected_sum += bin.errors.expected;
+      found += bin.errors.found;
+    }
+    EXPECT_EQ(expected_sum, 12u);
+    EXPECT_EQ(found, 8u);
+  }
+}
+
+TEST(TrunkMetrics, SurvivesAnEmptyMapAndAnEmptyTruth)
+{
+  EXPECT_EQ(trunkMetrics({}, {tree(0, 1, 1)}, {expected()}, kIdentity).misses.size(), 1u);
+  EXPECT_EQ(trunkMetrics({confirmed(0, 1, 1)}, {}, {}, kIdentity).false_positives.size(), 1u);
+}
+
+namespace
+{
+const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(),
+                    Eigen::Vector3d::Zero());
+
+std::vector<Pose> walk(std::size_t frames)
+{
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < frames; ++i)
+    poses.push_back(poseAt(0, 0.1 * static_cast<double>(i), 1.2, 0));
+  return poses;
+}
+} // namespace
+
+TEST(Visibility, ExpectsTrunksThatAreNearInsideAndFree)
+{
+  // Facing x, moving along y by 0.9 m: a trunk at 5 m changes its bearing by 10 degrees.
+  const std::vector<TruthTrunk> trunks = {
+      tree(0, 5, 0.5),         // seen
+      tree(1, 7.5, 0.75, 0.1), // behind trunk 0 in part of the frames
+      tree(2, 9, 0),           // too far
+      tree(3, -5, 0),          // behind the camera
+      tree(4, 1, 3),           // outside the image
+      {10000, {5, -0.5}, 0, 0} // no radius
+  };
+  const auto seen = trunkVisibility(trunks, walk(10), kForward, PinholeCamera());
+
+  EXPECT_TRUE(seen[0].is_expected);
+  EXPECT_EQ(seen[0].frames, 10u);
+  EXPECT_NEAR(seen[0].bearing_change, (std::atan(0.1) + std::atan(0.08)) / kDegree, 1e-9);
+  EXPECT_NEAR(seen[0].min_range, 5, 1e-9);
+  EXPECT_LT(seen[1].frames, 10u);
+  EXPECT_GT(seen[1].frames, 0u);
+  for (std::size_t i = 2; i < trunks.size(); ++i)
+    EXPECT_EQ(seen[i].frames, 0u) << i;
+}
+
+TEST(Visibility, AsksForEnoughFramesAndParallax)
+{
+  const std::vector<TruthTrunk> trunks = {tree(0, 5, 0.5)};
+  EXPECT_FALSE(trunkVisibility(trunks, walk(7), kForward, PinholeCamera())[0].is_expected);
+  EXPECT_TRUE(trunkVisibility(trunks, walk(8), kForward, PinholeCamera())[0].is_expected);
+  const std::vector<Pose> still(20, poseAt(0, 0, 1.2, 0));
+  EXPECT_FALSE(trunkVisibility(trunks, still, kForward, PinholeCamera())[0].is_expected);
+}
+
+TEST(Visibility, AddsUpWhatSeveralNearerTrunksHide)
+{
+  // Two thin trunks that overlap each other cover the left 60 % of a thick one.
+  const std::vector<Pose> still(1, poseAt(0, 0, 1.2, 0));
+  const std::vector<TruthTrunk> half = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05)};
+  EXPECT_EQ(trunkVisibility(half, still, kForward, PinholeCamera())[0].frames, 1u);
+  const std::vector<TruthTrunk> most = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05),
+                                        tree(2, 3.2, 0.02, 0.06)};
+  EXPECT_EQ(trunkVisibility(most, still, kForward, PinholeCamera())[0].frames, 0u);
+}
+
+/// Runs made up from the true flight: moved in the plane, and by another clock.
+class RunAgainst : public testing::Test
+{
+protected:
+  static constexpr const char *kFlight = BOLE_SOURCE_DIR "/data/park-forward";
+
+  std::string writeRun(const std::string &name, double metres_off, std::int64_t ns_off,
+                       const std::vector<TrunkRecord> &map) const
+  {
+    const std::string folder = testing::TempDir() + "bole_evaluate_" + name;
+    std::filesystem::create_directories(folder);
+    const AslSource source(kFlight);
+    Trajectory run;
+    for (const std::int64_t stamp_ns : source.stamps())
+      if (const auto wMb = interpolate(source.truth(), stamp_ns)) {
+        run.push_back({stamp_ns + ns_off, *wMb});
+        run.back().wMb.t.x() += metres_off;
+      }
+    writeTrajectory(folder + "/trajectory.tum", run);
+    writeTrunks(folder + "/trunks.csv", map);
+    return folder;
+  }
+};
+
+TEST_F(RunAgainst, TheClockOfALiveRunIsFoundByItsMotionWhenAsked)
+{
+  // another clock, another place, and the first three frames were lost
+  const std::string run = writeRun("live", 3, 100'037'000'000, {});
+  Trajectory late = readTumTrajectory(run + "/trajectory.tum");
+  late.erase(late.begin(), late.begin() + 3);
+  writeTrajectory(run + "/trajectory.tum", late);
+  EXPECT_THROW(evaluate(run, kFlight), vpException);
+  const Evaluation evaluation = evaluate(run, kFlight, {true});
+  ASSERT_TRUE(evaluation.time_shift_s);
+  EXPECT_NEAR(*evaluation.time_shift_s, -100.037, 0.0011);
+  EXPECT_EQ(evaluation.smoothed.absolute[0].poses, late.size());
+  EXPECT_LT(evaluation.smoothed.absolute[2].ate, 3e-3);
+}
+
+TEST_F(RunAgainst, AnotherRunStandsForTheTruth)
+{
+  TrunkRecord candidate = confirmed(3, 9, 9);
+  candidate.status = TrunkStatus::candidate;
+  const std::string one =
+      writeRun("one", 0, 0, {confirmed(1, 5, 1, 0.2), confirmed(2, 7, -2, 0.3), candidate});
+  const std::string other =
+      writeRun("other", 2, 0, {confirmed(7, 7.1, 1, 0.25), confirmed(8, 20, 4)});
+  const Evaluation evaluation = evaluate(other, one);
+  EXPECT_TRUE(evaluation.is_against_run);
+  ASSERT_TRUE(evaluation.trunks);
+  EXPECT_DOUBLE_EQ(evaluation.trunks->recall, 0.5);    // of its two confirmed trunks
+  EXPECT_DOUBLE_EQ(evaluation.trunks->precision, 0.5);
+  EXPECT_NEAR(evaluation.trunks->all.median[2], 0.1, 1e-4); // after the shift by 2 m
+  EXPECT_NEAR(evaluation.trunks->all.radius_rmse, 0.05, 1e-4);
+  EXPECT_NEAR(evaluation.smoothed.absolute[0].ate, 2, 1e-4);
+  EXPECT_NEAR(evaluation.smoothed.absolute[2].ate, 0, 1e-4);
+}

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/forest_renderer.h"
+#include "lab/simulation/h264_link.h"
+#include "lab/simulation/simulated_flight.h"
+
+#include "geometry/so3.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+/// A single straight pole 4 m ahead on flat ground, and scenery without a tree.
+Forest singlePole(Light light = Light::overcast)
+{
+  ForestOptions options;
+  options.density = 0;
+  options.undergrowth = options.saplings = options.ground_amplitude = options.crown_leaves = 0;
+  options.light = light;
+  SimulatedTrunk pole;
+  pole.foot = {4, 0.3, 0};
+  pole.radius = 0.2;
+  pole.taper = pole.flare = 0;
+  return Forest::plant(options, {{0, 0, 1.2}}, {pole});
+}
+
+Pose cameraAt(const Eigen::Vector3d &t, const Eigen::Vector3d &turn = Eigen::Vector3d::Zero())
+{
+  return Pose(expSo3(turn), t) * forwardCamera();
+}
+
+/// First and last column of trunk 0 in a row.
+std::pair<int, int> columnsOfTrunk(const RenderedFrame &frame, int row)
+{
+  int first = -1, last = -1;
+  for (int column = 0; column < static_cast<int>(frame.trunk_id.getWidth()); ++column) {
+    if (frame.trunk_id[row][column] == 0) {
+      first = first < 0 ? column : first;
+      last = column;
+    }
+  }
+  return {first, last};
+}
+
+TEST(ForestRenderer, BordersOfAStraightTrunkAreThoseOfTheRelativeTrunk)
+{
+  const Forest forest = singlePole();
+  ForestRenderer renderer(forest, {});
+  RenderedFrame frame;
+  const Pose wMc = cameraAt({0, 0, 1.2}, {0.05, 0.03, 0.04});
+  renderer.render(wMc, frame, true);
+
+  const RelativeTrunk relative = relativeTrunk(wMc, Pose(), forest.trunks.front().cylinder());
+  const PinholeCamera camera = renderer.camera().pinhole;
+  double left_error = 0, right_error = 0;
+  int rows = 0;
+  for (double elevation = -0.2; elevation < 0.4; elevation += 0.005, ++rows) {
+    // The border's line through two of its points, at the centre of the row.
+    const auto columnAt = [&](Border border, int row) {
+      const Eigen::Vector2d a = camera.project(relative.borderDirection(border, -0.2));
+      const Eigen::Vector2d b = camera.project(relative.borderDirection(border, 0.4));
+      return a.x() + (b.x() - a.x()) * (row - a.y()) / (b.y() - a.y());
+    };
+    const int row = static_cast<int>(
+        std::lround(camera.project(relative.borderDirection(Border::left, elevation)).y()));
+    const auto [first, last] = columnsOfTrunk(frame, row);
+    left_error += first - 0.5 - columnAt(Border::left, row);
+    right_error += last + 0.5 - columnAt(Border::right, row);
+    EXPECT_NEAR(first - 0.5, columnAt(Border::left, row), 0.7);
+    EXPECT_NEAR(last + 0.5, columnAt(Border::right, row), 0.7);
+  }
+  EXPECT_NEAR(left_error / rows, 0, 0.1);
+  EXPECT_NEAR(right_error / rows, 0, 0.1);
+}
+
+TEST(ForestRenderer, DepthIsAlongTheOpticalAxis)
+{
+  const Forest forest = singlePole();
+  ForestRenderer renderer(forest, {});
+  RenderedFrame frame;
+  renderer.render(cameraAt({0, 0, 1.2}), frame, true);
+  const int column = static_cast<int>(std::lround(159.5 - 200 * 0.3 / 4));
+  EXPECT_EQ(frame.trunk_id[120][column], 0);
+  EXPECT_NEAR(frame.depth[120][column], 3800, 10);
+  // Ground: 1.2 m below the camera, seen (v - cy) / f below the horizon.
+  EXPECT_NEAR(frame.depth[219][20], 1200 * 200 / 99.5, 10);
+  EXPECT_EQ(frame.trunk_id[219][20], 65535);
+  EXPECT_EQ(frame.depth[5][20], 65535);
+}
+
+TEST(ForestRenderer, SameInputSameBytes)
+{
+  ForestOptions options;
+  options.density = 0.05;
+  const Forest forest = Forest::plant(options, {{0, 0, 1.2}});
+  RenderedFrame a, b;
+  ForestRenderer first(forest, {}), second(forest, {});
+  first.render(cameraAt({0, 0, 1.2}), a);
+  second.render(cameraAt({0, 0, 1.2}), b);
+  EXPECT_TRUE(a.image == b.image);
+}
+
+TEST(ForestRenderer, MotionBlursWhatAStillCameraSeesSharp)
+{
+  RendererOptions options;
+  options.read_noise = options.shot_noise = 0;
+  options.samples_per_pixel = 16;
+  const Forest forest = singlePole();
+  ForestRenderer renderer(forest, options);
+  RenderedFrame still, moving;
+  renderer.render(cameraAt({0, 0, 1.2}), still);
+  renderer.render(cameraAt({0, 0, 1.2}, {0, 0, -0.03}), cameraAt({0, 0, 1.2}, {0, 0, 0.03}),
+                  moving);
+  const auto steepest = [](const vpImage<unsigned char> &image) {
+    int most = 0;
+    for (unsigned column = 90; column < 230; ++column) {
+      most = std::max(most, std::abs(int(image[60][column + 1]) - int(image[60][column])));
+    }
+    return most;
+  };
+  EXPECT_LT(2 * steepest(moving.image), steepest(still.image));
+}
+
+TEST(ForestRenderer, SunCastsTheShadowOfATrunk)
+{
+  RendererOptions options;
+  options.read_noise = options.shot_noise = 0;
+  const Forest forest = singlePole(Light::sun);
+  ForestRenderer renderer(forest, options);
+  // Straight down on the shadow, 1.5 m beside the foot, away from the sun.
+  const Eigen::Vector3d away =
+      Eigen::Vector3d(-forest.to_sun.x(), -forest.to_sun.y(), 0).normalized();
+  const Eigen::Vector3d above =
+      forest.trunks.front().foot + 1.5 * away + Eigen::Vector3d(0, 0, 1.2);
+  Eigen::Matrix3d down;
+  down << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  RenderedFrame frame;
+  renderer.render(Pose(down, above), frame);
+  const Eigen::Vector3d side = Eigen::Vector3d::UnitZ().cross(away);
+  const auto grey = [&](const Eigen::Vector3d &offset) {
+    const Eigen::Vector3d p = down.transpose() * (offset - Eigen::Vector3d(0, 0, 1.2));
+    const Eigen::Vector2d u = renderer.camera().pinhole.project(p);
+    double sum = 0;
+    for (int dy = -12; dy <= 12; ++dy) {
+      for (int dx = -12; dx <= 12; ++dx) {
+        sum += frame.image[static_cast<int>(u.y()) + dy][static_cast<int>(u.x()) + dx];
+      }
+    }
+    return sum / 625;
+  };
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  EXPECT_LT(1.2 * grey(none), grey(0.45 * side));
+  EXPECT_LT(1.2 * grey(none), grey(-0.45 * side));
+}
+
+TEST(ForestRenderer, AutomaticExposureReachesItsTargetInSteps)
+{
+  RendererOptions options;
+  options.exposure_target = 100;
+  const Forest forest = singlePole();
+  ForestRenderer renderer(forest, options);
+  RenderedFrame frame;
+  renderer.render(cameraAt({0, 0, 1.2}), frame);
+  double sum = 0;
+  for (unsigned k = 0; k < frame.image.getSize(); ++k) {
+    sum += frame.image.bitmap[k];
+  }
+  EXPECT_NEAR(sum / frame.image.getSize(), 100, 6);
+  const double steps = std::log(frame.gain) / std::log1p(options.gain_step);
+  EXPECT_NEAR(steps, std::round(steps), 1e-9);
+}
+
+TEST(ForestRenderer, LensBendsThePicture)
+{
+  RendererOptions options;
+  options.camera = {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
+  const Forest forest = singlePole();
+  ForestRenderer renderer(forest, options);
+  RenderedFrame frame;
+  const Pose wMc = cameraAt({0, 0, 1.2}, {0, 0, 0.6}); // the trunk near the right border
+  renderer.render(wMc, frame, true);
+  const RelativeTrunk relative = relativeTrunk(wMc, Pose(), forest.trunks.front().cylinder());
+  const auto bent = [&](Border border) {
+    const Eigen::Vector3d d = relative.borderDirection(border, 0);
+    return options.camera.distort(d.head<2>() / d.z());
+  };
+  const Eigen::Vector2d left = bent(Border::left), right = bent(Border::right);
+  ASSERT_LT(right.x(), 318);
+  const auto [first, last] = columnsOfTrunk(frame, static_cast<int>(std::lround(left.y())));
+  EXPECT_NEAR(first, left.x(), 1.0);
+  EXPECT_NEAR(last, right.x(), 1.0);
+}
+
+TEST(H264Link, LowerBitRateLosesMore)
+{
+  const Forest forest = singlePole();
+  const auto lossAt = [&](double kbps, std::size_t *bytes) {
+    ForestRenderer renderer(forest, {});
+    H264Link link(320, 240, 15, kbps);
+    RenderedFrame frame;
+    double loss = 0;
+    for (int k = 0; k < 10; ++k) {
+      renderer.render(cameraAt({0.05 * k, 0, 1.2}), frame);
+      const vpImage<unsigned char> sent = frame.image;
+      link.pass(frame.image);
+      *bytes += link.lastBytes();
+      for (unsigned n = 0; n < sent.getSize(); ++n) {
+        loss += std::abs(int(sent.bitmap[n]) - int(frame.image.bitmap[n]));
+      }
+    }
+    return loss / (10.0 * 320 * 240);
+  };
+  std::size_t few = 0, many = 0;
+  const double high_loss = lossAt(200, &few), low_loss = lossAt(4000, &many);
+  EXPECT_GT(high_loss, 1.3 * low_loss);
+  EXPECT_LT(low_loss, 5);
+  EXPECT_LT(2 * few, many);
+}
+
+TEST(H264Link, RefusesOddSizes) { EXPECT_THROW(H264Link(321, 240, 15, 1000), vpException); }
+} // namespace
+} // namespace bole

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/so3.h"
+#include "lab/simulation/vpSimulatorArDrone.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+using namespace bole;
+
+namespace
+{
+Forest clearing()
+{
+  ForestOptions options;
+  options.density = 0.02;
+  options.undergrowth = options.saplings = options.crown_leaves = 0;
+  return Forest::plant(options, {{0, 0, 1}, {4, 0, 1}}, {});
+}
+
+vpSimulatorArDrone::Options calm()
+{
+  vpSimulatorArDrone::Options options;
+  options.body.gust = options.body.velocity_noise = 0;
+  options.renderer.samples_per_pixel = 1;
+  options.renderer.camera.pinhole = {50, 50, 40, 30, 80, 60};
+  return options;
+}
+
+vpColVector velocity(double vx, double vy, double vz, double wz)
+{
+  vpColVector v(6, 0.0);
+  v[0] = vx, v[1] = vy, v[2] = vz, v[5] = wz;
+  return v;
+}
+
+void takeOff(vpSimulatorArDrone &robot)
+{
+  robot.setMaxTranslationVelocity(3);
+  robot.setMaxRotationVelocity(3);
+  robot.open(vpSimulatorArDrone::Permission::fly);
+  robot.takeOff();
+  for (int k = 0; k < 50; ++k) {
+    robot.hover();
+    robot.advance(0.1);
+  }
+}
+
+void command(vpSimulatorArDrone &robot, const vpColVector &v, double seconds,
+             vpRobot::vpControlFrameType frame = vpRobot::REFERENCE_FRAME)
+{
+  for (int k = 0; k < std::lround(10 * seconds); ++k) {
+    robot.setVelocity(frame, v);
+    robot.advance(0.1);
+  }
+}
+
+TEST(SimulatorArDrone, DoesNothingWithoutPermission)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  robot.open(vpSimulatorArDrone::Permission::none);
+  EXPECT_FALSE(robot.isOpen());
+  EXPECT_THROW(robot.takeOff(), vpException);
+  EXPECT_THROW(robot.setVelocity(vpRobot::REFERENCE_FRAME, vpColVector(6, 0.0)), vpException);
+  EXPECT_THROW(robot.emergency(), vpException);
+  robot.advance(1);
+  EXPECT_FALSE(robot.isInAir());
+}
+
+TEST(SimulatorArDrone, SettlesWhereTheProportionalLawBalancesTheDrag)
+{
+  const auto options = calm();
+  vpSimulatorArDrone robot(clearing(), options);
+  takeOff(robot);
+  command(robot, velocity(0.8, 0, 0, 0), 12);
+  const double push = 9.81 * options.body.largest_tilt * options.gain; // of the law, for small tilts
+  EXPECT_NEAR(robot.body().measuredVelocity().x(), 0.8 * push / (push + options.body.drag), 0.02);
+}
+
+TEST(SimulatorArDrone, ObeysTheCameraFrame)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  takeOff(robot);
+  const double height = robot.body().pose().t.z();
+  vpColVector v(6, 0.0);
+  v[0] = 0.5;  // right
+  v[1] = -0.3; // up
+  v[4] = -0.5; // to the left
+  command(robot, v, 2, vpRobot::CAMERA_FRAME);
+  EXPECT_LT(robot.body().measuredVelocity().y(), -0.1);
+  EXPECT_NEAR(robot.body().pose().t.z() - height, 2 * 0.3, 0.2);
+  const Pose wMb = robot.body().pose();
+  EXPECT_NEAR(std::atan2(wMb.R(1, 0), wMb.R(0, 0)), 1, 0.15);
+}
+
+TEST(SimulatorArDrone, SaturatesAsRobotsOfVispDo)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  takeOff(robot);
+  robot.setMaxRotationVelocity(0.2);
+  command(robot, velocity(0, 0, 0, 2), 3);
+  const Pose wMb = robot.body().pose();
+  EXPECT_LT(std::atan2(wMb.R(1, 0), wMb.R(0, 0)), 0.6);
+}
+
+TEST(SimulatorArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  takeOff(robot);
+  command(robot, velocity(1, 0, 0, 0), 2);
+  EXPECT_EQ(robot.watchdog(), vpSimulatorArDrone::Watchdog::content);
+  robot.advance(1.5);
+  EXPECT_EQ(robot.watchdog(), vpSimulatorArDrone::Watchdog::hovers);
+  EXPECT_LT(robot.body().measuredVelocity().x(), 0.3);
+  robot.advance(6);
+  EXPECT_FALSE(robot.isInAir());
+}
+
+TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  takeOff(robot);
+  EXPECT_TRUE(robot.isInAir());
+  robot.emergency();
+  EXPECT_FALSE(robot.isInAir());
+  robot.takeOff();
+  robot.advance(2);
+  EXPECT_TRUE(robot.isInAir());
+  robot.land();
+  robot.advance(6);
+  EXPECT_FALSE(robot.isInAir());
+}
+
+TEST(SimulatorArDrone, FramesComeAtTheirRateAndLate)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  takeOff(robot);
+  std::int64_t last = 0;
+  for (int k = 0; k < 4; ++k) {
+    Frame frame;
+    robot.setVelocity(vpRobot::REFERENCE_FRAME, velocity(1, 0, 0, 0.5));
+    ASSERT_TRUE(robot.next(frame));
+    EXPECT_NEAR(robot.time() - 1e-9 * static_cast<double>(frame.stamp_ns), calm().video_delay_s, 0.006);
+    EXPECT_EQ(frame.index, static_cast<std::size_t>(k));
+    EXPECT_EQ(frame.image.getWidth(), 80u);
+    if (k > 0) {
+      EXPECT_EQ(frame.stamp_ns - last, 100000000);
+    }
+    last = frame.stamp_ns;
+  }
+}
+
+TEST(SimulatorArDrone, TheGyroIntegratesToTheTurnBetweenFrames)
+{
+  auto options = calm();
+  options.sensors.gyro_noise = options.sensors.gyro_bias = 0;
+  vpSimulatorArDrone robot(clearing(), options);
+  takeOff(robot);
+  std::optional<Pose> last;
+  for (int k = 0; k < 10; ++k) {
+    Frame frame;
+    robot.setVelocity(vpRobot::REFERENCE_FRAME, velocity(1, 0.5, 0, 1));
+    ASSERT_TRUE(robot.next(frame));
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    for (const GyroSample &sample : frame.gyro)
+      turn = turn * expSo3(0.005 * sample.rate);
+    if (last) {
+      ASSERT_EQ(frame.gyro.size(), 20u);
+      EXPECT_LT(logSo3(turn.transpose() * last->R.transpose() * frame.wMb_truth->R).norm(), 1e-3);
+      EXPECT_GT(k < 3 ? 1 : logSo3(turn).norm(), 0.05);
+    }
+    last = frame.wMb_truth;
+  }
+}
+
+TEST(SimulatorArDrone, SameSeedAndCommandsSameFlight)
+{
+  auto options = calm();
+  options.body.gust = 0.2;
+  Frame frames[2];
+  for (Frame &frame : frames) {
+    options.setSeed(7);
+    vpSimulatorArDrone robot(clearing(), options);
+    takeOff(robot);
+    for (int k = 0; k < 3; ++k) {
+      robot.setVelocity(vpRobot::REFERENCE_FRAME, velocity(1, 0, 0, 0));
+      frame = Frame();
+      robot.next(frame);
+    }
+  }
+  EXPECT_TRUE(frames[0].image == frames[1].image);
+  EXPECT_EQ(frames[0].wMb_truth->t, frames[1].wMb_truth->t);
+  EXPECT_EQ(frames[0].wMb_odometry->t, frames[1].wMb_odometry->t);
+}
+
+TEST(SimulatorArDrone, ReportsTheNearestBarkItPassed)
+{
+  const Forest forest = clearing();
+  vpSimulatorArDrone robot(forest, calm());
+  takeOff(robot);
+  EXPECT_NEAR(robot.leastClearance(), forest.distanceToBark({0, 0, 1}), 0.2);
+}
+
+TEST(SimulatorArDrone, RefusesVelocitiesThatAreNone)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  robot.open(vpSimulatorArDrone::Permission::fly);
+  vpColVector v(6, 0.0);
+  v[3] = std::nan("");
+  EXPECT_THROW(robot.setVelocity(vpRobot::CAMERA_FRAME, v), vpException);
+  EXPECT_THROW(robot.setVelocity(vpRobot::CAMERA_FRAME, vpColVector(4, 0.0)), vpException);
+  EXPECT_THROW(robot.setVelocity(vpRobot::JOINT_STATE, vpColVector(6, 0.0)), vpException);
+}
+
+TEST(SimulatorArDrone, ThePoseFilterIsWhatGetPositionSays)
+{
+  vpSimulatorArDrone robot(clearing(), calm());
+  vpColVector q;
+  EXPECT_THROW(robot.getPosition(vpRobot::REFERENCE_FRAME, q), vpException);
+  takeOff(robot);
+  Frame frame;
+  robot.next(frame);
+  robot.getPosition(vpRobot::REFERENCE_FRAME, q);
+  EXPECT_DOUBLE_EQ(q[2], frame.wMb_odometry->t.z());
+}
+} // namespace

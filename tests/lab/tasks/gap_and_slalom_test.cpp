@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/gap_task.h"
+#include "lab/tasks/slalom_task.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+Obstacle trunkAt(int id, double x, double y, double radius = 0.15)
+{
+  Obstacle trunk;
+  trunk.id = id;
+  trunk.is_confirmed = true;
+  trunk.xy = {x, y};
+  trunk.radius = radius;
+  return trunk;
+}
+
+TEST(Obstacle, CountsItsCovarianceInTheDirectionAsked)
+{
+  Obstacle trunk = trunkAt(0, 0, 0, 0.2);
+  trunk.covariance << 0.09, 0, 0, 0.01;
+  EXPECT_NEAR(trunk.clearance({2, 0}, 0), 1.8, 1e-12);
+  EXPECT_NEAR(trunk.clearance({2, 0}, 2), 1.8 - 0.6, 1e-12);
+  EXPECT_NEAR(trunk.clearance({0, 2}, 2), 1.8 - 0.2, 1e-12);
+}
+
+TEST(NearPoints, WhatStandsUprightCountsAndWhatLiesLowDoesNot)
+{
+  const Pose wMb(Eigen::Matrix3d::Identity(), {0, 0, 1.2});
+  NearPoints near;
+  for (int k = 0; k < 4; ++k) // in a frame each: bark, a bush, a crown over the drone
+    near.see({{1.03, 0.02, 0.6 + 0.3 * k}, {1.03, 0.02, 1.2}, {1.03, 1.02, 0.5 + 0.02 * k}, {1.03, 1.02, 0.5}, {1.03, -1.02, 3.0}},
+             wMb, 0.1 * k);
+  std::vector<Obstacle> found;
+  near.addTo(found, wMb, 2);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR((found[0].xy - Eigen::Vector2d(1.03, 0.02)).norm(), 0, 1e-9);
+  EXPECT_GT(found[0].evidence, 10);
+  found.clear();
+  near.addTo(found, wMb, 0.9);
+  EXPECT_TRUE(found.empty());
+  near.see({}, wMb, 10); // long after
+  near.addTo(found, wMb, 2);
+  EXPECT_TRUE(found.empty());
+}
+
+TEST(SeenSpace, IsWhatPointsWereSeenThroughAndNotWhatHidesThem)
+{
+  const Eigen::Vector3d from(-20.3, 7.1, 1.2); // the map of cells goes round
+  const auto ray = [](double degrees, double slope) {
+    const double a = degrees * M_PI / 180;
+    return Eigen::Vector3d(std::cos(a), std::sin(a), slope).normalized();
+  };
+  std::vector<Pipeline::Sight> sights;
+  for (double degrees = -30; degrees <= 30; degrees += 0.25)
+    sights.push_back({ray(degrees, 0), std::abs(degrees) < 8 ? 1 / 1.5 : 1 / 9.0, 0.01}); // a wide thing 1.5 m ahead
+  SeenSpace space;
+  for (int k = 0; k < 10; ++k)
+    space.see(sights, from, 0.1 * k);
+  const auto isSeen = [&](double degrees, double range) {
+    return space.isSeen(from.head<2>() + range * ray(degrees, 0).head<2>());
+  };
+  EXPECT_TRUE(isSeen(0, 1.0));
+  EXPECT_FALSE(isSeen(0, 1.5)); // its bark
+  EXPECT_FALSE(isSeen(0, 2.5)); // and behind it
+  EXPECT_TRUE(isSeen(20, 2.5));
+  EXPECT_FALSE(isSeen(50, 1.5)); // beside the image
+  space.see({}, from, 30);       // long after
+  EXPECT_FALSE(isSeen(20, 2.5));
+}
+
+TEST(SeenSpace, RaysToTheGroundTellOfTheHeightOfTheDroneOnly)
+{
+  std::vector<Pipeline::Sight> sights;
+  for (int k = 0; k < 200; ++k)
+    sights.push_back({Eigen::Vector3d(1, 0, -0.5).normalized(), 1 / 6.0, 0.01});
+  SeenSpace space;
+  space.see(sights, {0, 0, 1.2}, 0);
+  EXPECT_TRUE(space.isSeen({0.7, 0}));
+  EXPECT_FALSE(space.isSeen({1.7, 0})); // the ray is 0.85 m below it there
+}
+
+TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
+{
+  const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.05, 0.2)};
+  Eigen::Vector2d p(0, 0), v(0, 0);
+  for (int k = 0; k < 1000; ++k) { // obeys with a lag of 0.5 s
+    v += 0.02 / 0.5 * (keptClear({0.6, 0}, p, trunks, 0.28, 0) - v);
+    p += 0.02 * v;
+    ASSERT_GT((trunks[0].xy - p).norm(), 0.2 + 0.28) << "after " << k << " steps";
+  }
+}
+
+TEST(KeptClear, AWayThatLeadsPastOrAwayOrToWhatIsNoTrunkYetStaysAsItIs)
+{
+  std::vector<Obstacle> trunks{trunkAt(0, 2, 1.5, 0.2)};
+  EXPECT_NEAR((keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0) - Eigen::Vector2d(0.6, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((keptClear({0, -0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, -0.6)).norm(), 0, 1e-12);
+  trunks[0].is_confirmed = false;
+  EXPECT_NEAR((keptClear({0, 0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, 0.6)).norm(), 0, 1e-12);
+}
+
+TEST(KeptClear, NeitherADoubtfulNorANearTrunkPushesTheDroneAway)
+{
+  std::vector<Obstacle> trunks{trunkAt(0, 2, 0.4, 0.2)}; // nearer than the hull allows
+  EXPECT_NEAR(keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0).y(), 0, 1e-12);
+  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).norm(), 0, 1e-12);
+  trunks[0].evidence = -0.5;
+  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).y(), 0.3, 1e-12);
+}
+
+TEST(KeptClear, TheMiddleOfAGapOfTheLeastWidthIsPassedAtFullSpeed)
+{
+  const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.75), trunkAt(1, 3, -0.75)}; // 1.2 m free
+  for (double x = 0; x < 5; x += 0.05) {
+    const Eigen::Vector2d v = keptClear({0.6, 0}, {x, 0}, trunks, 0.28, 0);
+    EXPECT_GT(v.x(), 0.4) << x;
+    EXPECT_NEAR(v.y(), 0, 0.05) << x;
+  }
+}
+
+TEST(Gap, MiddleIsThatOfTheFreeWidth)
+{
+  const Gap gap = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {0, 0});
+  EXPECT_NEAR(gap.width, 1.6, 1e-12);
+  EXPECT_NEAR(gap.middle.y(), 0.1, 1e-12);
+  EXPECT_NEAR(gap.along.x(), 1, 1e-12);
+  EXPECT_EQ(gap.left, 7);
+  EXPECT_EQ(gap.right, 4);
+  const Gap from_behind = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {10, 0});
+  EXPECT_NEAR(from_behind.along.x(), -1, 1e-12);
+  EXPECT_EQ(from_behind.left, 4);
+}
+
+TEST(Gap, IsOfNoUseWhereATrunkOfItIsDoubtful)
+{
+  std::vector<Obstacle> trunks = {trunkAt(0, 5, 1), trunkAt(1, 5, -1)};
+  trunks[0].evidence = 3;
+  trunks[1].evidence = 1;
+  EXPECT_FALSE(chooseGap(trunks, {0, 0}, 0, 1.5, {}));
+  EXPECT_TRUE(chooseGap(trunks, {0, 0}, 0, 0.5, {}));
+}
+
+TEST(Gap, ChoosesTheOneNearestToStraightAhead)
+{
+  const std::vector<Obstacle> trunks{trunkAt(0, 5, 1), trunkAt(1, 5, -0.8), trunkAt(2, 5, -2.8)};
+  const auto gap = chooseGap(trunks, {0, 0}, 0, 0, {});
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->left, 0);
+  EXPECT_EQ(gap->right, 1);
+  const auto to_the_right = chooseGap(trunks, {0, 0}, -0.35, 0, {});
+  ASSERT_TRUE(to_the_right);
+  EXPECT_EQ(to_the_right->right, 2);
+}
+
+TEST(Gap, IsNotChosenWhereItIsNarrowUnconfirmedOrBlocked)
+{
+  const std::vector<Obstacle> open{trunkAt(0, 5, 0.8), trunkAt(1, 5, -0.8)};
+  ASSERT_TRUE(chooseGap(open, {0, 0}, 0, 0, {}));
+  EXPECT_FALSE(chooseGap({trunkAt(0, 5, 0.6), trunkAt(1, 5, -0.6)}, {0, 0}, 0, 0, {})); // 0.9 m
+  auto doubtful = open;
+  doubtful[0].is_confirmed = false;
+  EXPECT_FALSE(chooseGap(doubtful, {0, 0}, 0, 0, {}));
+  auto blocked = open;
+  blocked.push_back(trunkAt(2, 6.2, 0.1));
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
+  blocked.back().is_confirmed = false; // a candidate is in the way as well
+  EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
+}
+
+/// Least distance hull to bark of a drone that follows chooseWay() with its lag.
+double slalom(const std::vector<Obstacle> &trunks, double length, double *seconds = nullptr)
+{
+  const SlalomTaskOptions options;
+  SlalomState state;
+  double least = 1e9, last = 0, vx = 0, t = 0;
+  for (; state.x < length && t < 120; t += 0.1) {
+    const SlalomWay way = chooseWay(trunks, state, last, options);
+    last = way.offset;
+    for (int k = 0; k < 10; ++k) {
+      const double wanted = std::clamp(way.offset - state.y, -options.sideways, options.sideways);
+      state.vy += 0.01 / options.lag * (wanted - state.vy);
+      vx += 0.01 / options.lag * (way.speed - vx);
+      state.y += 0.01 * state.vy;
+      state.x += 0.01 * vx;
+      for (const Obstacle &trunk : trunks)
+        least = std::min(least, trunk.clearance({state.x, state.y}, 0) - options.body_radius);
+    }
+  }
+  if (seconds)
+    *seconds = t;
+  return least;
+}
+
+TEST(Slalom, PassesTrunksThatStandOnTheLine)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = 0; k < 8; ++k)
+    trunks.push_back(trunkAt(k, 5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
+  double seconds = 0;
+  EXPECT_GT(slalom(trunks, 38, &seconds), 0.2);
+  EXPECT_LT(seconds, 50); // at 1 m/s, not by creeping
+}
+
+TEST(Slalom, FindsTheOpeningInAWall)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -12; k <= 12; ++k)
+    if (k != 5 && k != 6 && k != 7)
+      trunks.push_back(trunkAt(k + 12, 6, 0.5 * k, 0.15));
+  EXPECT_GT(slalom(trunks, 9), 0.05);
+}
+
+TEST(Slalom, KeepsFartherFromWhatIsLessWellKnown)
+{
+  Obstacle sure = trunkAt(0, 4, 0.1), vague = sure;
+  vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
+  const SlalomState state;
+  EXPECT_GT(std::abs(chooseWay({vague}, state, 0, {}).offset), std::abs(chooseWay({sure}, state, 0, {}).offset));
+}
+
+TEST(Slalom, GoesRoundWhatWasNotSeenThrough)
+{
+  SlalomTaskOptions straight;
+  straight.swing = 0;
+  const IsSeen but_ahead_left = [](double x, double y) { return x < 1 || y < -0.2; };
+  EXPECT_NEAR(chooseWay({}, {}, 0, straight).offset, 0, 1e-9);
+  EXPECT_LT(chooseWay({}, {}, 0, straight, but_ahead_left).offset, -0.4);
+  EXPECT_EQ(chooseWay({}, {}, 0, straight, [](double, double) { return true; }).offset, 0);
+  const SlalomWay blind = chooseWay({}, {}, 0, straight, [](double x, double) { return x < 0.5; });
+  EXPECT_LT(blind.speed, straight.speed); // and does not fly where nothing is known
+}
+
+TEST(Slalom, LeavesATrunkBesideItThoughNoWayLeadsNearer)
+{
+  const Obstacle beside = trunkAt(0, 0.1, -0.6, 0.2); // 12 cm from the hull
+  SlalomTaskOptions straight;
+  straight.swing = 0;
+  EXPECT_EQ(chooseWay({}, {}, 0, straight).offset, 0);
+  EXPECT_GE(chooseWay({beside}, {}, 0, straight).offset, 0.25);
+}
+
+TEST(Slalom, LeavesWhatItStandsInByTheMap)
+{
+  Obstacle ghost = trunkAt(0, 0.3, -0.2, 0.1); // there is no free way but away from it
+  const SlalomWay way = chooseWay({ghost}, {}, 0, {});
+  EXPECT_LT(way.clearance, 0);
+  EXPECT_GT(way.offset, 0.2);
+  EXPECT_LT(way.cost, 100); // which no contact costs
+}
+
+TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
+{
+  SlalomTaskOptions options;
+  options.look = 4;
+  SlalomTask task(options);
+  const Pipeline pipeline(PinholeCamera(), SmootherOptions::forwardCamera());
+  FrameResult result; // of a drone that obeys at once
+  double left = 0, right = 0;
+  for (int k = 0; k < 60; ++k) {
+    const double t = 0.1 * k;
+    result.stamp_ns = k * 100000000LL;
+    const TaskCommand command = task.step(result, pipeline);
+    ASSERT_FALSE(command.is_hovering);
+    EXPECT_EQ(task.phase(), t < 4 ? TaskPhase::searching : TaskPhase::servoing) << t;
+    EXPECT_EQ(command.velocity.x() > 0.3, t >= 4) << t;
+    result.wMb.t += 0.1 * command.velocity.head<3>();
+    left = std::max(left, t < 4 ? result.wMb.t.y() : 0);
+    right = std::min(right, t < 4 ? result.wMb.t.y() : 0);
+  }
+  EXPECT_GT(left, 0.4);
+  EXPECT_LT(right, -0.4);
+}
+
+TEST(Slalom, StopsBeforeAWallWithoutOpening)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -30; k <= 30; ++k)
+    trunks.push_back(trunkAt(k + 30, 4, 0.4 * k, 0.2));
+  EXPECT_GT(slalom(trunks, 9), 0);
+}
+} // namespace
+} // namespace bole

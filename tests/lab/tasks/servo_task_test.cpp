@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/camera_file.h"
+#include "lab/tasks/servo_task.h"
+
+#include <Eigen/Geometry>
+
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+/// Flies ahead while it sees what it is told that it sees.
+class Ahead : public ServoTask
+{
+public:
+  using ServoTask::ServoTask;
+  bool is_in_view = true;
+
+  int given_up = 0;
+
+protected:
+  void giveUpTarget() override { ++given_up; }
+  bool sees(const FrameResult &, const Pipeline &) const override { return is_in_view; }
+  TaskCommand act(const FrameResult &, const Pipeline &) override { return {false, {1, 0, 0, 0}, "ahead"}; }
+};
+
+const PinholeCamera kCamera{200, 200, 160, 120, 320, 240};
+
+class Safety : public testing::Test
+{
+protected:
+  bool hovers(Ahead &task, FrameStatus status = FrameStatus::ok)
+  {
+    FrameResult result;
+    result.frame_status = status;
+    return task.step(result, m_pipeline).is_hovering;
+  }
+  Pipeline m_pipeline{kCamera, forwardCamera()};
+};
+
+TEST_F(Safety, HoversAtOnceWhereAFrameIsNotOk)
+{
+  for (const FrameStatus status : {FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized}) {
+    Ahead task;
+    for (int k = 0; k < 5; ++k)
+      ASSERT_FALSE(hovers(task));
+    EXPECT_TRUE(hovers(task, status)) << toString(status);
+    EXPECT_TRUE(task.isLost());
+  }
+}
+
+TEST_F(Safety, HoversAfterTheTargetWasNotSeenForLostFrames)
+{
+  SafetyOptions options;
+  options.lost_frames = 4;
+  Ahead task(options);
+  ASSERT_FALSE(hovers(task));
+  task.is_in_view = false;
+  for (int k = 0; k < 3; ++k)
+    EXPECT_FALSE(hovers(task)) << k;
+  EXPECT_TRUE(hovers(task));
+}
+
+TEST_F(Safety, GivesATargetUpAfterGoodFramesWithoutItAndNotForBadOnes)
+{
+  SafetyOptions options;
+  options.patience_frames = 10;
+  Ahead task(options);
+  ASSERT_FALSE(hovers(task));
+  task.is_in_view = false;
+  for (int k = 0; k < 30; ++k)
+    hovers(task, FrameStatus::corrupt);
+  EXPECT_EQ(task.given_up, 0);
+  task.is_in_view = true;
+  hovers(task);
+  task.is_in_view = false;
+  for (int k = 0; k < 10; ++k)
+    hovers(task);
+  EXPECT_EQ(task.given_up, 0);
+  EXPECT_TRUE(hovers(task)) << "hovers until it has found another";
+  EXPECT_EQ(task.given_up, 1);
+}
+
+TEST_F(Safety, GoesOnOnlyAfterSureFramesInARow)
+{
+  SafetyOptions options;
+  options.sure_frames = 3;
+  Ahead task(options);
+  EXPECT_TRUE(hovers(task, FrameStatus::corrupt));
+  EXPECT_TRUE(hovers(task));
+  EXPECT_TRUE(hovers(task));
+  EXPECT_TRUE(hovers(task, FrameStatus::corrupt)); // not in a row
+  EXPECT_TRUE(hovers(task));
+  EXPECT_TRUE(hovers(task));
+  EXPECT_FALSE(hovers(task));
+}
+
+TEST(SafetyOptions, RefusesCountsOutOfRange)
+{
+  SafetyOptions options;
+  options.lost_frames = 0;
+  EXPECT_THROW(Ahead{options}, vpException);
+}
+
+TEST(Sidestep, GoesToAndFroByItsAmplitudeAndKeepsItsHeading)
+{
+  Sidestep sidestep(0.5, 8);
+  Pose wMb(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {2, -1, 1.2});
+  const Eigen::Vector2d left(-std::sin(0.7), std::cos(0.7)), start = wMb.t.head<2>();
+  double most = 0, least = 0;
+  for (double t = 0; t < 8; t += 0.02) {
+    const Eigen::Vector4d v = sidestep.velocity(wMb, t);
+    EXPECT_NEAR(v(3), 0, 1e-9);
+    wMb.t += wMb.R * Eigen::Vector3d(0.02 * v(0), 0.02 * v(1), 0);
+    const double across = left.dot(wMb.t.head<2>() - start);
+    most = std::max(most, across);
+    least = std::min(least, across);
+    EXPECT_LT((wMb.t.head<2>() - start - across * left).norm(), 1e-9);
+  }
+  EXPECT_NEAR(most, 0.5, 0.02);
+  EXPECT_NEAR(least, -0.5, 0.02);
+}
+
+TEST(Towards, TurnsTheShortWayAndSpeaksInTheBody)
+{
+  const Pose wMb(Eigen::AngleAxisd(3, Eigen::Vector3d::UnitZ()).toRotationMatrix(), Eigen::Vector3d::Zero());
+  const Eigen::Vector4d v = towards(wMb, {std::cos(3.0), std::sin(3.0)}, -3);
+  EXPECT_NEAR(v(0), 1, 1e-9);
+  EXPECT_NEAR(v(1), 0, 1e-9);
+  EXPECT_GT(v(3), 0.2); // over pi, not back through zero
+}
+} // namespace
+} // namespace bole

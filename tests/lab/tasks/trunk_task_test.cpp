@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The control law on exact features: a camera that moves as it is told, before a trunk.
+#include "support/drawn_trunks.h"
+
+#include "geometry/so3.h"
+#include "input/camera_file.h"
+#include "lab/tasks/trunk_task.h"
+
+#include <Eigen/Geometry>
+
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr double kStep = 0.02;
+
+struct Flight
+{
+  Trunk trunk;
+  Pose wMb{Eigen::Matrix3d::Identity(), {0, 0, 1.2}};
+  Pose bMc = forwardCamera();
+
+  vpFeatureTrunk feature() const
+  {
+    vpFeatureTrunk seen;
+    seen.buildFrom(trunk, wMb * bMc);
+    return seen;
+  }
+  void move(const Eigen::Vector4d &v)
+  {
+    wMb = {wMb.R * expSo3({0, 0, kStep * v(3)}), wMb.t + wMb.R * Eigen::Vector3d(kStep * v.head<3>())};
+  }
+  double distance() const { return feature().distance(); }
+};
+
+/// Asks \p task as one that believes the drone to obey at once, as this one does.
+TrunkTaskOptions atOnce()
+{
+  TrunkTaskOptions options;
+  options.response = {0, 0, 0};
+  return options;
+}
+
+Flight before(double x, double y, double radius)
+{
+  Flight flight;
+  flight.trunk.xy = {x, y};
+  flight.trunk.log_radius = std::log(radius);
+  return flight;
+}
+
+TEST(TrunkTask, TheErrorDecaysAtTheGain)
+{
+  Flight flight = before(3.3, 0.4, 0.2);
+  TrunkTaskOptions options = atOnce();
+  options.distance = 3;
+  options.gain = 0.5;
+  TrunkTask task(flight.bMc, options);
+  const double bearing = flight.feature().bearing(), ratio = std::log(flight.distance() / 3);
+  for (int k = 0; k < 100; ++k) // 2 s
+    flight.move(task.velocityFor(flight.feature(), 0.2, k * kStep, 0));
+  const double left = std::exp(-0.5 * 2);
+  EXPECT_NEAR(flight.feature().bearing() / bearing, left, 0.03);
+  EXPECT_NEAR(std::log(flight.distance() / 3) / ratio, left, 0.03);
+}
+
+TEST(TrunkTask, HoldsTheBearingAskedForAndNotOnlyStraightAhead)
+{
+  Flight flight = before(4, -0.5, 0.15);
+  TrunkTaskOptions options = atOnce();
+  options.bearing = 0.2;
+  options.ratio = 0.06;
+  TrunkTask task(flight.bMc, options);
+  for (int k = 0; k < 2000; ++k)
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0));
+  EXPECT_NEAR(flight.feature().bearing(), 0.2, 1e-3);
+  EXPECT_NEAR(flight.distance(), 0.15 / 0.06, 1e-2);
+}
+
+TEST(TrunkTask, AWrongRadiusSlowsButDoesNotMoveTheRatioItKeeps)
+{
+  Flight flight = before(4, 0, 0.15);
+  TrunkTaskOptions options = atOnce();
+  options.ratio = 0.06;
+  TrunkTask task(flight.bMc, options);
+  for (int k = 0; k < 2500; ++k)
+    flight.move(task.velocityFor(flight.feature(), 0.25, k * kStep, 0)); // believes 0.25 m
+  EXPECT_NEAR(std::exp(flight.feature().logRatio()), 0.06, 1e-3);
+}
+
+TEST(TrunkTask, CirclesAtTheRatioAndTheSpeedAskedFor)
+{
+  Flight flight = before(2.5, 0, 0.15);
+  TrunkTaskOptions options = atOnce();
+  options.ratio = 0.06;
+  options.speed = 0.5;
+  TrunkTask task(flight.bMc, options);
+  double turned = 0;
+  for (int k = 0; k < 1600; ++k) { // 32 s at 0.5 m/s round 2.5 m is once round
+    const Eigen::Vector2d a = flight.wMb.t.head<2>() - flight.trunk.xy;
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0.5));
+    const Eigen::Vector2d b = flight.wMb.t.head<2>() - flight.trunk.xy;
+    turned += std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
+    ASSERT_NEAR(flight.feature().bearing(), 0, 0.01);
+    ASSERT_NEAR(flight.distance(), 2.5, 0.05);
+  }
+  EXPECT_NEAR(std::abs(turned), 32 * 0.5 / 2.5, 0.1);
+}
+
+TEST(TrunkTask, ASteadyPushMovesNothing)
+{
+  Flight flight = before(3, 0, 0.15);
+  TrunkTaskOptions options = atOnce();
+  options.ratio = 0.05;
+  TrunkTask task(flight.bMc, options);
+  for (int k = 0; k < 1000; ++k)
+    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0) + Eigen::Vector4d(-0.05, 0.1, 0, 0.02));
+  EXPECT_NEAR(flight.distance(), 3, 0.005);
+  EXPECT_NEAR(flight.feature().bearing(), 0, 0.001);
+}
+
+/// A drone that hears a command \p delay after the frame it answers and takes its time to obey.
+struct SlowFlight : Flight
+{
+  ResponseOptions response;
+  DroneResponse drone;
+
+  SlowFlight(const Flight &flight, const ResponseOptions &options) : Flight(flight), response(options), drone(options) {}
+
+  /// \p obeyed: share of the velocity that is flown; the rest is drag.
+  void fly(TrunkTask &task, double radius, double from_s, double to_s, double obeyed = 1)
+  {
+    for (int k = 0; k < static_cast<int>((to_s - from_s) / 0.1); ++k) { // frames
+      const double t = from_s + 0.1 * k;
+      drone.advance(t);
+      drone.send(t, obeyed * task.velocityFor(feature(), radius, t, task.options().speed));
+      for (int i = 0; i < 5; ++i)
+        move(drone.advance(t + kStep * (i + 1)) / kStep);
+    }
+  }
+};
+
+TEST(TrunkTask, TheErrorOfALateAndSlowDroneDecaysAtTheGainToo)
+{
+  TrunkTaskOptions options;
+  options.ratio = 0.05;
+  options.gain = 1;
+  SlowFlight flight(before(3.5, 0.35, 0.15), options.response);
+  TrunkTask task(flight.bMc, options);
+  const double bearing = flight.feature().bearing();
+  const double late_s = options.response.delay, slow_s = options.response.turn_lag;
+  flight.fly(task, 0.15, 0, 4);
+  const double t = 4 - late_s, left = (std::exp(-t) - slow_s * std::exp(-t / slow_s)) / (1 - slow_s);
+  EXPECT_NEAR(flight.feature().bearing() / bearing, left, 0.03);
+  EXPECT_GT(std::log(flight.distance() / 3), -0.01) << "no overshoot";
+  EXPECT_LT(std::log(flight.distance() / 3), 0.02);
+}
+
+TEST(TrunkTask, CirclesWithoutLagThoughTheDroneIsLateSlowAndObeysByHalf)
+{
+  TrunkTaskOptions options;
+  options.ratio = 0.06;
+  options.speed = 0.5;
+  SlowFlight flight(before(2.5, 0, 0.15), options.response);
+  TrunkTask task(flight.bMc, options);
+  flight.fly(task, 0.15, 0, 15, 0.5);
+  const Eigen::Vector2d a = flight.wMb.t.head<2>() - flight.trunk.xy;
+  flight.fly(task, 0.15, 15, 18, 0.5);
+  const Eigen::Vector2d b = flight.wMb.t.head<2>() - flight.trunk.xy;
+  EXPECT_GT(std::acos(a.normalized().dot(b.normalized())), 0.25);
+  EXPECT_NEAR(flight.feature().bearing(), 0, 0.004);
+  EXPECT_NEAR(flight.distance(), 2.5, 0.02);
+}
+
+TEST(DroneResponse, LagsBehindASteadyVelocityByDelayAndLag)
+{
+  DroneResponse drone({0.1, 0.5, 0.2});
+  drone.advance(0);
+  drone.send(0, {0.4, 0, 0, 0.3});
+  Eigen::Vector4d path = drone.advance(0.05);
+  EXPECT_EQ(path.norm(), 0) << "not heard yet";
+  for (double t = 0.1; t < 10; t += 0.1)
+    path += drone.advance(t);
+  path += drone.advance(10);
+  EXPECT_NEAR(path(0), 0.4 * (10 - 0.1 - 0.5), 1e-6);
+  EXPECT_NEAR(path(3), 0.3 * (10 - 0.1 - 0.2), 1e-6);
+  EXPECT_NEAR(drone.velocity()(0), 0.4, 1e-6);
+}
+
+TEST(FeatureFilter, FindsAValueThatMovesAsOrderedAndDriftsBesides)
+{
+  FeatureFilter filter;
+  filter.start(0.3, 0.002, 0.1);
+  double value = 0.3;
+  for (int k = 0; k < 200; ++k) {
+    const double ordered = 0.02 * std::sin(0.3 * k);
+    value += ordered + 0.1 * 0.04;
+    filter.predict(ordered, 0.1, 0.01);
+    filter.correct(value, 0.002);
+  }
+  EXPECT_NEAR(filter.value(), value, 1e-6);
+  EXPECT_NEAR(filter.drift(), 0.04, 1e-5);
+}
+
+TEST(FeatureFilter, AValueFarOffMovesItByNoMoreThanThreeSigma)
+{
+  FeatureFilter calm, jumped;
+  for (FeatureFilter *filter : {&calm, &jumped}) {
+    filter->start(0, 0.002, 0.01);
+    for (int k = 0; k < 100; ++k) {
+      filter->predict(0, 0.1, 0.01);
+      filter->correct(0, 0.002);
+    }
+    filter->predict(0, 0.1, 0.01);
+  }
+  calm.correct(0.02, 0.002); // far off, and ten times as far: of other edges
+  jumped.correct(0.2, 0.002);
+  EXPECT_GT(calm.value(), 0.001);
+  EXPECT_NEAR(jumped.value(), calm.value(), 1e-12);
+  EXPECT_LT(jumped.value(), 0.008);
+}
+
+TEST(TrunkTask, GoesRoundTheOtherWayWhereATrunkStandsInItsWay)
+{
+  // a drone that moves to and fro by itself; to its left, near the way round, stands another trunk
+  const std::vector<Cylinder> wood = {test::uprightTrunk(3.5, 0, 0.15), test::uprightTrunk(2, 1.2, 0.12)};
+  const PinholeCamera camera;
+  TrunkTaskOptions options;
+  options.speed = 0.4;
+  options.ratio = 0.05;
+  options.free_way = 3;
+  TrunkTask task(forwardCamera(), options);
+  Pipeline pipeline(camera, forwardCamera());
+  int waited = 0, left = 0, right = 0;
+  for (int k = 0; k < 140 && right == 0; ++k) {
+    Frame frame;
+    frame.index = static_cast<std::size_t>(k);
+    frame.stamp_ns = k * 100000000LL;
+    frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0, 0.4 * std::sin(0.15 * k), 1.2});
+    frame.image = test::drawTrunks(camera, (*frame.wMb_odometry * forwardCamera()).inverse(), wood, unsigned(k));
+    const FrameResult result = pipeline.process(frame);
+    const TaskCommand command = task.step(result, pipeline);
+    waited += command.reason == "way blocked: waits";
+    if (command.reason == "circles")
+      ++(command.velocity.y() > 0 ? left : right);
+  }
+  EXPECT_EQ(left, 0);
+  EXPECT_GE(waited, 10);
+  EXPECT_LE(waited, 12);
+  EXPECT_GT(right, 0);
+}
+
+TEST(TrunkTask, KeepsItsLargestSpeed)
+{
+  Flight flight = before(12, 3, 0.2);
+  TrunkTaskOptions options;
+  options.largest_speed = 0.4;
+  TrunkTask task(flight.bMc, options);
+  EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
+}
+
+TEST(TrunkTask, RefusesOptionsOutOfRange)
+{
+  TrunkTaskOptions options;
+  options.gain = 0;
+  EXPECT_THROW(TrunkTask(forwardCamera(), options), vpException);
+}
+} // namespace
+} // namespace bole

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/random.h"
+#include "lab/trials/closed_loop.h"
+#include "lab/trials/error_curves.h"
+#include "lab/trials/injected_fault.h"
+#include "lab/trials/median_interval.h"
+#include "lab/trials/scenario.h"
+#include "lab/trials/servo_trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <limits>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+TEST(BootstrapMedian, HoldsTheMedianAndHasNoWidthWhereAllAreEqual)
+{
+  const MedianInterval odd = bootstrapMedian({3, 1, 2}), even = bootstrapMedian({4, 1, 2, 3});
+  EXPECT_EQ(odd.median, 2);
+  EXPECT_EQ(even.median, 2.5);
+  EXPECT_LE(odd.low, odd.median);
+  EXPECT_GE(odd.high, odd.median);
+  const MedianInterval equal = bootstrapMedian({7, 7, 7, 7});
+  EXPECT_EQ(equal.low, 7);
+  EXPECT_EQ(equal.high, 7);
+  EXPECT_TRUE(std::isnan(bootstrapMedian({}).median));
+  EXPECT_EQ(bootstrapMedian({1, std::nan(""), 3}).count, 2u);
+}
+
+TEST(BootstrapMedian, TheOrderOfTheRunsDoesNotMatter)
+{
+  const MedianInterval a = bootstrapMedian({5, 1, 4, 2, 3, 9}), b = bootstrapMedian({9, 3, 2, 4, 1, 5});
+  EXPECT_EQ(a.low, b.low);
+  EXPECT_EQ(a.high, b.high);
+}
+
+TEST(BootstrapMedian, HoldsTheTrueMedianInAbout95Of100Samples)
+{
+  Random random(3);
+  int holds = 0;
+  for (int k = 0; k < 400; ++k) {
+    std::vector<double> values;
+    for (int i = 0; i < 25; ++i)
+      values.push_back(random.normal());
+    const MedianInterval interval = bootstrapMedian(values, 400, static_cast<std::uint64_t>(k));
+    holds += interval.low <= 0 && interval.high >= 0;
+  }
+  EXPECT_GT(holds, 400 * 0.91);
+  EXPECT_LT(holds, 400 * 0.99);
+}
+
+TEST(Wilson, AgreesWithThePublishedExample)
+{
+  const ShareInterval interval = wilson(81, 263); // Newcombe 1998, Table I, method 3: .2553 to .3662
+  EXPECT_NEAR(interval.low, 0.2553, 1e-4);
+  EXPECT_NEAR(interval.high, 0.3662, 1e-4);
+  EXPECT_EQ(wilson(0, 10).low, 0);
+  EXPECT_LT(wilson(10, 10).low, 0.75);
+}
+
+TEST(Fault, SpoilsFramesInItsTimeAndNoOthers)
+{
+  for (const FaultKind kind : {FaultKind::black, FaultKind::freeze, FaultKind::noise}) {
+    FaultOptions options;
+    options.kind = kind;
+    options.start_s = 1;
+    options.duration_s = 2;
+    FaultInjector injector(options);
+    for (int k = -5; k < 50; ++k) {
+      Frame frame;
+      frame.image.resize(8, 8, static_cast<unsigned char>(100 + k));
+      const vpImage<unsigned char> before = frame.image;
+      const bool is_in_time = k >= 10 && k < 30;
+      EXPECT_EQ(injector.apply(frame, 0.1 * k), is_in_time) << toString(kind) << k;
+      EXPECT_EQ(frame.image == before, !is_in_time);
+      if (kind == FaultKind::freeze && is_in_time) {
+        EXPECT_EQ(frame.image[0][0], 109); // the last good one
+      }
+      EXPECT_EQ(frame.status, FrameStatus::ok); // nobody is told
+    }
+  }
+  EXPECT_THROW(faultKindFromString("smoke"), vpException);
+}
+
+TEST(Scenario, SameSeedSameForestAndAnotherSeedAnother)
+{
+  ScenarioOptions options;
+  options.seed = 4;
+  const Scenario a = makeScenario(options), b = makeScenario(options);
+  options.seed = 5;
+  const Scenario c = makeScenario(options);
+  ASSERT_EQ(a.forest.trunks.size(), b.forest.trunks.size());
+  EXPECT_EQ(a.forest.trunks[0].foot, b.forest.trunks[0].foot);
+  EXPECT_NE(a.forest.trunks[0].foot, c.forest.trunks[0].foot);
+}
+
+TEST(Scenario, TheGapHasTheWidthItSaysAndIsFree)
+{
+  ScenarioOptions options;
+  options.kind = ServoKind::gap;
+  for (options.seed = 1; options.seed < 20; ++options.seed) {
+    const Scenario scenario = makeScenario(options);
+    const SimulatedTrunk &left = scenario.forest.trunks[0], &right = scenario.forest.trunks[1];
+    const auto at = [](const SimulatedTrunk &trunk) { return Eigen::Vector2d(trunk.axisAt(1.2).head<2>()); };
+    const double free = (at(left) - at(right)).norm() - left.radiusAt(1.2) - right.radiusAt(1.2);
+    EXPECT_NEAR(free, scenario.gap_width, 1e-9);
+    EXPECT_GE(free, 1.2);
+    const Eigen::Vector2d middle = 0.5 * (at(left) + at(right));
+    EXPECT_GT(scenario.forest.distanceToBark({middle.x(), middle.y(), 1.2}), 0.5);
+  }
+}
+
+TEST(Scenario, NothingStandsBetweenTheCircleAndItsTrunk)
+{
+  ScenarioOptions options;
+  options.kind = ServoKind::circle;
+  for (options.seed = 1; options.seed < 20; ++options.seed) {
+    const Scenario scenario = makeScenario(options);
+    const SimulatedTrunk &target = scenario.forest.trunks[static_cast<std::size_t>(scenario.target)];
+    const double circle = target.radius / options.ratio;
+    for (const SimulatedTrunk &other : scenario.forest.trunks) {
+      const double apart = (other.axisAt(1.2) - target.axisAt(1.2)).head<2>().norm();
+      EXPECT_TRUE(other.id == target.id || apart > circle + 0.5) << options.seed << ": " << apart;
+    }
+  }
+}
+
+TEST(Scenario, TrunksStandOnTheSlalomsLineToo)
+{
+  ScenarioOptions options;
+  options.kind = ServoKind::slalom;
+  int on_the_line = 0;
+  for (options.seed = 1; options.seed < 6; ++options.seed) {
+    const Scenario scenario = makeScenario(options);
+    for (const SimulatedTrunk &trunk : scenario.forest.trunks)
+      on_the_line += std::abs(trunk.foot.y()) < 0.4 && trunk.foot.x() > 2 && trunk.foot.x() < 40;
+    EXPECT_GT(scenario.forest.distanceToBark({0, 0, 1.2}), 0.6);
+  }
+  EXPECT_GT(on_the_line, 3); // 0.05 a m^2 on 5 x 30 m^2: eight are expected
+}
+
+/// Flies slowly to the left from the first frame on.
+class Leftward : public ServoTask
+{
+protected:
+  bool sees(const FrameResult &, const Pipeline &) const override { return true; }
+  TaskCommand act(const FrameResult &, const Pipeline &) override
+  {
+    enter(TaskPhase::servoing);
+    return {false, {0, 0.4, 0, 0}, "left"};
+  }
+};
+
+TEST(ClosedLoop, HoversInTheFrameOfEachFaultAndFliesOnAfterIt)
+{
+  ForestOptions forest;
+  forest.density = 0.02;
+  const Forest clearing = Forest::plant(forest, {{0, 0, 1}, {0, 5, 1}}, {});
+  for (const FaultKind fault : {FaultKind::black, FaultKind::freeze, FaultKind::noise}) {
+    vpSimulatorArDrone::Options settings = ServoTrialOptions::defaultRobot();
+    settings.renderer.samples_per_pixel = 1;
+    vpSimulatorArDrone robot(clearing, settings);
+    Pipeline pipeline(robot.camera(), robot.bMc());
+    Leftward task;
+    LoopOptions options;
+    options.duration_s = 4;
+    options.fault = {fault, 1, 1.5};
+    const LoopRecord record = runClosedLoop(robot, pipeline, task, options);
+    int spoilt = 0, after = 0;
+    double speed_at_end_of_fault = 1;
+    for (const LoopSample &sample : record.samples) {
+      spoilt += sample.is_spoilt;
+      EXPECT_TRUE(!sample.is_spoilt || (sample.is_hovering && sample.frame_status != FrameStatus::ok)) << toString(fault);
+      if (sample.is_spoilt)
+        speed_at_end_of_fault = sample.speed;
+      after += spoilt == 15 && !sample.is_spoilt && !sample.is_hovering;
+    }
+    EXPECT_EQ(spoilt, 15);
+    EXPECT_LT(speed_at_end_of_fault, 0.15); // 0.35 m/s before
+    EXPECT_GE(after, 10);
+    EXPECT_FALSE(record.is_contact);
+  }
+}
+
+TEST(ServoTrial, ARecordBecomesAFigureAndATable)
+{
+  LoopRecord record;
+  for (int k = 0; k < 20; ++k) {
+    LoopSample sample;
+    sample.time_s = 0.1 * k;
+    sample.phase = k < 5 ? TaskPhase::searching : TaskPhase::servoing;
+    if (k >= 5)
+      sample.believed = sample.real = {{"bearing [deg]", 10 * std::exp(-0.2 * k)}};
+    record.samples.push_back(sample);
+  }
+  const std::string svg = errorCurves(record, "a title"), csv = samplesCsv(record);
+  EXPECT_NE(svg.find("bearing [deg]"), std::string::npos);
+  EXPECT_NE(svg.find("a title"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 21);
+}
+} // namespace
+} // namespace bole

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "mbt/cao_reader.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <unistd.h>
+#include <visp3/core/vpException.h>
+
+namespace
+{
+using namespace bole;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+const fs::path kImages = BOLE_VISP_IMAGES_DIR;
+
+std::string messageOf(const std::string &path)
+{
+  try {
+    readCao(path);
+  }
+  catch (const vpException &error) {
+    return error.what();
+  }
+  return "";
+}
+
+class CaoReader : public testing::Test
+{
+protected:
+  ~CaoReader() override { fs::remove(m_path); }
+  std::string file(const std::string &text) const
+  {
+    std::ofstream(m_path, std::ios::binary) << text;
+    return m_path;
+  }
+  const std::string m_path = testing::TempDir() + "cao_reader_" + std::to_string(::getpid()) + ".cao";
+};
+
+std::string contentOf(const fs::path &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+TEST_F(CaoReader, ReadsWhatItWrote)
+{
+  Cylinder a, b;
+  a.foot = {1, 2, 0.1}, a.top = {1.1, 2, 4}, a.radius = 0.15, a.name = "tree 7";
+  b.foot = {-3, 0.5, 0}, b.top = {-3, 0.5, 2.5}, b.radius = 0.3;
+  writeCao(m_path, {a, b}, "two trunks");
+  const std::vector<Cylinder> read = readCao(m_path);
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_LT((read[0].foot - a.foot).norm() + (read[0].top - a.top).norm() + (read[1].top - b.top).norm(), 1e-6);
+  EXPECT_EQ(read[0].name, "tree 7");
+  EXPECT_EQ(read[1].name, "");
+  EXPECT_DOUBLE_EQ(read[1].radius, 0.3);
+}
+
+TEST_F(CaoReader, ViSPsCylinderModelsAreRefusedForTheirCircleAtItsLine)
+{
+  for (const char *name : {"cylinder_cao_model_linux_line_ending.cao", "cylinder_cao_model_windows_line_ending.cao"}) {
+    const fs::path path = kImages / "mbt-cao" / name;
+    if (!fs::exists(path))
+      GTEST_SKIP() << path << " is absent: package visp-images-data";
+    EXPECT_THAT(messageOf(path.string()), HasSubstr(":19: circles = 1, must be 0"));
+  }
+}
+
+TEST_F(CaoReader, ViSPsCylinderModelsLoadWithoutTheirCircleWhateverTheirLineEndings)
+{
+  for (const char *name : {"cylinder_cao_model_linux_line_ending.cao", "cylinder_cao_model_windows_line_ending.cao"}) {
+    const fs::path path = kImages / "mbt-cao" / name;
+    if (!fs::exists(path))
+      GTEST_SKIP() << path << " is absent: package visp-images-data";
+    const std::string text = contentOf(path);
+    EXPECT_EQ(text.find('\r') != std::string::npos, std::string(name).find("windows") != std::string::npos);
+    const std::size_t circles = text.find("# 3D circles");
+    ASSERT_NE(circles, std::string::npos);
+    const std::string ending = text.find('\r') == std::string::npos ? "\n" : "\r\n";
+    const std::vector<Cylinder> read = readCao(file(text.substr(0, circles) + "# 3D circles" + ending + "0" + ending));
+    ASSERT_EQ(read.size(), 1u);
+    EXPECT_EQ(read[0].radius, 1);
+    EXPECT_EQ(read[0].foot, Eigen::Vector3d(0, 0, 1));
+    EXPECT_EQ(read[0].top, Eigen::Vector3d(0, 0, -1));
+  }
+}
+
+TEST_F(CaoReader, ACubeIsRefusedAtTheLineOfItsFaces)
+{
+  const fs::path path = kImages / "mbt" / "cube_and_cylinder.cao";
+  if (!fs::exists(path))
+    GTEST_SKIP() << path << " is absent: package visp-images-data";
+  EXPECT_THAT(messageOf(path.string()), HasSubstr("cube_and_cylinder.cao:19: faces from points = 6, must be 0: a model of trunks holds cylinders only"));
+}
+
+TEST_F(CaoReader, SaysFileLineAndWhatMustBeThere)
+{
+  const std::string head = "V1\n2\n0 0 0\n0 0 3\n0\n0\n0\n";
+  EXPECT_THAT(messageOf("/nowhere.cao"), HasSubstr("/nowhere.cao: cannot be read"));
+  EXPECT_THAT(messageOf(file("V2\n")), HasSubstr(":1: version = V2, must be V1"));
+  EXPECT_THAT(messageOf(file("V1\n1\n0 zero 0\n")), HasSubstr(":3: '0 zero 0', must be three numbers"));
+  EXPECT_THAT(messageOf(file(head)), HasSubstr(":8: the file ends, must go on with cylinders"));
+  EXPECT_THAT(messageOf(file(head + "1\n0 2 0.1\n0\n")), HasSubstr(":9: point = 2, must be 0 .. 1"));
+  EXPECT_THAT(messageOf(file(head + "1\n0 1 -0.1\n0\n")), HasSubstr(":9: radius = -0.1, must be above 0"));
+  EXPECT_THAT(messageOf(file(head + "1\n0 0 0.1\n0\n")), HasSubstr(":9: the two points of the axis must differ"));
+  EXPECT_THAT(messageOf(file(head + "1\n0 1 0.1 tree\n0\n")), HasSubstr(":9: 'tree' after the radius, must be name="));
+  EXPECT_THAT(messageOf(file(head + "1\n0 1 0.1\n0\nmore\n")), HasSubstr(":11: more after the circles"));
+  EXPECT_THAT(messageOf(file("V1\nload(\"other.cao\")\n")), HasSubstr(":2:"));
+  EXPECT_EQ(messageOf(file(head + "1\n0 1 0.1 name=\"oak\" # a comment\n0\n")), "");
+}
+
+TEST_F(CaoReader, WritingToAFolderThatIsNotThereIsRefused)
+{
+  EXPECT_THROW(writeCao("/nowhere/model.cao", {}), vpException);
+}
+} // namespace
