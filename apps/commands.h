@@ -12,13 +12,13 @@ void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
-void addServo(CLI::App &app); ///< tasks in the closed loop
-void addBenchmark(CLI::App &app); ///< many simulated flights, medians with intervals
-void addRecord(CLI::App &app);  ///< a live flight to disk
-void addReplay(CLI::App &app);  ///< a recorded flight, served again
-void addEmulate(CLI::App &app); ///< a sequence, served as an AR.Drone would
-void addGraph(CLI::App &app);    ///< the graph of a run
-void addSolve(CLI::App &app);    ///< the optimum of a saved graph
+void addServo(CLI::App &app);             ///< tasks in the closed loop
+void addBenchmark(CLI::App &app);         ///< many simulated flights, medians with intervals
+void addRecord(CLI::App &app);            ///< a live flight to disk
+void addReplay(CLI::App &app);            ///< a recorded flight, served again
+void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone would
+void addGraph(CLI::App &app);             ///< the graph of a run
+void addSolve(CLI::App &app);             ///< the optimum of a saved graph
 void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
 void addShowSaliency(CLI::App &app);      ///< basis flows, saliency beside images
 } // namespace bole::apps

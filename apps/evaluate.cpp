@@ -20,16 +20,14 @@ void addEvaluate(CLI::App &app)
     bool is_verbose = false;
   };
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App *command =
-      app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
+  CLI::App *command = app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
   command->add_option("RUN", arguments->run, "Folder written by `bole track`")->required();
   command
       ->add_option("SEQUENCE", arguments->sequence,
                    "EuRoC/ASL folder with ground truth (and trees.csv), or another run to be "
                    "compared with")
       ->required();
-  command->add_flag("-v,--verbose", arguments->is_verbose,
-                    "List every match, miss and false positive");
+  command->add_flag("-v,--verbose", arguments->is_verbose, "List every match, miss and false positive");
   command->add_flag("--align-time", arguments->options.align_time,
                     "Shift the run's stamps so that its motion fits: for live runs, whose stamps are "
                     "the drone's");
@@ -39,8 +37,7 @@ void addEvaluate(CLI::App &app)
                   "  bole evaluate run/live data/park-forward --align-time\n"
                   "  bole evaluate run/live run/park --align-time");
   command->callback([arguments] {
-    const Evaluation evaluation = 
-        evaluate(arguments->run, arguments->sequence, arguments->options);
+    const Evaluation evaluation = evaluate(arguments->run, arguments->sequence, arguments->options);
     std::fputs(toTable(evaluation, arguments->is_verbose).c_str(), stdout);
     writeAtomically(arguments->run + "/evaluation.json", toJson(evaluation));
   });

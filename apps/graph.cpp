@@ -24,11 +24,9 @@ void printStatistics(const Graph &graph)
   fmt::print("trunks     {}\n", graph.trunks.size());
   fmt::print("summaries  {}", graph.observations.size());
   if (!views.empty())
-    fmt::print(", {} to {} a trunk, median {}", views.front(), views.back(),
-               views[views.size() / 2]);
-  fmt::print("\nodometry   {}\ndirections {}\nheights    {}\npriors     {}\n",
-             graph.odometry.size(), graph.relative_poses.size(), graph.heights.size(),
-             graph.pose_priors.size());
+    fmt::print(", {} to {} a trunk, median {}", views.front(), views.back(), views[views.size() / 2]);
+  fmt::print("\nodometry   {}\ndirections {}\nheights    {}\npriors     {}\n", graph.odometry.size(),
+             graph.relative_poses.size(), graph.heights.size(), graph.pose_priors.size());
   fmt::print("cost       {:.9g}\n", cost(graph));
 }
 } // namespace
@@ -41,8 +39,7 @@ void addGraph(CLI::App &app)
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App *command = app.add_subcommand("graph", "Statistics and export of the graph of a run");
-  command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")
-      ->required();
+  command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")->required();
   command->add_option("--export", arguments->output, "write the graph here, in g2o text");
   command->footer("Example:\n  bole graph run --export forest.g2o");
   command->callback([arguments] {

@@ -3,9 +3,9 @@
 #include "commands.h"
 #include "interrupt.h"
 
-#include <bole/ardrone_source.h>
 #include "ardrone/flight_folder.h"
 #include "ardrone/recording.h"
+#include <bole/ardrone_source.h>
 
 #include <fmt/format.h>
 #include <map>
@@ -31,8 +31,9 @@ void report(const StatusCounts &counts, const LinkCounters &link, std::size_t by
   std::string frames;
   for (const auto &[status, count] : counts)
     frames += fmt::format("{}{} {}", frames.empty() ? "" : ", ", count, toString(status));
-  fmt::print(stderr, "\r{}; {} dropped; {} navdata, {} refused, {} late; {} connections; {:.1f} MB{}", frames, link.dropped,
-             link.navdata_packets, link.navdata_refused, link.navdata_late, link.connections, static_cast<double>(bytes) * 1e-6, end);
+  fmt::print(stderr, "\r{}; {} dropped; {} navdata, {} refused, {} late; {} connections; {:.1f} MB{}", frames,
+             link.dropped, link.navdata_packets, link.navdata_refused, link.navdata_late, link.connections,
+             static_cast<double>(bytes) * 1e-6, end);
 }
 
 void run(const Arguments &arguments)
@@ -40,8 +41,7 @@ void run(const Arguments &arguments)
   const ArDroneAddress address = ArDroneAddress::parse(arguments.address);
   RecordingWriter raw(arguments.folder);
   ArDroneSource source(address, arguments.source,
-                       [&raw](LinkChannel channel, std::int64_t arrival_ns,
-                              const std::uint8_t *data,
+                       [&raw](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
                               std::size_t size) { raw.write(channel, arrival_ns, data, size); });
   std::unique_ptr<FlightFolder> folder;
   if (!arguments.raw_only)
@@ -59,8 +59,7 @@ void run(const Arguments &arguments)
       report(counts, source.counters(), raw.bytes(), "");
     if (!raw.error().empty())
       throw vpException(vpException::ioError, raw.error());
-    if (arguments.seconds > 0 &&
-        static_cast<double>(frame.stamp_ns - first_ns) * 1e-9 >= arguments.seconds)
+    if (arguments.seconds > 0 && static_cast<double>(frame.stamp_ns - first_ns) * 1e-9 >= arguments.seconds)
       break;
   }
   if (!arguments.quiet)
@@ -71,25 +70,21 @@ void run(const Arguments &arguments)
 void addRecord(CLI::App &app)
 {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App *command =
-      app.add_subcommand("record", "Record an AR.Drone's flight: raw bytes, and an ASL folder");
+  CLI::App *command = app.add_subcommand("record", "Record an AR.Drone's flight: raw bytes, and an ASL folder");
   command
       ->add_option("address", arguments->address,
                    "ardrone://HOST[?offset=N&generation=1|2|auto&camera=FILE&video_delay_ms=N]")
       ->required();
   command->add_option("-o,--output", arguments->folder, "Folder to write")->required();
-  command->add_option(
-      "--seconds", arguments->seconds,
-      "Stop after this time of flight (default: at Ctrl-C, or when the drone falls silent)");
-  command->add_option("--give-up", arguments->source.give_up_s,
-                      "Silence that ends the recording [s] (default 10)");
+  command->add_option("--seconds", arguments->seconds,
+                      "Stop after this time of flight (default: at Ctrl-C, or when the drone falls silent)");
+  command->add_option("--give-up", arguments->source.give_up_s, "Silence that ends the recording [s] (default 10)");
   command->add_flag("--raw-only", arguments->raw_only, "No ASL folder");
   command->add_flag("-q,--quiet", arguments->quiet, "No progress");
-  command->footer(
-      "Examples:\n"
-      "  bole record ardrone://192.168.1.1 -o flight\n"
-      "  bole record 'ardrone://127.0.0.1?offset=10000&camera=my.yaml' -o flight --seconds 60\n"
-      "Then: bole track flight --config config/compressed.yaml, or bole replay flight");
+  command->footer("Examples:\n"
+                  "  bole record ardrone://192.168.1.1 -o flight\n"
+                  "  bole record 'ardrone://127.0.0.1?offset=10000&camera=my.yaml' -o flight --seconds 60\n"
+                  "Then: bole track flight --config config/compressed.yaml, or bole replay flight");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

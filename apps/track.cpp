@@ -6,11 +6,11 @@
 #include "overlay_window.h"
 #include "track_output.h"
 
-#include <bole/ardrone_source.h>
-#include <bole/open_source.h>
 #include "input/video_source.h"
 #include "output/progress.h"
+#include <bole/ardrone_source.h>
 #include <bole/config.h>
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,6 @@
 #include <deque>
 #include <fmt/format.h>
 #include <memory>
-
 
 namespace bole::apps
 {
@@ -50,8 +49,9 @@ std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, std::string &
   SourceOptions options = arguments.source;
   options.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
   source = openSource(arguments.input, options);
-  note = fmt::format("no camera file: the camera turns as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
-                     view.degrees, view.sigma_degrees, source->camera().fx);
+  note = fmt::format(
+      "no camera file: the camera turns as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
+      view.degrees, view.sigma_degrees, source->camera().fx);
   return source;
 }
 
@@ -66,7 +66,8 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments, std::string &
 
 bool isCompressed(const FrameSource &source)
 {
-  return dynamic_cast<const ArDroneSource *>(&source) != nullptr || dynamic_cast<const VideoSource *>(&source) != nullptr;
+  return dynamic_cast<const ArDroneSource *>(&source) != nullptr ||
+         dynamic_cast<const VideoSource *>(&source) != nullptr;
 }
 
 PipelineOptions readOptions(const Arguments &arguments, bool is_compressed)
@@ -96,7 +97,7 @@ class Flight
 {
 public:
   Flight(Pipeline &pipeline, TrackOutput &output, OverlayWindow &window)
-    : m_pipeline(pipeline), m_output(output), m_window(window)
+      : m_pipeline(pipeline), m_output(output), m_window(window)
   {
   }
 
@@ -135,7 +136,8 @@ void report(const Arguments &arguments, const TrackOutput &output, std::size_t c
   fmt::print("{} frames, {} trunks confirmed, median {:.1f} ms a frame. Look at {}/overlay.mp4 and {}/map.svg\n", count,
              output.confirmed(), output.timing().medianTotal_ms(), arguments.run, arguments.run);
   if (const auto median = output.timing().age_ms(0.5))
-    fmt::print("Age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, most {:.1f} ms\n",
+    fmt::print("Age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, most "
+               "{:.1f} ms\n",
                *median, *output.timing().age_ms(0.99), *output.timing().age_ms(1));
 }
 
@@ -190,24 +192,29 @@ void addTrack(CLI::App &app)
 {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App *command = app.add_subcommand("track", "Map the trunks of a flight and smooth its trajectory");
-  command->add_option("INPUT", arguments->input,
-                      "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
+  command
+      ->add_option("INPUT", arguments->input,
+                   "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
       ->required();
   command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
-  command->add_option("--config", arguments->config, "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
+  command->add_option("--config", arguments->config,
+                      "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
                       "config/compressed.yaml)");
   command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path,
                       "Poses for a video: TUM or ASL csv; `none` withholds odometry and gyro");
-  command->add_option("--odometry-offset", arguments->source.odometry_offset_s,
-                      "Added to the stamps of --odometry so that they count as the video's do [s]")
+  command
+      ->add_option("--odometry-offset", arguments->source.odometry_offset_s,
+                   "Added to the stamps of --odometry so that they count as the video's do [s]")
       ->capture_default_str();
-  CLI::Option *view = command->add_option("--field-of-view", arguments->source.field_of_view_deg,
-                                          "Horizontal, where there is no camera file [degrees]; else a pan in the video "
-                                          "tells it, or 65 is assumed");
-  command->add_option("--camera-height", arguments->camera_height,
-                      "Height of the camera over the ground [m], which gives a plain video its metre")
+  CLI::Option *view =
+      command->add_option("--field-of-view", arguments->source.field_of_view_deg,
+                          "Horizontal, where there is no camera file [degrees]; else a pan in the video "
+                          "tells it, or 65 is assumed");
+  command
+      ->add_option("--camera-height", arguments->camera_height,
+                   "Height of the camera over the ground [m], which gives a plain video its metre")
       ->check(CLI::Range(0.1, 100.0));
   const auto without = std::make_shared<std::vector<std::string>>();
   command->add_option("--without", *without, "Withhold one sensor: gyro or odometry (may be given twice)")
@@ -221,14 +228,15 @@ void addTrack(CLI::App &app)
       ->capture_default_str();
   command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
-  command->footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, graph.g2o, overlay.mp4, saliency.mp4, map.svg,\n"
-                  "timing.csv and summary.json to the folder; Ctrl-C ends the flight and keeps what is known.\n"
-                  "Examples:\n"
-                  "  bole track data/park-forward -o run\n"
-                  "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
-                  "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
-                  "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
-                  "  bole track ardrone://192.168.1.1 -o run --show");
+  command->footer(
+      "Writes trajectory.tum, trajectory_online.tum, trunks.csv, graph.g2o, overlay.mp4, saliency.mp4, map.svg,\n"
+      "timing.csv and summary.json to the folder; Ctrl-C ends the flight and keeps what is known.\n"
+      "Examples:\n"
+      "  bole track data/park-forward -o run\n"
+      "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
+      "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
+      "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
+      "  bole track ardrone://192.168.1.1 -o run --show");
   command->callback([arguments, view, without] {
     for (const std::string &sensor : *without)
       (sensor == "gyro" ? arguments->is_without_gyro : arguments->is_without_odometry) = true;

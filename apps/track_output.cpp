@@ -3,11 +3,11 @@
 
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include <bole/overlay.h>
 #include "output/timing_csv.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include "smoothing/g2o.h"
+#include <bole/overlay.h>
 
 #include <algorithm>
 #include <chrono>
@@ -48,7 +48,7 @@ void writeFiles(const std::string &run, const MapPicture &picture, const RunSumm
 
 TrackOutput::TrackOutput(const std::string &run, const std::string &input, const std::string &preset,
                          const FrameSource &source, const std::string &note, bool has_video)
-  : m_run(run), m_camera(source.camera())
+    : m_run(run), m_camera(source.camera())
 {
   std::error_code error;
   std::filesystem::create_directories(run, error);
@@ -96,9 +96,10 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, 
     overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high,
                               trunk.map_status, trunk.status == TrackingStatus::tracked});
   }
-  m_in_view = static_cast<std::size_t>(std::count_if(
-      result.trunks.begin(), result.trunks.end(),
-      [](const TrackedTrunk &trunk) { return trunk.status == TrackingStatus::tracked; }));
+  m_in_view =
+      static_cast<std::size_t>(std::count_if(result.trunks.begin(), result.trunks.end(), [](const TrackedTrunk &trunk) {
+        return trunk.status == TrackingStatus::tracked;
+      }));
   if (result.saliency)
     overlay.foreground = foregroundOf(*result.saliency);
   overlay.is_warning = frame.status != FrameStatus::ok;
@@ -141,9 +142,9 @@ void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
   m_summary.reference = pipeline.reference();
   m_picture.caption = describe(m_summary.reference);
   m_summary.is_complete = is_complete;
-  m_confirmed = static_cast<int>(
-      std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),
-                    [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
+  m_confirmed =
+      static_cast<int>(std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),
+                                     [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
 }
 
 void TrackOutput::keep(const Pipeline &pipeline)

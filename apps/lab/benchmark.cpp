@@ -3,11 +3,11 @@
 #include "commands.h"
 #include "interrupt.h"
 
+#include "lab/trials/accuracy_trial.h"
+#include "lab/trials/median_interval.h"
 #include "output/atomic_file.h"
 #include "output/progress.h"
 #include <bole/config.h>
-#include "lab/trials/accuracy_trial.h"
-#include "lab/trials/median_interval.h"
 
 #include <cmath>
 #include <cstdio>
@@ -58,9 +58,12 @@ const std::vector<Measure> &measures()
       {"recall", [](const Result &r) { return orNone(r.trunks.recall, r.trunks.all.expected > 0); }},
       {"precision", [](const Result &r) { return orNone(r.trunks.precision, r.trunks.confirmed > 0); }},
       {"duplicates", [](const Result &r) { return orNone(r.trunks.duplicates, r.trunks.confirmed > 0); }},
-      {"position median [m]", [=](const Result &r) { return orNone(r.trunks.all.median[kAligned], r.trunks.all.matches > 0); }},
-      {"position RMSE [m]", [=](const Result &r) { return orNone(r.trunks.all.rmse[kAligned], r.trunks.all.matches > 0); }},
-      {"... aligned in scale [m]", [=](const Result &r) { return orNone(r.trunks.all.rmse[kScaled], r.trunks.all.matches > 0); }},
+      {"position median [m]",
+       [=](const Result &r) { return orNone(r.trunks.all.median[kAligned], r.trunks.all.matches > 0); }},
+      {"position RMSE [m]",
+       [=](const Result &r) { return orNone(r.trunks.all.rmse[kAligned], r.trunks.all.matches > 0); }},
+      {"... aligned in scale [m]",
+       [=](const Result &r) { return orNone(r.trunks.all.rmse[kScaled], r.trunks.all.matches > 0); }},
       {"radius RMSE [m]", [](const Result &r) { return orNone(r.trunks.all.radius_rmse, r.trunks.all.matches > 0); }},
       {"radius bias [m]", [](const Result &r) { return orNone(r.trunks.all.radius_bias, r.trunks.all.matches > 0); }},
       {"NEES/2", [](const Result &r) { return r.nees_half; }},
@@ -116,11 +119,17 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
   }
   const ShareInterval recall = wilson(static_cast<int>(found), static_cast<int>(expected));
   const ShareInterval precision = wilson(static_cast<int>(matched), static_cast<int>(confirmed));
-  fmt::print("\n{}: {} flights; of all trunks recall {:.2f} [{:.2f}, {:.2f}] ({} of {}), precision {:.2f} [{:.2f}, {:.2f}] ({} of {})\n",
-             name, flights.size(), recall.share, recall.low, recall.high, found, expected, precision.share, precision.low,
-             precision.high, matched, confirmed);
-  json["recall"] = {{"share", recall.share}, {"low", recall.low}, {"high", recall.high}, {"found", found}, {"expected", expected}};
-  json["precision"] = {{"share", precision.share}, {"low", precision.low}, {"high", precision.high}, {"matched", matched}, {"confirmed", confirmed}};
+  fmt::print("\n{}: {} flights; of all trunks recall {:.2f} [{:.2f}, {:.2f}] ({} of {}), precision {:.2f} [{:.2f}, "
+             "{:.2f}] ({} of {})\n",
+             name, flights.size(), recall.share, recall.low, recall.high, found, expected, precision.share,
+             precision.low, precision.high, matched, confirmed);
+  json["recall"] = {
+      {"share", recall.share}, {"low", recall.low}, {"high", recall.high}, {"found", found}, {"expected", expected}};
+  json["precision"] = {{"share", precision.share},
+                       {"low", precision.low},
+                       {"high", precision.high},
+                       {"matched", matched},
+                       {"confirmed", confirmed}};
   for (const Measure &measure : measures()) {
     std::vector<double> values;
     for (const Flight *flight : flights)
@@ -128,8 +137,10 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
     const MedianInterval median = bootstrapMedian(values);
     if (median.count == 0)
       continue;
-    fmt::print("  {:26} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", measure.name, median.median, median.low, median.high, median.count);
-    json["medians"][measure.name] = {{"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
+    fmt::print("  {:26} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", measure.name, median.median, median.low,
+               median.high, median.count);
+    json["medians"][measure.name] = {
+        {"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
   }
   return json;
 }
@@ -137,7 +148,7 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
 void report(const Arguments &arguments, const std::vector<Flight> &flights)
 {
   nlohmann::json json{{"version", BOLE_VERSION}, {"frames", arguments.frames}, {"samples", arguments.samples},
-                      {"path", arguments.path}, {"bark", arguments.bark}, {"first_seed", arguments.first_seed}};
+                      {"path", arguments.path},  {"bark", arguments.bark},     {"first_seed", arguments.first_seed}};
   const auto group = [&](const std::string &name, const auto &belongs) {
     std::vector<const Flight *> members;
     for (const Flight &flight : flights)
@@ -172,18 +183,21 @@ void run(const Arguments &arguments)
     std::error_code error;
     std::filesystem::create_directories(arguments.folder, error);
     if (error)
-      throw vpException(vpException::ioError, "%s: cannot be made: %s", arguments.folder.c_str(), error.message().c_str());
+      throw vpException(vpException::ioError, "%s: cannot be made: %s", arguments.folder.c_str(),
+                        error.message().c_str());
   }
   endAtInterrupt();
   std::vector<Flight> flights;
-  Progress progress(static_cast<std::size_t>(arguments.seeds) * arguments.densities.size() * arguments.lights.size(), stderr);
+  Progress progress(static_cast<std::size_t>(arguments.seeds) * arguments.densities.size() * arguments.lights.size(),
+                    stderr);
   std::size_t confirmed = 0;
   for (int k = 0; k < arguments.seeds; ++k)
     for (const double density : arguments.densities)
       for (const std::string &light : arguments.lights) {
         const std::uint64_t seed = arguments.first_seed + static_cast<std::uint64_t>(k);
         Flight flight{seed, density, light, {}};
-        flight.result = runAccuracyTrial(sceneOf(arguments, seed, density, light), arguments.frames, options, interrupted);
+        flight.result =
+            runAccuracyTrial(sceneOf(arguments, seed, density, light), arguments.frames, options, interrupted);
         if (interrupted())
           return flights.empty() ? void() : report(arguments, flights); // the flights that were finished
         confirmed += flight.result.trunks.confirmed;
@@ -198,23 +212,34 @@ void run(const Arguments &arguments)
 void addBenchmark(CLI::App &app)
 {
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App *command = app.add_subcommand("benchmark", "Simulate, track and evaluate many flights; medians with 95 % intervals");
+  CLI::App *command =
+      app.add_subcommand("benchmark", "Simulate, track and evaluate many flights; medians with 95 % intervals");
   command->add_option("-o,--output", arguments->folder, "Folder for flights.csv and benchmark.json");
-  command->add_option("--seeds", arguments->seeds, "Forests for each density and light")->capture_default_str()->check(CLI::Range(1, 100000));
+  command->add_option("--seeds", arguments->seeds, "Forests for each density and light")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
   command->add_option("--first-seed", arguments->first_seed, "The others follow it")->capture_default_str();
   command->add_option("--density", arguments->densities, "Trunks a square metre, one or more (default 0.04 0.08)");
-  command->add_option("--light", arguments->lights, "sun, overcast or both (default)")->check(CLI::IsMember({"sun", "overcast"}));
-  command->add_option("--bark", arguments->bark, "dark, bright or mixed")->capture_default_str()->check(CLI::IsMember({"dark", "bright", "mixed"}));
-  command->add_option("--path", arguments->path, "forward, lateral, loop or slalom")->capture_default_str()->check(CLI::IsMember({"forward", "lateral", "loop", "slalom"}));
-  command->add_option("--frames", arguments->frames, "Of a flight")->capture_default_str()->check(CLI::Range(20, 100000));
+  command->add_option("--light", arguments->lights, "sun, overcast or both (default)")
+      ->check(CLI::IsMember({"sun", "overcast"}));
+  command->add_option("--bark", arguments->bark, "dark, bright or mixed")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dark", "bright", "mixed"}));
+  command->add_option("--path", arguments->path, "forward, lateral, loop or slalom")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"forward", "lateral", "loop", "slalom"}));
+  command->add_option("--frames", arguments->frames, "Of a flight")
+      ->capture_default_str()
+      ->check(CLI::Range(20, 100000));
   command->add_option("--samples", arguments->samples, "Rays a pixel")->capture_default_str()->check(CLI::Range(1, 64));
   command->add_option("--h264", arguments->h264_kbps, "Pass the pictures through H.264 at this bit rate [kbit/s]");
   command->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   command->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
-  command->footer("Intervals of medians by bootstrap over the flights, of shares by Wilson. Ctrl-C reports the flights finished.\n"
-                  "Examples:\n"
-                  "  bole benchmark --seeds 10 -o run/benchmark\n"
-                  "  bole benchmark --seeds 5 --density .12 --light sun --path slalom --set flow.use_saliency=false");
+  command->footer(
+      "Intervals of medians by bootstrap over the flights, of shares by Wilson. Ctrl-C reports the flights finished.\n"
+      "Examples:\n"
+      "  bole benchmark --seeds 10 -o run/benchmark\n"
+      "  bole benchmark --seeds 5 --density .12 --light sun --path slalom --set flow.use_saliency=false");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

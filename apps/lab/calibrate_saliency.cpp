@@ -53,7 +53,8 @@ void calibrate(const CalibrateArguments &arguments)
 void addCalibrateSaliency(CLI::App &app)
 {
   auto arguments = std::make_shared<CalibrateArguments>();
-  CLI::App *command = app.add_subcommand("calibrate-saliency", "Learn the noise parameters of saliency from a sequence");
+  CLI::App *command =
+      app.add_subcommand("calibrate-saliency", "Learn the noise parameters of saliency from a sequence");
   command->add_option("SEQUENCE", arguments->sequence, "ASL folder, video or numbered images")->required();
   command->add_option("-o,--output", arguments->output, "Configuration file to write")->capture_default_str();
   command->footer("Example:\n  bole calibrate-saliency flights/park-forward -o saliency.yaml");

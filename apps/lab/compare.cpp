@@ -3,8 +3,8 @@
 #include "commands.h"
 
 #include "lab/baseline/comparison_report.h"
-#include "output/atomic_file.h"
 #include "mbt/cao_reader.h"
+#include "output/atomic_file.h"
 
 #include <cstdio>
 #include <filesystem>
@@ -25,7 +25,8 @@ struct Arguments
   double range_m = 25, far_m = 25;
 };
 
-constexpr TrackerKind kVisp[] = {TrackerKind::visp_edge, TrackerKind::visp_generic_edge, TrackerKind::visp_generic_edge_klt};
+constexpr TrackerKind kVisp[] = {TrackerKind::visp_edge, TrackerKind::visp_generic_edge,
+                                 TrackerKind::visp_generic_edge_klt};
 
 TestFlight readFlight(const std::string &path)
 {
@@ -75,7 +76,8 @@ void compareAll(const Arguments &arguments, const TestFlight &flight, const std:
   report.timing = compare(flight, cao, timed, report.limits);
 }
 
-void measureBasin(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+void measureBasin(const Arguments &arguments, const TestFlight &flight, const std::string &cao,
+                  ComparisonReport &report)
 {
   BasinOptions options;
   options.min_trunks = std::min(2, int(flight.trunks.size()));
@@ -104,7 +106,8 @@ void measureBasin(const Arguments &arguments, const TestFlight &flight, const st
   }
 }
 
-void measureFaults(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+void measureFaults(const Arguments &arguments, const TestFlight &flight, const std::string &cao,
+                   ComparisonReport &report)
 {
   std::vector<Contender> contenders;
   for (const TrackerKind kind : kVisp)
@@ -122,7 +125,8 @@ void run(const Arguments &arguments)
   fs::create_directories(arguments.out);
   const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
   if (model.empty())
-    throw vpException(vpException::badValue, fmt::format("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m));
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m));
   const std::string cao = (fs::path(arguments.out) / "truth.cao").string();
   writeCao(cao, model, "the trunks of " + flight.name + " as they are");
 
@@ -151,24 +155,29 @@ void addCompare(CLI::App &app)
 {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App *command = app.add_subcommand("compare", "Compare vpMbTrunkTracker with ViSP's edge trackers on one flight");
-  command->add_option("SEQUENCE", arguments->sequence,
-                      "EuRoC/ASL folder with ground truth and trees.csv, or the folder `mbt` of visp-images-data")
+  command
+      ->add_option("SEQUENCE", arguments->sequence,
+                   "EuRoC/ASL folder with ground truth and trees.csv, or the folder `mbt` of visp-images-data")
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_option("-o,--output", arguments->out, "Folder for the results")->required();
   command->add_flag("--basin", arguments->has_basin, "Also: right answers against the size of a yaw step");
   command->add_flag("--faults", arguments->has_faults, "Also: black, noisy, smeared, frozen and wrong-size frames");
-  command->add_flag("--quick", arguments->is_quick, "ViSP's trackers at the settings of its tutorials, without the sweep");
-  command->add_option("--settings", arguments->settings, "XML settings of our tracker (models/*.xml)")->check(CLI::ExistingFile);
+  command->add_flag("--quick", arguments->is_quick,
+                    "ViSP's trackers at the settings of its tutorials, without the sweep");
+  command->add_option("--settings", arguments->settings, "XML settings of our tracker (models/*.xml)")
+      ->check(CLI::ExistingFile);
   command->add_option("--far", arguments->far_m, "Range up to which our tracker uses trunks [m]")
       ->check(CLI::Range(0.5, 100.0))
       ->capture_default_str();
-  command->footer("Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
-                  "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are used.\n"
-                  "Prints the table and writes OUT/compare.json, compare.html and compare.svg.\n"
-                  "Examples:\n"
-                  "  bole compare data/park-forward -o run/compare --basin --faults\n"
-                  "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");
+  command->footer(
+      "Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
+      "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are "
+      "used.\n"
+      "Prints the table and writes OUT/compare.json, compare.html and compare.svg.\n"
+      "Examples:\n"
+      "  bole compare data/park-forward -o run/compare --basin --faults\n"
+      "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

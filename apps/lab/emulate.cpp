@@ -38,8 +38,7 @@ void serve(ArDroneEmulator &emulator, bool quiet)
   while (!emulator.wait(0.25) && !interrupted())
     if (!quiet) {
       const auto counters = emulator.counters();
-      fmt::print(stderr, "\r{:.1f} s, {} frames, {} navdata ", counters.flight_s, counters.frames,
-                 counters.navdata);
+      fmt::print(stderr, "\r{:.1f} s, {} frames, {} navdata ", counters.flight_s, counters.frames, counters.navdata);
     }
   emulator.stop();
   const auto c = emulator.counters();
@@ -47,8 +46,8 @@ void serve(ArDroneEmulator &emulator, bool quiet)
     fmt::print(stderr,
                "\r{:.1f} s flown; sent {} frames, {} navdata; faults: {} lost, {} frames and {} "
                "navdata corrupted, {} frozen, {} stalled, {} reboots; {} frames not read\n",
-               c.flight_s, c.frames, c.navdata, c.lost, c.corrupted_frames, c.corrupted_navdata,
-               c.frozen, c.stalled, c.reboots, c.refused);
+               c.flight_s, c.frames, c.navdata, c.lost, c.corrupted_frames, c.corrupted_navdata, c.frozen, c.stalled,
+               c.reboots, c.refused);
 }
 
 void run(Arguments &arguments)
@@ -64,10 +63,8 @@ void run(Arguments &arguments)
     fmt::print(stderr,
                "AR.Drone {} at ardrone://127.0.0.1{}; images {}x{}, f = {:.1f} px{}; waits for a "
                "listener\n",
-               arguments.feed.generation,
-               arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "",
-               camera.width, camera.height, camera.fx,
-               has_odometry ? "" : "; no odometry in it: navdata stand still");
+               arguments.feed.generation, arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "",
+               camera.width, camera.height, camera.fx, has_odometry ? "" : "; no odometry in it: navdata stand still");
   serve(emulator, arguments.quiet);
 }
 
@@ -84,9 +81,8 @@ void replay(ReplayArguments &arguments)
   setPorts(arguments.emulator, arguments.offset);
   auto feed = makeRecordingFeed(arguments.flight);
   if (!arguments.quiet)
-    fmt::print(stderr, "AR.Drone {} of {} at ardrone://127.0.0.1{}; waits for a listener\n",
-               feed->generation(), arguments.flight,
-               arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "");
+    fmt::print(stderr, "AR.Drone {} of {} at ardrone://127.0.0.1{}; waits for a listener\n", feed->generation(),
+               arguments.flight, arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "");
   ArDroneEmulator emulator(std::move(feed), arguments.emulator);
   serve(emulator, arguments.quiet);
 }
@@ -96,13 +92,9 @@ void addEmulate(CLI::App &app)
 {
   auto arguments = std::make_shared<Arguments>();
   ArDroneEmulator::Options &emulator = arguments->emulator;
-  CLI::App *command =
-      app.add_subcommand("emulate", "Serve a sequence or video as an AR.Drone would, on loopback");
-  command->add_option("input", arguments->input, "ASL folder, numbered images or video")
-      ->required();
-  command
-      ->add_option("--generation", arguments->feed.generation,
-                   "1 (UVLC over UDP) or 2 (H.264 over TCP, default)")
+  CLI::App *command = app.add_subcommand("emulate", "Serve a sequence or video as an AR.Drone would, on loopback");
+  command->add_option("input", arguments->input, "ASL folder, numbered images or video")->required();
+  command->add_option("--generation", arguments->feed.generation, "1 (UVLC over UDP) or 2 (H.264 over TCP, default)")
       ->check(CLI::IsMember({1, 2}));
   command->add_option("--speed", emulator.speed, "Flight seconds a second, 1 to 20 (default 1)");
   command->add_flag("--loop", arguments->feed.loop, "There and back for ever");
@@ -110,9 +102,8 @@ void addEmulate(CLI::App &app)
   command->add_option("--camera", arguments->source.camera_path, "Camera file of the input");
   command->add_option("--offset", arguments->offset, "Added to the ports 5554 to 5556 (default 0)")
       ->check(CLI::Range(0, 59000));
-  command->add_option(
-      "--bit-rate", arguments->bit_rate_kbps,
-      "Of the H.264 [kbit/s] (default 1300, as captured; the drone's most is 4000)");
+  command->add_option("--bit-rate", arguments->bit_rate_kbps,
+                      "Of the H.264 [kbit/s] (default 1300, as captured; the drone's most is 4000)");
   command->add_option("--loss", emulator.loss, "Share of packets not sent, [0, 1)");
   command->add_option("--jitter", arguments->jitter_ms, "Largest extra delay of a packet [ms]");
   command->add_option("--corrupt", emulator.corrupt, "Share of packets with changed bytes, [0, 1)");
@@ -120,30 +111,25 @@ void addEmulate(CLI::App &app)
   command->add_option("--freeze", emulator.freeze_at_s,
                       "From this time [s] the camera sends one picture for --freeze-for");
   command->add_option("--freeze-for", emulator.freeze_for_s, "[s] (default 2)");
-  command->add_option("--stall", emulator.stall_at_s,
-                      "From this time [s] no video for --stall-for");
+  command->add_option("--stall", emulator.stall_at_s, "From this time [s] no video for --stall-for");
   command->add_option("--stall-for", emulator.stall_for_s, "[s] (default 2)");
   command->add_flag("--clock-wrap", emulator.clock_wrap, "Both clocks wrap after 3 s");
   command->add_option("--seed", emulator.seed, "Of the faults (default 1)");
   command->add_flag("-q,--quiet", arguments->quiet, "No progress");
-  command->footer(
-      "Examples:\n"
-      "  bole emulate data/park-forward --offset 10000 &\n"
-      "  bole track "
-      "'ardrone://127.0.0.1?offset=10000&camera=data/park-forward/mav0/cam0/sensor.yaml'\n"
-      "  bole emulate flight --generation 1 --loop --speed 2 --loss 0.05 --reboot 20");
+  command->footer("Examples:\n"
+                  "  bole emulate data/park-forward --offset 10000 &\n"
+                  "  bole track "
+                  "'ardrone://127.0.0.1?offset=10000&camera=data/park-forward/mav0/cam0/sensor.yaml'\n"
+                  "  bole emulate flight --generation 1 --loop --speed 2 --loss 0.05 --reboot 20");
   command->callback([arguments] { run(*arguments); });
 }
 
 void addReplay(CLI::App &app)
 {
   auto arguments = std::make_shared<ReplayArguments>();
-  CLI::App *command =
-      app.add_subcommand("replay", "Serve a recorded flight again as the drone did");
-  command->add_option("flight", arguments->flight, "Folder of `bole record`, or its raw.bin")
-      ->required();
-  command->add_option("--speed", arguments->emulator.speed,
-                      "Flight seconds a second, 1 to 20 (default 1)");
+  CLI::App *command = app.add_subcommand("replay", "Serve a recorded flight again as the drone did");
+  command->add_option("flight", arguments->flight, "Folder of `bole record`, or its raw.bin")->required();
+  command->add_option("--speed", arguments->emulator.speed, "Flight seconds a second, 1 to 20 (default 1)");
   command->add_option("--offset", arguments->offset, "Added to the ports 5554 to 5556 (default 0)")
       ->check(CLI::Range(0, 59000));
   command->add_flag("-q,--quiet", arguments->quiet, "No progress");

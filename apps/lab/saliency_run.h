@@ -4,8 +4,8 @@
 /// Feeds a sequence to the saliency stage: gyro and odometry of a frame as priors of the camera's motion.
 
 #include "geometry/so3.h"
-#include <bole/open_source.h>
 #include "saliency/saliency.h"
+#include <bole/open_source.h>
 
 #include <optional>
 
@@ -15,8 +15,9 @@ class SaliencyRun
 {
 public:
   SaliencyRun(FrameSource &source, const SaliencyOptions &options)
-    : m_source(source), m_estimator(source.camera(), options)
-  {}
+      : m_source(source), m_estimator(source.camera(), options)
+  {
+  }
 
   /// Reads on to the next frame that can be used; false at the end.
   bool next()
@@ -41,7 +42,7 @@ public:
   vpImage<unsigned char> previous_image;
 
 private:
-  static constexpr double kGyroSigma = 6e-4;        // [rad] a frame and axis
+  static constexpr double kGyroSigma = 6e-4;         // [rad] a frame and axis
   static constexpr double kTranslationSigma = 0.017; // [m] a frame and axis: the difference of two poses good to 1.2 cm
 
   std::optional<RotationPrior> gyro() const

@@ -4,13 +4,13 @@
 #include "interrupt.h"
 #include "overlay_window.h"
 
-#include "output/atomic_file.h"
-#include <bole/overlay.h>
-#include "output/video_writer.h"
-#include <bole/config.h>
 #include "lab/trials/error_curves.h"
 #include "lab/trials/median_interval.h"
 #include "lab/trials/servo_trial.h"
+#include "output/atomic_file.h"
+#include "output/video_writer.h"
+#include <bole/config.h>
+#include <bole/overlay.h>
 
 #include <algorithm>
 #include <cmath>
@@ -56,13 +56,14 @@ const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::ser
                                       {"hover after fault [s]", &ServoTrialResult::hover_after_s},
                                       {"drift in fault [m]", &ServoTrialResult::drift}};
 
-vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const LoopSample &sample, const PinholeCamera &camera)
+vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const LoopSample &sample,
+                          const PinholeCamera &camera)
 {
   Overlay overlay;
   for (const TrackedTrunk &trunk : result.trunks)
     if (trunk.map_status != TrunkStatus::merged && trunk.status != TrackingStatus::not_visible)
-      overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high, trunk.map_status,
-                                trunk.status == TrackingStatus::tracked});
+      overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high,
+                                trunk.map_status, trunk.status == TrackingStatus::tracked});
   overlay.is_warning = sample.is_lost;
   overlay.text = fmt::format("{:.1f} s  {}", sample.time_s, sample.reason);
   for (const auto &[name, value] : sample.real)
@@ -73,7 +74,9 @@ vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const L
 
 nlohmann::json toJson(const ServoTrialResult &result)
 {
-  nlohmann::json json{{"seed", result.seed}, {"success", result.is_success}, {"outcome", result.outcome},
+  nlohmann::json json{{"seed", result.seed},
+                      {"success", result.is_success},
+                      {"outcome", result.outcome},
                       {"other gap", result.is_other_gap}};
   for (const Column &column : kColumns)
     json[column.name] = std::isnan(result.*column.value) ? nlohmann::json() : nlohmann::json(result.*column.value);
@@ -132,15 +135,21 @@ void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult>
 {
   if (arguments.folder.empty())
     return;
-  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)}, {"runs", results.size()},
-                      {"runs asked for", arguments.runs}, {"successes", successes(results)},
-                      {"contacts", contacts(results)}, {"other gaps", otherGaps(results)},
-                      {"failures", failures(results)}, {"gated", arguments.trial.pipeline.flow.use_saliency},
-                      {"fault", arguments.fault}, {"version", BOLE_VERSION}};
+  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)},
+                      {"runs", results.size()},
+                      {"runs asked for", arguments.runs},
+                      {"successes", successes(results)},
+                      {"contacts", contacts(results)},
+                      {"other gaps", otherGaps(results)},
+                      {"failures", failures(results)},
+                      {"gated", arguments.trial.pipeline.flow.use_saliency},
+                      {"fault", arguments.fault},
+                      {"version", BOLE_VERSION}};
   for (const Column &column : kColumns) {
     const MedianInterval median = medianOf(column, results);
     if (median.count > 0)
-      json["medians"][column.name] = {{"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
+      json["medians"][column.name] = {
+          {"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
   }
   for (const ServoTrialResult &result : results)
     json["each"].push_back(toJson(result));
@@ -162,8 +171,8 @@ void print(const Arguments &arguments, const std::vector<ServoTrialResult> &resu
   for (const Column &column : kColumns) {
     const MedianInterval median = medianOf(column, results);
     if (median.count > 0)
-      fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low, median.high,
-                 median.count);
+      fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low,
+                 median.high, median.count);
   }
   if (!arguments.folder.empty())
     fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
@@ -229,7 +238,8 @@ void run(Arguments &arguments)
     if (interrupted() && k > 0)
       break; // half a run says nothing
     std::fprintf(stderr, "run %d of %d, seed %llu: %s\n", k + 1, arguments.runs,
-                 static_cast<unsigned long long>(result.seed), result.is_success ? "succeeded" : result.outcome.c_str());
+                 static_cast<unsigned long long>(result.seed),
+                 result.is_success ? "succeeded" : result.outcome.c_str());
     result.record.samples.clear(); // written already; a hundred of them would fill the memory
     results.push_back(std::move(result));
     writeTables(arguments, results);
@@ -246,12 +256,19 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   CLI::App *task = servo.add_subcommand(toString(kind), what);
   task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
   task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();
-  task->add_option("--runs", arguments->runs, "Random starts, a seed each")->capture_default_str()->check(CLI::Range(1, 100000));
-  task->add_option("--density", trial.scenario.density, "Trunks a square metre (hold, circle .03, gap .04, slalom .05)");
+  task->add_option("--runs", arguments->runs, "Random starts, a seed each")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  task->add_option("--density", trial.scenario.density,
+                   "Trunks a square metre (hold, circle .03, gap .04, slalom .05)");
   if (kind == ServoKind::hold)
-    task->add_option("--distance", trial.distance, "To be kept [m]: as good as the map's radius")->capture_default_str()->check(CLI::Range(0.5, 20.0));
+    task->add_option("--distance", trial.distance, "To be kept [m]: as good as the map's radius")
+        ->capture_default_str()
+        ->check(CLI::Range(0.5, 20.0));
   if (kind == ServoKind::hold || kind == ServoKind::circle)
-    task->add_option("--ratio", trial.ratio, "Radius over distance to be kept (circle .07; hold: instead of --distance)")->check(CLI::Range(0.01, 0.5));
+    task->add_option("--ratio", trial.ratio,
+                     "Radius over distance to be kept (circle .07; hold: instead of --distance)")
+        ->check(CLI::Range(0.01, 0.5));
   if (kind != ServoKind::hold)
     task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1)")->check(CLI::Range(0.05, 2.0));
   if (kind == ServoKind::circle)
@@ -266,7 +283,8 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   task->add_option("--fault-for", trial.loop.fault.duration_s, "[s]")->capture_default_str();
   task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();
   task->add_option("--samples", trial.robot.renderer.samples_per_pixel, "Rays a pixel")->capture_default_str();
-  task->add_option("--gust", trial.robot.body.gust, "Standard deviation of the wind's push [m/s^2]")->capture_default_str();
+  task->add_option("--gust", trial.robot.body.gust, "Standard deviation of the wind's push [m/s^2]")
+      ->capture_default_str();
   task->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   task->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
   task->add_flag("--ungated", arguments->is_ungated, "Without saliency: nothing says what is foreground");
@@ -281,12 +299,16 @@ void addServo(CLI::App &app)
 {
   CLI::App *servo = app.add_subcommand("servo", "Fly by trunks in a simulated forest, through the tracker");
   servo->require_subcommand(1);
-  addTask(*servo, ServoKind::hold, "Keep the bearing and the distance of a trunk", "bole servo hold --seed 1 --runs 20 -o run/hold");
-  addTask(*servo, ServoKind::circle, "Go round a trunk at constant r/d", "bole servo circle --ratio .08 --speed .5 -o run/circle --show");
+  addTask(*servo, ServoKind::hold, "Keep the bearing and the distance of a trunk",
+          "bole servo hold --seed 1 --runs 20 -o run/hold");
+  addTask(*servo, ServoKind::circle, "Go round a trunk at constant r/d",
+          "bole servo circle --ratio .08 --speed .5 -o run/circle --show");
   addTask(*servo, ServoKind::gap, "Pass between two trunks", "bole servo gap --runs 50 --no-video -o run/gap");
-  addTask(*servo, ServoKind::slalom, "Through a stand of trees along a line", "bole servo slalom --length 40 --density .05 --runs 10 --ungated -o run/slalom");
-  servo->footer("The loop is closed over rendered images and the tracker; the truth only judges. The drone hovers where a frame\n"
-                "cannot be believed or the trunk it flies by is lost: try --fault black.\n"
-                "Example: bole servo hold --fault freeze --fault-at 8 --fault-for 3 -o run");
+  addTask(*servo, ServoKind::slalom, "Through a stand of trees along a line",
+          "bole servo slalom --length 40 --density .05 --runs 10 --ungated -o run/slalom");
+  servo->footer(
+      "The loop is closed over rendered images and the tracker; the truth only judges. The drone hovers where a frame\n"
+      "cannot be believed or the trunk it flies by is lost: try --fault black.\n"
+      "Example: bole servo hold --fault freeze --fault-at 8 --fault-for 3 -o run");
 }
 } // namespace bole::apps

@@ -29,12 +29,14 @@ std::string basisFlowsSvg(const PinholeCamera &camera)
   const char *axes[3] = {"turn about x (right)", "turn about y (down)", "turn about z (forward)"};
   const double turn = 0.06; // [rad], for arrows of a length that can be seen
   const int step = camera.width / 14;
-  std::string svg = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" "
-                                "font-size=\"14\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-                                3 * camera.width + 40, camera.height + 40);
+  std::string svg =
+      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" "
+                  "font-size=\"14\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+                  3 * camera.width + 40, camera.height + 40);
   for (int axis = 0; axis < 3; ++axis) {
-    svg += fmt::format("<g transform=\"translate({},10)\"><rect width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
-                       10 + axis * (camera.width + 10), camera.width, camera.height);
+    svg += fmt::format(
+        "<g transform=\"translate({},10)\"><rect width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
+        10 + axis * (camera.width + 10), camera.width, camera.height);
     for (int v = step / 2; v < camera.height; v += step)
       for (int u = step / 2; u < camera.width; u += step) {
         const Eigen::Vector2d flow = turn * flowMatrix(camera, {u, v}).col(axis);
@@ -91,8 +93,12 @@ void addShowSaliency(CLI::App &app)
       app.add_subcommand("show-saliency", "Draw the basis flows and saliency beside the images of a sequence");
   command->add_option("SEQUENCE", arguments->sequence, "ASL folder, video or numbered images")->required();
   command->add_option("-o,--output", arguments->output, "Folder for the pictures")->capture_default_str();
-  command->add_option("--first", arguments->first, "First frame that is drawn")->capture_default_str()->check(CLI::NonNegativeNumber);
-  command->add_option("--every", arguments->every, "Frames from picture to picture")->capture_default_str()->check(CLI::PositiveNumber);
+  command->add_option("--first", arguments->first, "First frame that is drawn")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--every", arguments->every, "Frames from picture to picture")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   command->footer("White is near (or moves unlike the background), black is far, grey is unknown.\n"
                   "Example:\n  bole show-saliency flights/park-forward -o pictures --every 40");
   command->callback([arguments] { show(*arguments); });

@@ -24,8 +24,7 @@ struct Arguments
 /// Options of the command line go on top of the file's: only those that were given.
 void run(const CLI::App &command, const Arguments &arguments)
 {
-  SceneOptions scene =
-      arguments.scene_file.empty() ? SceneOptions() : readScene(arguments.scene_file);
+  SceneOptions scene = arguments.scene_file.empty() ? SceneOptions() : readScene(arguments.scene_file);
   if (arguments.scene_file.empty() && command.count("--samples") == 0) {
     scene.renderer.samples_per_pixel = 8;
   }
@@ -49,13 +48,11 @@ void run(const CLI::App &command, const Arguments &arguments)
   take("--h264", scene.h264_kbps, given.h264_kbps);
   take("--samples", scene.renderer.samples_per_pixel, given.renderer.samples_per_pixel);
   if (arguments.lens == "ardrone1") { // published calibration of its front camera
-    scene.renderer.camera = {
-        {215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
+    scene.renderer.camera = {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
   }
   else if (arguments.lens == "ardrone2") {
-    scene.renderer.camera = {{569.9, 568.0, 331.4, 135.9, 640, 360},
-                             Distortion::radial_tangential,
-                             {{-0.527, 0.274, 0.0211, -0.0064}}};
+    scene.renderer.camera = {
+        {569.9, 568.0, 331.4, 135.9, 640, 360}, Distortion::radial_tangential, {{-0.527, 0.274, 0.0211, -0.0064}}};
   }
   const int frames = arguments.record.frames;
   recordFlight(scene, arguments.record, [&](int done) {
@@ -70,19 +67,17 @@ void run(const CLI::App &command, const Arguments &arguments)
 void addSimulate(CLI::App &app)
 {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App *command = app.add_subcommand(
-      "simulate", "Render a flight through a forest, with its truth, as an ASL folder");
+  CLI::App *command =
+      app.add_subcommand("simulate", "Render a flight through a forest, with its truth, as an ASL folder");
   const std::map<std::string, Light> lights{{"sun", Light::sun}, {"overcast", Light::overcast}};
-  const std::map<std::string, Bark> barks{
-      {"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}};
+  const std::map<std::string, Bark> barks{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}};
   const std::map<std::string, PathKind> paths{{"forward", PathKind::forward},
                                               {"lateral", PathKind::lateral},
                                               {"loop", PathKind::loop},
                                               {"slalom", PathKind::slalom}};
   SceneOptions &scene = arguments->scene;
   command->add_option("-o,--output", arguments->record.folder, "Folder to write")->required();
-  command->add_option("--scene", arguments->scene_file,
-                      "Scene file (YAML); the options below go on top of it");
+  command->add_option("--scene", arguments->scene_file, "Scene file (YAML); the options below go on top of it");
   command->add_option("--seed", arguments->seed, "Same seed, same bytes (default 1)");
   command->add_option("--density", scene.forest.density, "Trunks a square metre (default 0.06)");
   command->add_option("--light", scene.forest.light, "sun or overcast (default)")
@@ -93,27 +88,22 @@ void addSimulate(CLI::App &app)
       ->transform(CLI::CheckedTransformer(paths));
   command->add_option("--frames", arguments->record.frames, "Number of frames (default 120)");
   command->add_option("--speed", scene.flight.speed, "[m/s] (default 1)");
-  command->add_option("--flight-height", scene.flight.height,
-                      "Over the ground at the start [m] (default 1.2)");
+  command->add_option("--flight-height", scene.flight.height, "Over the ground at the start [m] (default 1.2)");
   command->add_option("--rate", scene.rate_hz, "Frames a second (default 10)");
-  command->add_option("--exposure", scene.exposure_ms,
-                      "Time of exposure [ms]: motion blur (default 6)");
+  command->add_option("--exposure", scene.exposure_ms, "Time of exposure [ms]: motion blur (default 6)");
   command->add_option("--samples", scene.renderer.samples_per_pixel, "Rays a pixel (default 8)");
   command
       ->add_option("--camera", arguments->lens,
                    "none (f = 200 px, no distortion; or the scene's), ardrone1 or ardrone2")
       ->check(CLI::IsMember({"none", "ardrone1", "ardrone2"}));
-  command->add_option("--h264", scene.h264_kbps,
-                      "Pass the pictures through H.264 at this bit rate [kbit/s]");
-  command->add_flag("--truth-images", arguments->record.truth_images,
-                    "Write depth/ and trunk_id/ too");
+  command->add_option("--h264", scene.h264_kbps, "Pass the pictures through H.264 at this bit rate [kbit/s]");
+  command->add_flag("--truth-images", arguments->record.truth_images, "Write depth/ and trunk_id/ too");
   command->add_flag("--overwrite", arguments->record.overwrite, "Replace the folder");
   command->add_flag("-q,--quiet", arguments->quiet, "No progress");
-  command->footer(
-      "Examples:\n"
-      "  bole simulate --seed 7 --density 0.08 --light sun --path slalom -o flight\n"
-      "  bole simulate --seed 7 --camera ardrone2 --h264 1000 --truth-images -o flight\n"
-      "  bole simulate --scene flight/scene.yaml --seed 8 -o another");
+  command->footer("Examples:\n"
+                  "  bole simulate --seed 7 --density 0.08 --light sun --path slalom -o flight\n"
+                  "  bole simulate --seed 7 --camera ardrone2 --h264 1000 --truth-images -o flight\n"
+                  "  bole simulate --scene flight/scene.yaml --seed 8 -o another");
   command->callback([command, arguments] { run(*command, *arguments); });
 }
 } // namespace bole::apps

@@ -4,8 +4,8 @@
 /// A live drone as a source of frames for the pipeline.
 
 #include "input/camera_file.h"
-#include <bole/frame.h>
 #include "input/rectifier.h"
+#include <bole/frame.h>
 #include <bole/vpArDroneGrabber.h>
 
 #include <memory>

@@ -20,15 +20,9 @@ struct PinholeCamera
   int width = 320, height = 240; ///< [px]
 
   /// Pixel of a point or direction in front of the camera (z > 0).
-  Eigen::Vector2d project(const Eigen::Vector3d &p) const
-  {
-    return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy};
-  }
+  Eigen::Vector2d project(const Eigen::Vector3d &p) const { return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy}; }
   /// Direction (x, y, 1) of a pixel.
-  Eigen::Vector3d ray(const Eigen::Vector2d &u_px) const
-  {
-    return {(u_px.x() - cx) / fx, (u_px.y() - cy) / fy, 1};
-  }
+  Eigen::Vector3d ray(const Eigen::Vector2d &u_px) const { return {(u_px.x() - cx) / fx, (u_px.y() - cy) / fy, 1}; }
   bool contains(const Eigen::Vector2d &u_px, double margin_px = 0) const
   {
     return u_px.x() >= margin_px && u_px.y() >= margin_px && u_px.x() <= width - 1 - margin_px &&
@@ -41,7 +35,8 @@ struct PinholeCamera
 };
 
 /// How the lens bends what the pinhole would show.
-enum class Distortion {
+enum class Distortion
+{
   none,
   radial_tangential, ///< k1, k2, p1, p2 (OpenCV, EuRoC)
   equidistant,       ///< k1 .. k4 (OpenCV fisheye, EuRoC)

@@ -3,9 +3,9 @@
 /// \file
 /// Options from YAML files: strict, with the line of every mistake.
 ///
-/// A file has one map a stage (`flow`, `motion`, `points`, `gyro`, `relative_pose`, `gradient`, `saliency`, `detection`,
-/// `energy`, `tracking`, `smoothing`, `map`) whose keys are the names of the members of that stage's options. Keys that
-/// are not given keep their value. Unknown, repeated, mistyped and out-of-range keys are errors.
+/// A file has one map a stage (`flow`, `motion`, `points`, `gyro`, `relative_pose`, `gradient`, `saliency`,
+/// `detection`, `energy`, `tracking`, `smoothing`, `map`) whose keys are the names of the members of that stage's
+/// options. Keys that are not given keep their value. Unknown, repeated, mistyped and out-of-range keys are errors.
 ///
 /// Laws (each a test): config/default.yaml gives the defaults of the code; readConfig(toYaml(x)) == x.
 

@@ -45,8 +45,7 @@ struct Evaluation
 /// file that is missing or faulty, or that has no common stamps with the truth. Where the summary of
 /// the run says that its metre is not odometry's, trunks are matched after alignment in scale too;
 /// where its world stands at the height of the first camera, the mean height is aligned.
-Evaluation evaluate(const std::string &run, const std::string &sequence,
-                    const EvaluationOptions &options = {});
+Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options = {});
 
 /// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match
 /// or its nearest neighbour, and every false positive and duplicate.

@@ -17,6 +17,5 @@ namespace bole
 /// for (Frame frame; source->next(frame);)
 ///   use(frame);
 /// \endcode
-std::unique_ptr<FrameSource> openSource(const std::string &input,
-                                        const SourceOptions &options = {});
+std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOptions &options = {});
 } // namespace bole

@@ -10,8 +10,8 @@
 #include "pipeline/motion_model.h"
 #include "pipeline/visual_odometry.h"
 #include "saliency/saliency_options.h"
-#include <bole/smoother.h>
 #include "tracking/trunk_tracker.h"
+#include <bole/smoother.h>
 
 namespace bole
 {
@@ -35,27 +35,27 @@ inline SmootherOptions closeToTheOptimum()
 /// What belongs to no single stage.
 struct FlowOptions
 {
-  bool use_points = true;        ///< relative poses from point features
-  bool use_saliency = true;      ///< motion saliency: off leaves detection ungated
-  bool detect_lines = false;     ///< the one-frame detector too; always on where no odometry gives a range
-  bool detect_window = true;     ///< the detector that asks a window of frames
-  int detect_every = 1;          ///< frames between two runs of the detector, 1 to 100
-  int adopt_most = 3;            ///< detections that become candidates in one frame, the best, 1 to 100: each costs
-                                 ///< time and, while it is wrong, pulls on the trajectory
-  double view_spacing = 0.06;    ///< least move between two views of the detector's window [m], 0 to 1
-  double trunk_low = 0.25;       ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
-  double trunk_high = 2.6;       ///< ... to [m]; its middle is near breast height, where radii are told
-  double track_range = 12;       ///< known trunks farther than this are not tracked [m], 1 to 100
-  double gate = 9.2;             ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
-  double contrast_noise = 0.02;  ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
-  double gate_sigma_px = 1.0;    ///< of a border beside the prediction [px], 0.1 to 10
-  double search_px = 0;          ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
-                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
-  double view_correlation = 0;   ///< views of a trunk from places nearer to one another than this share what is wrong in
-                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
-  int turned_frames = 0;         ///< borders whose sign turned over are believed when found where they are expected in so
-                                 ///< many frames in a row: seen from its other side, what was brighter than the background
-                                 ///< is darker; 0 (never) to 1000
+  bool use_points = true;       ///< relative poses from point features
+  bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
+  bool detect_lines = false;    ///< the one-frame detector too; always on where no odometry gives a range
+  bool detect_window = true;    ///< the detector that asks a window of frames
+  int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
+  int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
+                                ///< time and, while it is wrong, pulls on the trajectory
+  double view_spacing = 0.06;   ///< least move between two views of the detector's window [m], 0 to 1
+  double trunk_low = 0.25;      ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
+  double trunk_high = 2.6;      ///< ... to [m]; its middle is near breast height, where radii are told
+  double track_range = 12;      ///< known trunks farther than this are not tracked [m], 1 to 100
+  double gate = 9.2;            ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
+  double contrast_noise = 0.02; ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
+  double gate_sigma_px = 1.0;   ///< of a border beside the prediction [px], 0.1 to 10
+  double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
+                                ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
+  double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
+                                ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
+  int turned_frames = 0; ///< borders whose sign turned over are believed when found where they are expected in so
+                         ///< many frames in a row: seen from its other side, what was brighter than the background
+                         ///< is darker; 0 (never) to 1000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };

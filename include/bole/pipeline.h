@@ -21,9 +21,9 @@
 /// Memory: the window of the detector and the graph of the smoother; no image is kept beyond the window.
 /// Not thread-safe; no globals.
 
-#include <bole/world_reference.h>
-#include <bole/options.h>
 #include "saliency/saliency.h"
+#include <bole/options.h>
+#include <bole/world_reference.h>
 
 #include <deque>
 #include <utility>
@@ -46,8 +46,8 @@ struct FrameResult
   std::size_t index = 0;
   std::int64_t stamp_ns = 0;
   FrameStatus frame_status = FrameStatus::ok;
-  Pose wMb;                         ///< as known right after this frame
-  std::vector<TrackedTrunk> trunks; ///< known trunks that might be in view
+  Pose wMb;                          ///< as known right after this frame
+  std::vector<TrackedTrunk> trunks;  ///< known trunks that might be in view
   std::vector<Detection> detections; ///< new ones, of the window
   std::vector<LineDetection> lines;  ///< new ones, of this frame alone
   std::optional<Saliency> saliency;
@@ -161,9 +161,9 @@ private:
   TrunkMap m_map;
   std::deque<View> m_views; ///< oldest first
   std::vector<StampedPose> m_online;
-  std::vector<Sight> m_sights;               ///< of the last frame
-  std::vector<std::size_t> m_indices;       ///< Frame::index of each processed frame
-  Vector6d m_velocity = Vector6d::Zero();   ///< of the body, in its frame
-  std::optional<double> m_ground_z;         ///< height of the ground in the world, where it is known [m]
+  std::vector<Sight> m_sights;            ///< of the last frame
+  std::vector<std::size_t> m_indices;     ///< Frame::index of each processed frame
+  Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame
+  std::optional<double> m_ground_z;       ///< height of the ground in the world, where it is known [m]
 };
 } // namespace bole

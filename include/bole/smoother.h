@@ -82,12 +82,10 @@ struct SmootherOptions
   Loss direction_loss = {LossKind::huber, 4.0};
 
   // Priors of a new trunk; addTrunk() has a variant with its own.
-  double prior_radius =
-      0.15; ///< [m], median of the log-normal prior, > 0: forest trunks, 0.08 to 0.3
+  double prior_radius = 0.15;          ///< [m], median of the log-normal prior, > 0: forest trunks, 0.08 to 0.3
   double prior_log_radius_sigma = 0.5; ///< > 0: a factor of 1.6 at one sigma
   double prior_lean_sigma = 0.035;     ///< tan, > 0: 2 degrees; 1e-4 switches lean off
-  double prior_position_sigma =
-      50; ///< [m], > 0: about the first guess; only keeps unseen trunks somewhere
+  double prior_position_sigma = 50;    ///< [m], > 0: about the first guess; only keeps unseen trunks somewhere
 
   /// Poses kept open behind the newest; older ones are marginalised into a linear prior and keep
   /// their estimate. 0: all stay open. Otherwise >= 2.

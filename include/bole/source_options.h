@@ -10,9 +10,8 @@ namespace bole
 /// Options of every frame source. validate() throws vpException "name = value, must be ...".
 struct SourceOptions
 {
-  std::string camera_path; ///< camera file (readCamera()); empty: the one of the folder, or a guess
-  std::string
-      odometry_path; ///< trajectory file (readTrajectory()); empty: the one of the folder, or none
+  std::string camera_path;   ///< camera file (readCamera()); empty: the one of the folder, or a guess
+  std::string odometry_path; ///< trajectory file (readTrajectory()); empty: the one of the folder, or none
   /// [s], added to the stamps of odometry_path so that they count as the video's do. Default 0.
   double odometry_offset_s = 0;
   /// [s], > 0: between odometry samples further apart than this nothing is interpolated. Default 1:

@@ -43,7 +43,11 @@ struct Trunk
   Vector5d minus(const Trunk &other) const;
 };
 
-enum class Border { left, right }; ///< as seen from the camera, z of the trunk up
+enum class Border
+{
+  left,
+  right
+}; ///< as seen from the camera, z of the trunk up
 
 /// The relative trunk theta^r = (cRt, r/d) of SO(3) x R+.
 ///
@@ -74,8 +78,8 @@ struct RelativeTrunk
 /// isFinite()) when the camera centre is inside the trunk.
 /// \param J_pose 4x6 Jacobian by the tangent (rho, phi) of wMb, or nullptr.
 /// \param J_trunk 4x5 Jacobian by the tangent of the trunk, or nullptr.
-RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk,
-                            Matrix46d *J_pose = nullptr, Matrix45d *J_trunk = nullptr);
+RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose = nullptr,
+                            Matrix45d *J_trunk = nullptr);
 
 /// The upright trunk of radius \p radius [m] that gives the relative trunk \p relative from the camera
 /// pose \p wMc: the inverse of relativeTrunk() once the radius is known (lean is set to zero).

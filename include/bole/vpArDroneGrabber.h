@@ -36,17 +36,15 @@ class vpArDroneGrabber : public vpFrameGrabber
 public:
   struct Options
   {
-    double open_timeout_s = 5; ///< [s], (0.1, 600): a key frame comes every half second
-    double frame_timeout_s =
-        0.4; ///< [s], (0.02, 60): acquire() gives up then, the status is `missing`
+    double open_timeout_s = 5;    ///< [s], (0.1, 600): a key frame comes every half second
+    double frame_timeout_s = 0.4; ///< [s], (0.02, 60): acquire() gives up then, the status is `missing`
     bole::DroneLink::Options link;
     void validate() const;
   };
 
   /// \param address see bole::ArDroneAddress; throws vpException when it is none.
   explicit vpArDroneGrabber(const std::string &address = "ardrone://192.168.1.1");
-  vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options,
-                   bole::LinkTap tap = {});
+  vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options, bole::LinkTap tap = {});
   ~vpArDroneGrabber() override;
 
   void open(vpImage<unsigned char> &I) override;
@@ -58,10 +56,7 @@ public:
   // Of the image acquired last:
   bole::FrameStatus getStatus() const { return m_frame.status; }
   const std::string &getMessage() const { return m_frame.message; }
-  double getTimestamp() const
-  {
-    return static_cast<double>(m_frame.stamp_ns) * 1e-9;
-  } ///< drone's clock [s]
+  double getTimestamp() const { return static_cast<double>(m_frame.stamp_ns) * 1e-9; } ///< drone's clock [s]
   std::uint32_t getFrameNumber() const { return m_frame.number; }
   /// Attitude, rates, velocity, height, battery and state at the exposure; nothing where navdata
   /// are missing.

@@ -75,10 +75,10 @@ public:
   vpColVector error(const vpBasicFeature &s_star, unsigned int select = FEATURE_ALL) override;
   void print(unsigned int select = FEATURE_ALL) const override;
   vpFeatureTrunk *duplicate() const override;
-  void display(const vpCameraParameters &cam, const vpImage<unsigned char> &I,
-               const vpColor &color = vpColor::green, unsigned int thickness = 1) const override;
-  void display(const vpCameraParameters &cam, const vpImage<vpRGBa> &I,
-               const vpColor &color = vpColor::green, unsigned int thickness = 1) const override;
+  void display(const vpCameraParameters &cam, const vpImage<unsigned char> &I, const vpColor &color = vpColor::green,
+               unsigned int thickness = 1) const override;
+  void display(const vpCameraParameters &cam, const vpImage<vpRGBa> &I, const vpColor &color = vpColor::green,
+               unsigned int thickness = 1) const override;
 
 private:
   void set(const bole::RelativeTrunk &relative);

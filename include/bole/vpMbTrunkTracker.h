@@ -19,8 +19,8 @@
 /// prior, when the borders agree less than they do where the pose is right. It is then the estimate, which goes on.
 ///
 /// Loss is noticed: track() ends with testTracking(), as ViSP's own trackers do, which throws vpTrackingException
-/// unless getStatus() is `tracked` or `partly_on_prior`. When lost or given a bad image, the pose is the prediction, and
-/// the next call of track() tries again by itself: nothing has to be re-initialised.
+/// unless getStatus() is `tracked` or `partly_on_prior`. When lost or given a bad image, the pose is the prediction,
+/// and the next call of track() tries again by itself: nothing has to be re-initialised.
 ///
 /// Differences from ViSP's trackers: models hold cylinders only (others are refused with file and line); no
 /// polygons, so getNbPolygon() is 0 and LOD, Ogre and scan-line settings have no effect; the visibility of trunks
@@ -40,9 +40,9 @@
 ///
 /// Cost: see README, "Against ViSP's edge trackers". One tracker a thread.
 
+#include "input/image_health.h"
 #include "mbt/border_vote.h"
 #include "mbt/camera_motion.h"
-#include "input/image_health.h"
 #include "mbt/rotation_aligner.h"
 #include "mbt/vpMbtDistanceTrunk.h"
 
@@ -54,7 +54,8 @@
 class vpMbTrunkTracker : public vpMbTracker
 {
 public:
-  enum class Status {
+  enum class Status
+  {
     not_initialised,
     tracked,         ///< all six directions seen in the image
     partly_on_prior, ///< some directions are not seen: getUnobserved()
@@ -81,10 +82,10 @@ public:
     /// How much the width of a real trunk differs from its model, as a share: taper, bark, shading edges
     /// (0.001 .. 1). Bearings of trunks, which have no such bias, then say where the camera is.
     double radius_sigma = 0.15;
-    double scan_min_px = 4;   ///< least half-width of the scan (2 .. 20)
-    double scan_max_px = 24;  ///< greatest (8 .. 100)
-    double refine_px = 5;     ///< half-width of the second scan (2 .. 20)
-    int refinements = 1;      ///< scans after the first (0 .. 5)
+    double scan_min_px = 4;  ///< least half-width of the scan (2 .. 20)
+    double scan_max_px = 24; ///< greatest (8 .. 100)
+    double refine_px = 5;    ///< half-width of the second scan (2 .. 20)
+    int refinements = 1;     ///< scans after the first (0 .. 5)
     /// Without a motion prior: what the camera may do between two frames, after the turn is taken out.
     double step_sigma_m = 0.12;    ///< across the trunks, per axis, while its velocity is unknown (0.001 .. 10)
     double accel_sigma_m = 0.03;   ///< change of that step from one frame to the next (0.001 .. 10)
@@ -96,13 +97,14 @@ public:
     /// the trunks found may be others (0 .. 1). Right poses of simulated flights have 0.79, wrong ones 0.57.
     double min_agreement = 0.68;
     /// Without a motion prior: squared Mahalanobis distance from the motion expected beyond which trunks were taken for
-    /// others, and the pose is not believed (0.1 .. 1000). Right poses of simulated flights stay below 6 in 998 of 1000 frames.
+    /// others, and the pose is not believed (0.1 .. 1000). Right poses of simulated flights stay below 6 in 998 of 1000
+    /// frames.
     double max_jump = 6;
-    double max_sigma_m = 0.15;     ///< standard deviation along any axis beyond which a pose is uncertain (0.001 .. 100)
-    double max_sigma_rad = 0.044;  ///< about any axis (0.001 .. 3.2)
-    double unobserved_m = 0.5;     ///< a direction the image knows worse than this is not observed (0.01 .. 10)
-    double lever_m = 3;            ///< radians count as metres at this range in unobserved_m (0.1 .. 100)
-    void validate() const; ///< throws vpException "name = value, must be ..."
+    double max_sigma_m = 0.15;    ///< standard deviation along any axis beyond which a pose is uncertain (0.001 .. 100)
+    double max_sigma_rad = 0.044; ///< about any axis (0.001 .. 3.2)
+    double unobserved_m = 0.5;    ///< a direction the image knows worse than this is not observed (0.01 .. 10)
+    double lever_m = 3;           ///< radians count as metres at this range in unobserved_m (0.1 .. 100)
+    void validate() const;        ///< throws vpException "name = value, must be ..."
   };
 
   vpMbTrunkTracker();
@@ -113,7 +115,8 @@ public:
   ///@{
   /// Where odometry or a gyro expects the camera at the next track(), and the covariance of that expectation as
   /// a whole. Used once. It is weighed as one more measurement: what odometry knows for good (height by sonar, roll and
-  /// pitch by gravity) may be given with a small variance and holds what the trunks cannot say. \throw vpException when \p covariance is not a finite, positive definite 6x6 matrix.
+  /// pitch by gravity) may be given with a small variance and holds what the trunks cannot say. \throw vpException when
+  /// \p covariance is not a finite, positive definite 6x6 matrix.
   void setMotionPrior(const vpHomogeneousMatrix &cMo, const vpMatrix &covariance);
   Status getStatus() const { return m_status; }
   const std::string &getMessage() const { return m_message; } ///< the status in words
@@ -187,7 +190,8 @@ private:
     Matrix6d covariance;
   };
 
-  static constexpr double kRightAgreement = 0.79; ///< of right poses, mean over simulated flights: what a start is taken for
+  static constexpr double kRightAgreement =
+      0.79; ///< of right poses, mean over simulated flights: what a start is taken for
 
   // vpMbTrunkTrackerPose.cpp: the estimation
   Eigen::Vector3d alongTrunks() const;
@@ -223,10 +227,10 @@ private:
   bole::RotationAligner::Reference m_thumbnails; ///< of the present image, where they were needed
   bole::RotationAligner::Reference m_reference;  ///< of the last image that was tracked; empty: not yet reduced
   vpImage<unsigned char> m_reference_image;      ///< that image, where m_reference is empty
-  bole::CameraMotion m_motion;          ///< since then, without a prior
-  bole::Vote m_vote;          ///< of the first scan
-  double m_agreement = kRightAgreement; ///< over the last frames
-  bool m_is_doubtful = false; ///< what judge() made of it
+  bole::CameraMotion m_motion;                   ///< since then, without a prior
+  bole::Vote m_vote;                             ///< of the first scan
+  double m_agreement = kRightAgreement;          ///< over the last frames
+  bool m_is_doubtful = false;                    ///< what judge() made of it
   std::optional<MotionPrior> m_prior;
   int m_frames_since_good = 0;
   Matrix6d m_posterior = Matrix6d::Zero();

@@ -42,8 +42,7 @@ public:
   {
     double hover_after_s = 0.5; ///< [s], (0.05, 2): five frames of a slow tracker
     double land_after_s = 3;    ///< [s], (0.1, 60), more than hover_after_s
-    double gain =
-        0.3; ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
+    double gain = 0.3;          ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
     double largest_share = 0.5; ///< (0, 1]: of tilt, climb and turn
     double largest_climb = 0.7; ///< [m/s], (0, 5): the drone's setting control:control_vz_max
     double largest_turn = 1.74; ///< [rad/s], (0, 7): the drone's setting control:control_yaw

@@ -8,7 +8,8 @@
 namespace bole
 {
 /// Where the metre of the map comes from.
-enum class ScaleSource {
+enum class ScaleSource
+{
   odometry, ///< the pose filter
   height,   ///< a known height over the ground
   prior     ///< the radius a trunk usually has: distances are right only as far as that is
@@ -16,7 +17,8 @@ enum class ScaleSource {
 const char *toString(ScaleSource source);
 
 /// Where up comes from.
-enum class GravitySource {
+enum class GravitySource
+{
   odometry, ///< the pose filter
   trunks,   ///< the common vanishing point of the trunks
   assumed   ///< the first image is taken to be upright

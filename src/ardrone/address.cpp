@@ -11,16 +11,13 @@ namespace
 {
 const std::string kScheme = "ardrone://";
 
-double readNumber(const std::string &address, const std::string &key, const std::string &value,
-                  double low, double high)
+double readNumber(const std::string &address, const std::string &key, const std::string &value, double low, double high)
 {
   double number = 0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-  if (error != std::errc() || end != value.data() + value.size() ||
-      !(number >= low && number <= high))
-    throw vpException(
-        vpException::badValue,
-        fmt::format("{}: {} = {}, must be a number from {} to {}", address, key, value, low, high));
+  if (error != std::errc() || end != value.data() + value.size() || !(number >= low && number <= high))
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: {} = {}, must be a number from {} to {}", address, key, value, low, high));
   return number;
 }
 } // namespace
@@ -35,16 +32,13 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
   ArDroneAddress out;
   const std::size_t question = address.find('?');
   std::string host =
-      address.substr(kScheme.size(),
-                     question == std::string::npos ? std::string::npos : question - kScheme.size());
+      address.substr(kScheme.size(), question == std::string::npos ? std::string::npos : question - kScheme.size());
   while (!host.empty() && host.back() == '/')
     host.pop_back();
   if (host.find(':') != std::string::npos)
-    throw vpException(
-        vpException::badValue,
-        fmt::format(
-            "{}: host = {}, must be without a port; give ?offset=N, or ?navdata=N&video=N&at=N",
-            address, host));
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: host = {}, must be without a port; give ?offset=N, or ?navdata=N&video=N&at=N",
+                                  address, host));
   if (!host.empty())
     out.host = host;
 
@@ -57,9 +51,7 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
     const std::size_t equals = pair.find('=');
     const std::string key = pair.substr(0, equals);
     const std::string value = equals == std::string::npos ? "" : pair.substr(equals + 1);
-    const auto port = [&] {
-      return static_cast<std::uint16_t>(readNumber(address, key, value, 1, 65535));
-    };
+    const auto port = [&] { return static_cast<std::uint16_t>(readNumber(address, key, value, 1, 65535)); };
     if (key == "offset")
       offset = static_cast<int>(readNumber(address, key, value, 0, 59000));
     else if (key == "navdata")
@@ -69,23 +61,20 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
     else if (key == "at")
       out.at_port = port();
     else if (key == "generation")
-      out.generation =
-          value == "auto" ? 0 : static_cast<int>(readNumber(address, key, value, 1, 2));
+      out.generation = value == "auto" ? 0 : static_cast<int>(readNumber(address, key, value, 1, 2));
     else if (key == "camera")
       out.camera_path = value;
     else if (key == "video_delay_ms")
       out.video_delay_s = readNumber(address, key, value, 0, 500) / 1000;
     else
-      throw vpException(vpException::badValue,
-                        fmt::format("{}: key = {}, must be one of offset, navdata, video, at, "
-                                    "generation, camera, video_delay_ms",
-                                    address, key));
+      throw vpException(vpException::badValue, fmt::format("{}: key = {}, must be one of offset, navdata, video, at, "
+                                                           "generation, camera, video_delay_ms",
+                                                           address, key));
   }
   for (std::uint16_t *p : {&out.navdata_port, &out.video_port, &out.at_port}) {
     if (*p + offset > 65535)
-      throw vpException(
-          vpException::badValue,
-          fmt::format("{}: offset = {}, must keep every port below 65536", address, offset));
+      throw vpException(vpException::badValue,
+                        fmt::format("{}: offset = {}, must keep every port below 65536", address, offset));
     *p = static_cast<std::uint16_t>(*p + offset);
   }
   return out;
@@ -93,8 +82,7 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
 
 std::string ArDroneAddress::toString() const
 {
-  std::string text = fmt::format("{}{}?navdata={}&video={}&at={}", kScheme, host, navdata_port,
-                                 video_port, at_port);
+  std::string text = fmt::format("{}{}?navdata={}&video={}&at={}", kScheme, host, navdata_port, video_port, at_port);
   if (generation != 0)
     text += fmt::format("&generation={}", generation);
   if (!camera_path.empty())

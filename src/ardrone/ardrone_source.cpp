@@ -20,10 +20,9 @@ CameraModel fitted(CameraModel camera, int width, int height, const std::string 
 {
   const double factor = static_cast<double>(width) / camera.pinhole.width;
   if (std::abs(factor * camera.pinhole.height - height) > kShapeTolerance * height)
-    throw vpException(
-        vpException::dimensionError,
-        fmt::format("{}: resolution = {}x{}, must be of the shape of the drone's images, {}x{}",
-                    where, camera.pinhole.width, camera.pinhole.height, width, height));
+    throw vpException(vpException::dimensionError,
+                      fmt::format("{}: resolution = {}x{}, must be of the shape of the drone's images, {}x{}", where,
+                                  camera.pinhole.width, camera.pinhole.height, width, height));
   camera.pinhole = camera.pinhole.scaled(factor);
   camera.pinhole.width = width;
   camera.pinhole.height = height;
@@ -45,8 +44,7 @@ MountedCamera publishedArDroneCamera(int generation, int width, int height)
     camera.model.distortion = Distortion::radial_tangential;
     camera.model.coefficients = {-0.527, 0.274, 0.0211, -0.0064};
   }
-  camera.model = fitted(camera.model, width, height,
-                        fmt::format("published camera of the AR.Drone {}", generation));
+  camera.model = fitted(camera.model, width, height, fmt::format("published camera of the AR.Drone {}", generation));
   return camera;
 }
 
@@ -69,8 +67,7 @@ struct ArDroneSource::State
 
   void chooseCamera(const vpImage<unsigned char> &first)
   {
-    const int width = static_cast<int>(first.getWidth()),
-              height = static_cast<int>(first.getHeight());
+    const int width = static_cast<int>(first.getWidth()), height = static_cast<int>(first.getHeight());
     if (address.camera_path.empty()) {
       mounted = publishedArDroneCamera(grabber.getLink().generation(), width, height);
     }
@@ -124,17 +121,12 @@ void ArDroneSource::Options::validate() const
 {
   grabber.validate();
   if (!(give_up_s > 0.5 && give_up_s < 86400))
-    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0.5, 86400) s",
-                      give_up_s);
+    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0.5, 86400) s", give_up_s);
   if (max_width_px != 0 && max_width_px < 64)
-    throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px",
-                      max_width_px);
+    throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px", max_width_px);
 }
 
-ArDroneSource::ArDroneSource(const std::string &address)
-    : ArDroneSource(ArDroneAddress::parse(address), Options{})
-{
-}
+ArDroneSource::ArDroneSource(const std::string &address) : ArDroneSource(ArDroneAddress::parse(address), Options{}) {}
 
 ArDroneSource::ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap)
 {

@@ -107,13 +107,12 @@ void AtChannel::trimFlat() { send("FTRIM", ""); }
 
 void AtChannel::reference(bool take_off, bool emergency)
 {
-  send("REF",
-       std::to_string(kReferenceBase | (take_off ? kTakeOff : 0) | (emergency ? kEmergency : 0)));
+  send("REF", std::to_string(kReferenceBase | (take_off ? kTakeOff : 0) | (emergency ? kEmergency : 0)));
 }
 
 void AtChannel::move(bool progressive, float roll, float pitch, float gaz, float yaw)
 {
-  send("PCMD", fmt::format("{},{},{},{},{}", progressive ? 1 : 0, atFloat(roll), atFloat(pitch),
-                           atFloat(gaz), atFloat(yaw)));
+  send("PCMD",
+       fmt::format("{},{},{},{},{}", progressive ? 1 : 0, atFloat(roll), atFloat(pitch), atFloat(gaz), atFloat(yaw)));
 }
 } // namespace bole

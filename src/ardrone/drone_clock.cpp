@@ -32,8 +32,7 @@ std::uint32_t navdataTimeWord(std::int64_t microseconds)
   std::int64_t reduced = microseconds % kNavdataTimePeriod_us;
   if (reduced < 0)
     reduced += kNavdataTimePeriod_us;
-  return static_cast<std::uint32_t>(reduced / 1'000'000) << 21 |
-         static_cast<std::uint32_t>(reduced % 1'000'000);
+  return static_cast<std::uint32_t>(reduced / 1'000'000) << 21 | static_cast<std::uint32_t>(reduced % 1'000'000);
 }
 
 void ClockFit::Options::validate() const
@@ -53,17 +52,14 @@ bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
 {
   const std::int64_t offset = host_ns - drone_ns;
   const bool first = !m_offset_ns;
-  const bool jump =
-      !first && std::abs(static_cast<double>(offset - *m_offset_ns)) > m_options.jump_s * 1e9;
+  const bool jump = !first && std::abs(static_cast<double>(offset - *m_offset_ns)) > m_options.jump_s * 1e9;
   if (first || jump) {
     m_offset_ns = offset;
     m_first_host_ns = host_ns;
   }
   else {
-    const double elapsed_ns =
-        static_cast<double>(std::max<std::int64_t>(0, host_ns - m_last_host_ns));
-    *m_offset_ns =
-        std::min(offset, *m_offset_ns + static_cast<std::int64_t>(m_options.drift * elapsed_ns));
+    const double elapsed_ns = static_cast<double>(std::max<std::int64_t>(0, host_ns - m_last_host_ns));
+    *m_offset_ns = std::min(offset, *m_offset_ns + static_cast<std::int64_t>(m_options.drift * elapsed_ns));
   }
   m_last_host_ns = host_ns;
   return !jump;
@@ -71,7 +67,6 @@ bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
 
 bool ClockFit::isReady() const
 {
-  return m_offset_ns &&
-         static_cast<double>(m_last_host_ns - m_first_host_ns) * 1e-9 >= m_options.settle_s;
+  return m_offset_ns && static_cast<double>(m_last_host_ns - m_first_host_ns) * 1e-9 >= m_options.settle_s;
 }
 } // namespace bole

@@ -56,23 +56,19 @@ struct DroneLink::State
       const std::lock_guard<std::mutex> lock(mutex);
       ++counters.connections;
     };
-    of_video.frame = [this](DecodedFrame &&frame, const VideoDecoder::Counters &counted,
-                            std::int64_t arrival_ns) {
+    of_video.frame = [this](DecodedFrame &&frame, const VideoDecoder::Counters &counted, std::int64_t arrival_ns) {
       publish(std::move(frame), counted, arrival_ns);
     };
     NavdataReceiver::Callbacks of_navdata;
     of_navdata.tap = tap;
-    of_navdata.packet = [this](const std::uint8_t *data, std::size_t size,
-                               std::int64_t arrival_ns) {
+    of_navdata.packet = [this](const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns) {
       return takeNavdata(data, size, arrival_ns);
     };
     video = std::make_unique<VideoReceiver>(address, options, std::move(of_video));
-    navdata = std::make_unique<NavdataReceiver>(address, options.full_navdata, commands,
-                                                std::move(of_navdata));
+    navdata = std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
   }
 
-  void publish(DecodedFrame &&decoded, const VideoDecoder::Counters &counted,
-               std::int64_t arrival_ns)
+  void publish(DecodedFrame &&decoded, const VideoDecoder::Counters &counted, std::int64_t arrival_ns)
   {
     const std::lock_guard<std::mutex> lock(mutex);
     counters.video = counted;
@@ -97,8 +93,7 @@ struct DroneLink::State
   }
 
   /// \return the state bits of a good packet.
-  std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size,
-                                           std::int64_t arrival_ns)
+  std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
   {
     Navdata navdata;
     const NavdataError error = parseNavdata(data, size, navdata);
@@ -124,8 +119,7 @@ struct DroneLink::State
     if (navdata.demo) {
       // Demo packets have no time: then the arrival must do.
       const std::int64_t stamp_ns =
-          navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000
-                       : arrival_ns;
+          navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000 : arrival_ns;
       if (!navdata_clock.add(stamp_ns, arrival_ns))
         odometry.restart();
       odometry.add(stamp_ns, navdata);
@@ -137,15 +131,13 @@ struct DroneLink::State
 
   std::int64_t videoToNavdata(std::int64_t stamp_ns) const
   {
-    return navdata_clock.toDrone(video_clock.toHost(stamp_ns) -
-                                 static_cast<std::int64_t>(address.video_delay_s * 1e9));
+    return navdata_clock.toDrone(video_clock.toHost(stamp_ns) - static_cast<std::int64_t>(address.video_delay_s * 1e9));
   }
 
   /// A picture that stays while the body moves is no picture of now.
   void checkFrozen(LiveFrame &frame) const
   {
-    if (frame.status != FrameStatus::ok || !frame.unchanged_since_ns ||
-        counters.navdata_packets == 0)
+    if (frame.status != FrameStatus::ok || !frame.unchanged_since_ns || counters.navdata_packets == 0)
       return;
     const auto then = odometry.at(videoToNavdata(*frame.unchanged_since_ns));
     if (!frame.body || !then) {

@@ -19,15 +19,14 @@ struct LiveFrame
 {
   FrameStatus status = FrameStatus::missing;
   std::string message;
-  YuvPicture picture;          ///< empty when nothing could be decoded
-  std::uint32_t number = 0;    ///< as the drone counts
-  std::int64_t stamp_ns = 0;   ///< drone's video clock, unwrapped; rises over reboots too
-  std::int64_t arrival_ns = 0; ///< host's steady clock, last byte of the frame
-  std::optional<std::int64_t>
-      unchanged_since_ns;        ///< stamp of the picture from which this hardly differs
-  std::optional<BodyState> body; ///< navdata interpolated at the exposure, stamp as above
-  std::vector<GyroSample> gyro;  ///< since the frame given out before, stamps as above
-  std::optional<Matrix6d> odometry_covariance; ///< of the motion since the frame given out before
+  YuvPicture picture;                             ///< empty when nothing could be decoded
+  std::uint32_t number = 0;                       ///< as the drone counts
+  std::int64_t stamp_ns = 0;                      ///< drone's video clock, unwrapped; rises over reboots too
+  std::int64_t arrival_ns = 0;                    ///< host's steady clock, last byte of the frame
+  std::optional<std::int64_t> unchanged_since_ns; ///< stamp of the picture from which this hardly differs
+  std::optional<BodyState> body;                  ///< navdata interpolated at the exposure, stamp as above
+  std::vector<GyroSample> gyro;                   ///< since the frame given out before, stamps as above
+  std::optional<Matrix6d> odometry_covariance;    ///< of the motion since the frame given out before
 };
 
 struct LinkCounters
@@ -52,8 +51,7 @@ enum class LinkChannel : std::uint8_t
 };
 /// Sees every received byte first; called from the receiving threads, must be quick and
 /// thread-safe.
-using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const std::uint8_t *data,
-                                   std::size_t size)>;
+using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)>;
 
 /// Talks to a drone as a listener: wakes the streams, asks for full navdata, keeps the
 /// communication watchdog content. Never sends a flight command.
@@ -72,8 +70,7 @@ class DroneLink
 public:
   struct Options
   {
-    bool full_navdata =
-        true; ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
+    bool full_navdata = true; ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
     double silence_s = 0.8;   ///< [s], (0.1, 30): a link this long silent is opened anew
     double retry_s = 0.1;     ///< [s], (0.01, 5): pause between attempts
     double frozen_m = 0.1;    ///< [m], (0, 10): a motion that no scene among trees can hide

@@ -29,8 +29,7 @@ struct FreePacket
 };
 using Context = std::unique_ptr<AVCodecContext, FreeContext>;
 
-void copyPlane(const std::uint8_t *from, int stride, int width, int height,
-               std::vector<std::uint8_t> &to)
+void copyPlane(const std::uint8_t *from, int stride, int width, int height, std::vector<std::uint8_t> &to)
 {
   to.resize(static_cast<std::size_t>(width) * height);
   for (int row = 0; row < height; ++row)
@@ -48,10 +47,7 @@ void silenceLibav()
   static_cast<void>(done);
 }
 
-std::uint8_t clampToByte(double value)
-{
-  return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0));
-}
+std::uint8_t clampToByte(double value) { return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0)); }
 } // namespace
 
 void YuvPicture::toGrey(vpImage<unsigned char> &image) const
@@ -69,8 +65,7 @@ void YuvPicture::toColour(vpImage<vpRGBa> &image) const
       const std::size_t at = static_cast<std::size_t>(v) * width + u;
       const std::size_t colour = static_cast<std::size_t>(v / 2) * half + u / 2;
       const double luma = y[at], blue = cb[colour] - 128.0, red = cr[colour] - 128.0;
-      image.bitmap[at] = vpRGBa(clampToByte(luma + 1.402 * red),
-                                clampToByte(luma - 0.344136 * blue - 0.714136 * red),
+      image.bitmap[at] = vpRGBa(clampToByte(luma + 1.402 * red), clampToByte(luma - 0.344136 * blue - 0.714136 * red),
                                 clampToByte(luma + 1.772 * blue));
     }
 }
@@ -103,8 +98,8 @@ H264Decoder::~H264Decoder() = default;
 
 void H264Decoder::flush() { avcodec_flush_buffers(m_state->context.get()); }
 
-H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_unit, int width,
-                                        int height, YuvPicture &picture)
+H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_unit, int width, int height,
+                                        YuvPicture &picture)
 {
   m_message.clear();
   State &state = *m_state;
@@ -128,10 +123,8 @@ H264Decoder::Result H264Decoder::decode(const std::vector<std::uint8_t> &access_
   picture.width = width > 0 ? std::min(width, frame.width) : frame.width;
   picture.height = height > 0 ? std::min(height, frame.height) : frame.height;
   copyPlane(frame.data[0], frame.linesize[0], picture.width, picture.height, picture.y);
-  copyPlane(frame.data[1], frame.linesize[1], (picture.width + 1) / 2, (picture.height + 1) / 2,
-            picture.cb);
-  copyPlane(frame.data[2], frame.linesize[2], (picture.width + 1) / 2, (picture.height + 1) / 2,
-            picture.cr);
+  copyPlane(frame.data[1], frame.linesize[1], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cb);
+  copyPlane(frame.data[2], frame.linesize[2], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cr);
   const bool damaged = frame.decode_error_flags != 0 || (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0;
   av_frame_unref(state.frame.get());
   if (damaged) {
@@ -156,9 +149,8 @@ H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate,
   if (codec == nullptr)
     codec = avcodec_find_encoder(AV_CODEC_ID_H264);
   if (codec == nullptr)
-    throw vpException(
-        vpException::fatalError,
-        "libavcodec was built without an H.264 encoder: the emulator of the AR.Drone 2 needs one");
+    throw vpException(vpException::fatalError,
+                      "libavcodec was built without an H.264 encoder: the emulator of the AR.Drone 2 needs one");
   m_state->width = width;
   m_state->height = height;
   m_state->context.reset(avcodec_alloc_context3(codec));
@@ -180,10 +172,9 @@ H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate,
              fmt::format("keyint={0}:min-keyint={0}:scenecut=0", key_interval).c_str(), 0);
   silenceLibav();
   if (avcodec_open2(&context, codec, nullptr) < 0)
-    throw vpException(
-        vpException::fatalError,
-        fmt::format("libavcodec could not open its H.264 encoder for {}x{} at {} Hz and {} bit/s",
-                    width, height, rate_hz, bit_rate));
+    throw vpException(vpException::fatalError,
+                      fmt::format("libavcodec could not open its H.264 encoder for {}x{} at {} Hz and {} bit/s", width,
+                                  height, rate_hz, bit_rate));
   AVFrame &frame = *m_state->frame;
   frame.format = context.pix_fmt;
   frame.width = context.width;
@@ -222,10 +213,9 @@ std::size_t nalSize(const std::vector<std::uint8_t> &bytes, std::size_t from, in
 H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, bool force_key)
 {
   State &state = *m_state;
-  if (static_cast<int>(image.getWidth()) != state.width ||
-      static_cast<int>(image.getHeight()) != state.height)
-    throw vpException(vpException::dimensionError, "image size = %ux%u, must be %dx%d as the first",
-                      image.getWidth(), image.getHeight(), state.width, state.height);
+  if (static_cast<int>(image.getWidth()) != state.width || static_cast<int>(image.getHeight()) != state.height)
+    throw vpException(vpException::dimensionError, "image size = %ux%u, must be %dx%d as the first", image.getWidth(),
+                      image.getHeight(), state.width, state.height);
   AVFrame &frame = *state.frame;
   if (av_frame_make_writable(&frame) < 0)
     throw vpException(vpException::fatalError, "no memory for the encoder's frame");
@@ -236,12 +226,10 @@ H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, boo
     std::fill(out + state.width, out + frame.width, row[state.width - 1]);
   }
   for (int plane = 1; plane < 3; ++plane)
-    std::fill_n(frame.data[plane],
-                static_cast<std::ptrdiff_t>(frame.linesize[plane]) * frame.height / 2,
+    std::fill_n(frame.data[plane], static_cast<std::ptrdiff_t>(frame.linesize[plane]) * frame.height / 2,
                 std::uint8_t{128});
   frame.pict_type = force_key ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
-  frame.pts += static_cast<std::int64_t>(1000.0 * state.context->framerate.den /
-                                         state.context->framerate.num);
+  frame.pts += static_cast<std::int64_t>(1000.0 * state.context->framerate.den / state.context->framerate.num);
 
   Packet packet;
   if (avcodec_send_frame(state.context.get(), &frame) < 0 ||

@@ -46,8 +46,7 @@ public:
 
   /// \param picture written for `picture` and, with what could be decoded, for `damaged`.
   /// \param width, height [px] part of the coded picture that is shown; 0 for all of it.
-  Result decode(const std::vector<std::uint8_t> &access_unit, int width, int height,
-                YuvPicture &picture);
+  Result decode(const std::vector<std::uint8_t> &access_unit, int width, int height, YuvPicture &picture);
   /// Forgets references: the next picture must be a key frame.
   void flush();
   const std::string &message() const { return m_message; } ///< why the last picture was not whole

@@ -21,16 +21,14 @@ std::uint32_t checksum(const std::uint8_t *data, std::size_t size)
 
 Eigen::Vector3f readVector(const std::uint8_t *p)
 {
-  return {readLittleEndian<float>(p), readLittleEndian<float>(p + 4),
-          readLittleEndian<float>(p + 8)};
+  return {readLittleEndian<float>(p), readLittleEndian<float>(p + 4), readLittleEndian<float>(p + 8)};
 }
 
 void readTypedOptions(Navdata &navdata)
 {
   const auto bytesOf = [&](std::uint16_t id, std::size_t least) -> const std::uint8_t * {
     const auto found = navdata.options.find(id);
-    return found != navdata.options.end() && found->second.size() >= least ? found->second.data()
-                                                                           : nullptr;
+    return found != navdata.options.end() && found->second.size() >= least ? found->second.data() : nullptr;
   };
   if (const std::uint8_t *p = bytesOf(kDemo, kDemoUsed)) {
     Navdata::Demo demo;

@@ -35,18 +35,15 @@ struct Navdata
 
   struct Demo // option 0
   {
-    std::uint32_t control_state =
-        0; ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
+    std::uint32_t control_state = 0; ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
     std::uint32_t battery_percent = 0;
-    Eigen::Vector3f phi_theta_psi_mdeg =
-        Eigen::Vector3f::Zero();                             ///< roll, pitch, yaw [milli-degree]
-    std::int32_t altitude_mm = 0;                            ///< over the ground [mm]
-    Eigen::Vector3f velocity_mm_s = Eigen::Vector3f::Zero(); ///< [mm/s], drone's axes
+    Eigen::Vector3f phi_theta_psi_mdeg = Eigen::Vector3f::Zero(); ///< roll, pitch, yaw [milli-degree]
+    std::int32_t altitude_mm = 0;                                 ///< over the ground [mm]
+    Eigen::Vector3f velocity_mm_s = Eigen::Vector3f::Zero();      ///< [mm/s], drone's axes
   };
   std::optional<Demo> demo;
-  std::optional<std::uint32_t>
-      time;       ///< option 1: upper 11 bits [s], lower 21 bits [us]: wraps after 2048 s
-  struct Physical // option 3
+  std::optional<std::uint32_t> time; ///< option 1: upper 11 bits [s], lower 21 bits [us]: wraps after 2048 s
+  struct Physical                    // option 3
   {
     Eigen::Vector3f acceleration_mg = Eigen::Vector3f::Zero(); ///< [mg], drone's axes
     Eigen::Vector3f rate_deg_s = Eigen::Vector3f::Zero();      ///< [deg/s], drone's axes

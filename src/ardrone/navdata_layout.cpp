@@ -89,8 +89,7 @@ const std::vector<Layout> &layouts()
        "i2 raw 3, f4 raw_mg 3, f4 rectified_mg 3, f4 offset_mg 3, f4 heading_deg, f4 "
        "heading_gyro_deg, f4 heading_fused_deg, "
        "u1 calibrated, u4 state, f4 radius, f4 error_mean, f4 error_variance"},
-      {23, "wind_speed",
-       "f4 speed, f4 angle, f4 compensation_theta, f4 compensation_phi, f4 state 6, f4 debug 3"},
+      {23, "wind_speed", "f4 speed, f4 angle, f4 compensation_theta, f4 compensation_phi, f4 state 6, f4 debug 3"},
       {24, "kalman_pressure",
        "f4 offset_pressure, f4 z, f4 z_rate, f4 bias_pwm, f4 bias_pressure, f4 offset_sonar, f4 "
        "predicted_sonar, "
@@ -101,8 +100,7 @@ const std::vector<Layout> &layouts()
        "u4 state, u4 fifo_packets, u4 fifo_size, u4 usb_size, u4 usb_free, u4 frame_number, u4 "
        "usb_time_left"},
       {26, "wifi", "u4 link_quality"},
-      {27, "gps",
-       "f8 latitude_deg, f8 longitude_deg, f8 elevation_m, f8 hdop, i4 available, u1 rest 176"},
+      {27, "gps", "f8 latitude_deg, f8 longitude_deg, f8 elevation_m, f8 hdop, i4 available, u1 rest 176"},
   };
   return all;
 }
@@ -127,8 +125,7 @@ double readNumber(const std::string &type, const std::uint8_t *p)
     return readLittleEndian<std::uint32_t>(p);
   if (type == "i4")
     return readLittleEndian<std::int32_t>(p);
-  return type == "f4" ? static_cast<double>(readLittleEndian<float>(p))
-                      : readLittleEndian<double>(p);
+  return type == "f4" ? static_cast<double>(readLittleEndian<float>(p)) : readLittleEndian<double>(p);
 }
 
 /// Calls \p use(type, name, size, count) for each field of the layout.
@@ -155,8 +152,9 @@ std::size_t navdataOptionSize(std::uint16_t id)
 {
   std::size_t total = 0;
   if (const Layout *layout = find(id))
-    forEachField(*layout, [&](const std::string &, const std::string &, std::size_t size,
-                              int count) { total += size * static_cast<std::size_t>(count); });
+    forEachField(*layout, [&](const std::string &, const std::string &, std::size_t size, int count) {
+      total += size * static_cast<std::size_t>(count);
+    });
   return total;
 }
 
@@ -167,12 +165,10 @@ std::vector<NavdataField> navdataFields(std::uint16_t id, const std::vector<std:
   if (layout == nullptr)
     return out;
   std::size_t at = 0;
-  forEachField(*layout,
-               [&](const std::string &type, const std::string &name, std::size_t size, int count) {
-                 for (int i = 0; i < count && at + size <= bytes.size(); ++i, at += size)
-                   out.push_back({count == 1 ? name : name + "_" + std::to_string(i + 1),
-                                  readNumber(type, bytes.data() + at)});
-               });
+  forEachField(*layout, [&](const std::string &type, const std::string &name, std::size_t size, int count) {
+    for (int i = 0; i < count && at + size <= bytes.size(); ++i, at += size)
+      out.push_back({count == 1 ? name : name + "_" + std::to_string(i + 1), readNumber(type, bytes.data() + at)});
+  });
   return out;
 }
 } // namespace bole

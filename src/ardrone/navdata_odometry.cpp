@@ -17,15 +17,11 @@ constexpr double kCorrelation_s = 0.1; // of the velocity's error
 void require(const char *name, double value, double low, double high)
 {
   if (!(value > low && value < high))
-    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low,
-                      high);
+    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
 }
 
 double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
-Eigen::Matrix3d turnedBy(double yaw)
-{
-  return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-}
+Eigen::Matrix3d turnedBy(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
 
 /// What one packet says by itself: attitude, velocity, rate, height.
 BodyState readState(std::int64_t stamp_ns, const Navdata &navdata)
@@ -46,8 +42,7 @@ BodyState readState(std::int64_t stamp_ns, const Navdata &navdata)
 
 BodyState interpolated(const BodyState &a, const BodyState &b, std::int64_t stamp_ns)
 {
-  const double share =
-      static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
+  const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   BodyState out = share < 0.5 ? a : b;
   out.stamp_ns = stamp_ns;
   out.wMb.t = a.wMb.t + share * (b.wMb.t - a.wMb.t);
@@ -75,8 +70,7 @@ void NavdataOdometry::Options::validate() const
 
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw)
 {
-  return (Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
+  return (Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
           Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
       .toRotationMatrix();
 }
@@ -89,10 +83,7 @@ Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb)
 }
 
 NavdataOdometry::NavdataOdometry() : NavdataOdometry(Options{}) {}
-NavdataOdometry::NavdataOdometry(const Options &options) : m_options(options)
-{
-  m_options.validate();
-}
+NavdataOdometry::NavdataOdometry(const Options &options) : m_options(options) { m_options.validate(); }
 
 void NavdataOdometry::restart()
 {
@@ -110,17 +101,14 @@ void NavdataOdometry::add(std::int64_t stamp_ns, const Navdata &navdata)
     m_yaw_offset = yawOf(m_before_restart->wMb.R) - yawOf(state.wMb.R);
   state.wMb.R = turnedBy(m_yaw_offset) * state.wMb.R;
 
-  const BodyState *before =
-      m_history.empty() ? (m_before_restart ? &*m_before_restart : nullptr) : &m_history.back();
+  const BodyState *before = m_history.empty() ? (m_before_restart ? &*m_before_restart : nullptr) : &m_history.back();
   if (before == nullptr) {
     state.wMb.t = {0, 0, state.height};
   }
   else {
-    const double elapsed =
-        m_history.empty() ? 0 : static_cast<double>(stamp_ns - before->stamp_ns) * 1e-9;
+    const double elapsed = m_history.empty() ? 0 : static_cast<double>(stamp_ns - before->stamp_ns) * 1e-9;
     const bool bridged = elapsed <= m_options.largest_gap_s;
-    const Eigen::Vector3d mean_velocity =
-        0.5 * (before->wMb.R * before->velocity + state.wMb.R * state.velocity);
+    const Eigen::Vector3d mean_velocity = 0.5 * (before->wMb.R * before->velocity + state.wMb.R * state.velocity);
     state.wMb.t = before->wMb.t + (bridged ? elapsed : 0.0) * mean_velocity;
     if (state.height > 0) {
       const double jump = m_ground + state.height - state.wMb.t.z();
@@ -147,9 +135,9 @@ std::optional<BodyState> NavdataOdometry::at(std::int64_t stamp_ns) const
 {
   if (m_history.empty() || stamp_ns < m_history.front().stamp_ns)
     return std::nullopt;
-  const auto after = std::lower_bound(
-      m_history.begin(), m_history.end(), stamp_ns,
-      [](const BodyState &state, std::int64_t stamp) { return state.stamp_ns < stamp; });
+  const auto after =
+      std::lower_bound(m_history.begin(), m_history.end(), stamp_ns,
+                       [](const BodyState &state, std::int64_t stamp) { return state.stamp_ns < stamp; });
   if (after == m_history.end()) {
     BodyState last = m_history.back();
     const double ahead = static_cast<double>(stamp_ns - last.stamp_ns) * 1e-9;
@@ -183,15 +171,13 @@ Matrix6d NavdataOdometry::stepCovariance(std::int64_t from_ns, std::int64_t to_n
   const double elapsed = std::max(1e-3, static_cast<double>(to_ns - from_ns) * 1e-9);
   const auto end = at(to_ns);
   const double speed = end ? end->velocity.norm() : 0;
-  const double horizontal =
-      m_options.velocity_sigma * m_options.velocity_sigma * elapsed * kCorrelation_s +
-      std::pow(m_options.scale_sigma * speed * elapsed, 2);
+  const double horizontal = m_options.velocity_sigma * m_options.velocity_sigma * elapsed * kCorrelation_s +
+                            std::pow(m_options.scale_sigma * speed * elapsed, 2);
   Eigen::Matrix3d position =
       Eigen::Vector3d(horizontal, horizontal, 2 * std::pow(m_options.height_sigma, 2)).asDiagonal();
-  Eigen::Matrix3d rotation =
-      Eigen::Vector3d(std::pow(m_options.tilt_sigma, 2), std::pow(m_options.tilt_sigma, 2),
-                      std::pow(m_options.yaw_sigma, 2) * elapsed)
-          .asDiagonal();
+  Eigen::Matrix3d rotation = Eigen::Vector3d(std::pow(m_options.tilt_sigma, 2), std::pow(m_options.tilt_sigma, 2),
+                                             std::pow(m_options.yaw_sigma, 2) * elapsed)
+                                 .asDiagonal();
   if (end) { // world axes (up to the yaw) to the body's
     const Eigen::Matrix3d bRw = end->wMb.R.transpose();
     position = bRw * position * bRw.transpose();

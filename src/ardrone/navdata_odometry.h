@@ -4,8 +4,8 @@
 /// Where the drone says it has flown: odometry from navdata.
 
 #include "ardrone/navdata.h"
-#include <bole/pose.h>
 #include <bole/frame.h>
+#include <bole/pose.h>
 
 #include <cstdint>
 #include <deque>
@@ -20,11 +20,11 @@ struct BodyState
   std::int64_t stamp_ns = 0;                          ///< drone's navdata clock, unwrapped
   Pose wMb;                                           ///< see NavdataOdometry
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
-  std::optional<Eigen::Vector3d> rate; ///< [rad/s], body frame; with full navdata only
-  double height = 0;                   ///< over the ground [m], 0 while the sonar is blind
-  double battery = 0;                  ///< share of full, 0 to 1
-  std::uint32_t state = 0;             ///< bits of DroneState
-  std::uint32_t flight_phase = 0;      ///< Navdata::flightPhase()
+  std::optional<Eigen::Vector3d> rate;                ///< [rad/s], body frame; with full navdata only
+  double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
+  double battery = 0;                                 ///< share of full, 0 to 1
+  std::uint32_t state = 0;                            ///< bits of DroneState
+  std::uint32_t flight_phase = 0;                     ///< Navdata::flightPhase()
   bool has(DroneState bit) const { return (state & static_cast<std::uint32_t>(bit)) != 0; }
 };
 
@@ -58,14 +58,13 @@ class NavdataOdometry
 public:
   struct Options
   {
-    double velocity_sigma = 0.1; ///< [m/s], (0, 5): the drone's optical flow; 1 cm a step at 10 Hz
-    double scale_sigma = 0.03;   ///< (0, 1): error of the drone's speed in proportion; from flights
-    double height_sigma = 0.01;  ///< [m], (0, 1): the sonar's steps are 1 cm
-    double tilt_sigma = 0.005;   ///< [rad], (0, 0.5): error of roll and pitch of a step
-    double yaw_sigma = 0.005;    ///< [rad per square root of s], (0, 0.5): drift of the yaw
-    double ground_step =
-        0.15; ///< [m], (0.02, 5): a faster change of the height is a step in the ground
-    double largest_gap_s = 0.5; ///< [s], (0.05, 10): beyond, the velocity is not trusted to bridge
+    double velocity_sigma = 0.1;  ///< [m/s], (0, 5): the drone's optical flow; 1 cm a step at 10 Hz
+    double scale_sigma = 0.03;    ///< (0, 1): error of the drone's speed in proportion; from flights
+    double height_sigma = 0.01;   ///< [m], (0, 1): the sonar's steps are 1 cm
+    double tilt_sigma = 0.005;    ///< [rad], (0, 0.5): error of roll and pitch of a step
+    double yaw_sigma = 0.005;     ///< [rad per square root of s], (0, 0.5): drift of the yaw
+    double ground_step = 0.15;    ///< [m], (0.02, 5): a faster change of the height is a step in the ground
+    double largest_gap_s = 0.5;   ///< [s], (0.05, 10): beyond, the velocity is not trusted to bridge
     double extrapolation_s = 0.1; ///< [s], (0, 1): how far beyond the newest sample at() goes
     double history_s = 10;        ///< [s], (1, 600)
     void validate() const;

@@ -18,9 +18,8 @@ constexpr std::uint16_t kLargestSide = 2048;
 bool PaveHeader::isPlausible() const
 {
   const auto side = [](std::uint16_t pixels) { return pixels >= 16 && pixels <= kLargestSide; };
-  return version >= 1 && version <= 3 && codec == 4 &&
-         (header_size == kShortHeader || header_size == kLongHeader) && payload_size > 0 &&
-         payload_size <= kLargestPayload && side(coded_width) && side(coded_height) &&
+  return version >= 1 && version <= 3 && codec == 4 && (header_size == kShortHeader || header_size == kLongHeader) &&
+         payload_size > 0 && payload_size <= kLargestPayload && side(coded_width) && side(coded_height) &&
          side(display_width) && side(display_height) && display_width <= coded_width &&
          display_height <= coded_height && frame_type <= PaveFrameType::headers;
 }
@@ -137,8 +136,7 @@ std::optional<PaveFrame> PaveParser::next()
     // begins.
     const std::size_t end = std::min(frame_size, left);
     const std::size_t inner = findHeader(m_begin + header->header_size) - m_begin;
-    if (inner + kShortHeader <= end &&
-        parsePaveHeader(m_buffer.data() + m_begin + inner, left - inner)) {
+    if (inner + kShortHeader <= end && parsePaveHeader(m_buffer.data() + m_begin + inner, left - inner)) {
       skip(inner);
       continue;
     }
@@ -147,8 +145,7 @@ std::optional<PaveFrame> PaveParser::next()
 
     PaveFrame frame;
     frame.header = *header;
-    const auto payload =
-        m_buffer.begin() + static_cast<std::ptrdiff_t>(m_begin + header->header_size);
+    const auto payload = m_buffer.begin() + static_cast<std::ptrdiff_t>(m_begin + header->header_size);
     frame.payload.assign(payload, payload + header->payload_size);
     frame.after_gap = m_gap || (m_last_number && header->frame_number != *m_last_number + 1);
     m_last_number = header->frame_number;

@@ -52,8 +52,7 @@ struct PaveFrame
 {
   PaveHeader header;
   std::vector<std::uint8_t> payload;
-  bool after_gap =
-      false; ///< bytes were skipped, or a frame number is missing, just before this frame
+  bool after_gap = false; ///< bytes were skipped, or a frame number is missing, just before this frame
 };
 
 /// Cuts a byte stream into PaVE frames and finds its way again after damage.

@@ -16,8 +16,7 @@ constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bite
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 } // namespace
 
-VideoReceiver::VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options,
-                             Callbacks callbacks)
+VideoReceiver::VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks)
     : m_address(address),
       m_options(options),
       m_callbacks(std::move(callbacks)),
@@ -38,8 +37,7 @@ void VideoReceiver::run()
   while (m_running) {
     const int wanted = m_generation;
     if (wanted != 1) {
-      if (const Socket socket = Socket::connectTcp(m_address.host, m_address.video_port, kConnect);
-          socket.valid()) {
+      if (const Socket socket = Socket::connectTcp(m_address.host, m_address.video_port, kConnect); socket.valid()) {
         m_generation = 2;
         receiveStream(socket, buffer);
         continue;
@@ -118,8 +116,7 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
   }
 }
 
-void VideoReceiver::handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size,
-                           std::int64_t arrival_ns)
+void VideoReceiver::handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
 {
   if (m_callbacks.tap)
     m_callbacks.tap(LinkChannel::video, arrival_ns, data, size);
@@ -127,8 +124,8 @@ void VideoReceiver::handle(VideoDecoder &video, const std::uint8_t *data, std::s
     m_callbacks.frame(std::move(decoded), video.counters(), arrival_ns);
 }
 
-NavdataReceiver::NavdataReceiver(const ArDroneAddress &address, bool full_navdata,
-                                 AtChannel &commands, Callbacks callbacks)
+NavdataReceiver::NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands,
+                                 Callbacks callbacks)
     : m_address(address),
       m_full_navdata(full_navdata),
       m_commands(commands),

@@ -22,11 +22,9 @@ public:
   {
     LinkTap tap; ///< may be empty
     std::function<void()> connected;
-    std::function<void(DecodedFrame &&, const VideoDecoder::Counters &, std::int64_t arrival_ns)>
-        frame;
+    std::function<void(DecodedFrame &&, const VideoDecoder::Counters &, std::int64_t arrival_ns)> frame;
   };
-  VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options,
-                Callbacks callbacks);
+  VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks);
   ~VideoReceiver();
   int generation() const { return m_generation; }
 
@@ -34,8 +32,7 @@ private:
   void run();
   void receiveStream(const Socket &socket, std::vector<std::uint8_t> &buffer);
   void receiveDatagrams(std::vector<std::uint8_t> &buffer);
-  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size,
-              std::int64_t arrival_ns);
+  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns);
   void begin(VideoDecoder &video);
   VideoDecoder &decoderFor(int generation);
   bool isSilent(std::int64_t since_ns) const;
@@ -58,12 +55,10 @@ public:
   {
     LinkTap tap; ///< may be empty
     /// Takes a packet; returns its state bits where it was a good one.
-    std::function<std::optional<std::uint32_t>(const std::uint8_t *data, std::size_t size,
-                                               std::int64_t arrival_ns)>
+    std::function<std::optional<std::uint32_t>(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)>
         packet;
   };
-  NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands,
-                  Callbacks callbacks);
+  NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands, Callbacks callbacks);
   ~NavdataReceiver();
 
 private:

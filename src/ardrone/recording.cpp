@@ -69,8 +69,7 @@ RecordingWriter::~RecordingWriter()
   ::close(m_descriptor);
 }
 
-void RecordingWriter::write(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
-                            std::size_t size)
+void RecordingWriter::write(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)
 {
   std::vector<std::uint8_t> piece;
   piece.reserve(kHead + size + kTail);
@@ -84,8 +83,7 @@ void RecordingWriter::write(LinkChannel channel, std::int64_t arrival_ns, const 
   const std::lock_guard<std::mutex> lock(m_mutex);
   const ssize_t written = ::write(m_descriptor, piece.data(), piece.size());
   if (written != static_cast<ssize_t>(piece.size()) && m_error.empty())
-    m_error =
-        fmt::format("{}: {}", m_path, written < 0 ? std::strerror(errno) : "the disk is full");
+    m_error = fmt::format("{}: {}", m_path, written < 0 ? std::strerror(errno) : "the disk is full");
   m_bytes += written > 0 ? static_cast<std::size_t>(written) : 0;
 }
 
@@ -106,13 +104,12 @@ RecordingReader::RecordingReader(const std::string &folder)
   const auto path = rawPath(folder);
   std::ifstream file(path, std::ios::binary);
   if (!file)
-    throw vpException(vpException::ioError, fmt::format("{}: {}, must be a recording",
-                                                        path.string(), std::strerror(errno)));
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: {}, must be a recording", path.string(), std::strerror(errno)));
   m_bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   if (m_bytes.size() < kTitle.size() || !std::equal(kTitle.begin(), kTitle.end(), m_bytes.begin()))
-    throw vpException(vpException::ioError,
-                      fmt::format("{}:1: the first line must be \"{}\"", path.string(),
-                                  kTitle.substr(0, kTitle.size() - 1)));
+    throw vpException(vpException::ioError, fmt::format("{}:1: the first line must be \"{}\"", path.string(),
+                                                        kTitle.substr(0, kTitle.size() - 1)));
   m_at = kTitle.size();
 }
 
@@ -146,8 +143,8 @@ int recordedGeneration(const std::string &folder)
   for (RecordedPiece piece; reader.next(piece);)
     if (piece.channel == LinkChannel::video && !piece.bytes.empty()) {
       static constexpr std::array<std::uint8_t, 4> signature = {'P', 'a', 'V', 'E'};
-      const auto end = piece.bytes.begin() +
-                       static_cast<std::ptrdiff_t>(std::min<std::size_t>(piece.bytes.size(), 4096));
+      const auto end =
+          piece.bytes.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(piece.bytes.size(), 4096));
       if (std::search(piece.bytes.begin(), end, signature.begin(), signature.end()) != end)
         return 2;
       if (piece.bytes.size() > 3 && piece.bytes[2] == 0 && piece.bytes[3] == 0)

@@ -36,8 +36,7 @@ public:
   RecordingWriter(const RecordingWriter &) = delete;
   RecordingWriter &operator=(const RecordingWriter &) = delete;
 
-  void write(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
-             std::size_t size);
+  void write(LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size);
   std::size_t bytes() const;
   /// Not empty when the disk refused something: what, first time.
   std::string error() const;

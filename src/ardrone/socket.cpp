@@ -36,10 +36,7 @@ bool waitFor(int descriptor, short events, Milliseconds timeout)
   return poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
 }
 
-void setNonBlocking(int descriptor)
-{
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL, 0) | O_NONBLOCK);
-}
+void setNonBlocking(int descriptor) { fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL, 0) | O_NONBLOCK); }
 
 Socket bindTo(const std::string &host, std::uint16_t port, int type)
 {
@@ -50,9 +47,8 @@ Socket bindTo(const std::string &host, std::uint16_t port, int type)
   setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
   if (!address || descriptor < 0 ||
       bind(descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
-    throw vpException(vpException::ioError,
-                      fmt::format("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port,
-                                  host, std::strerror(errno)));
+    throw vpException(vpException::ioError, fmt::format("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP",
+                                                        port, host, std::strerror(errno)));
   setNonBlocking(descriptor);
   return owner;
 }
@@ -78,8 +74,7 @@ Socket Socket::connectTcp(const std::string &host, std::uint16_t port, Milliseco
   if (!address || !socket.valid())
     return {};
   setNonBlocking(socket.m_descriptor);
-  if (connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address),
-              sizeof(*address)) != 0) {
+  if (connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0) {
     int error = 0;
     socklen_t length = sizeof(error);
     if (errno != EINPROGRESS || !waitFor(socket.m_descriptor, POLLOUT, timeout) ||
@@ -96,24 +91,19 @@ Socket Socket::connectUdp(const std::string &host, std::uint16_t port)
   const auto address = resolve(host, port);
   Socket socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   if (!address || !socket.valid() ||
-      connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address),
-              sizeof(*address)) != 0)
+      connect(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
     return {};
   setNonBlocking(socket.m_descriptor);
   return socket;
 }
 
-Socket Socket::bindUdp(const std::string &host, std::uint16_t port)
-{
-  return bindTo(host, port, SOCK_DGRAM);
-}
+Socket Socket::bindUdp(const std::string &host, std::uint16_t port) { return bindTo(host, port, SOCK_DGRAM); }
 
 Socket Socket::listenTcp(const std::string &host, std::uint16_t port)
 {
   Socket socket = bindTo(host, port, SOCK_STREAM);
   if (listen(socket.m_descriptor, 4) != 0)
-    throw vpException(vpException::ioError,
-                      fmt::format("TCP port {} of {}: {}", port, host, std::strerror(errno)));
+    throw vpException(vpException::ioError, fmt::format("TCP port {} of {}: {}", port, host, std::strerror(errno)));
   return socket;
 }
 
@@ -125,27 +115,22 @@ std::uint16_t Socket::localPort() const
   return ntohs(address.sin_port);
 }
 
-bool Socket::waitReadable(Milliseconds timeout) const
-{
-  return waitFor(m_descriptor, POLLIN, timeout);
-}
+bool Socket::waitReadable(Milliseconds timeout) const { return waitFor(m_descriptor, POLLIN, timeout); }
 
-Socket::Read Socket::receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
-                             Milliseconds timeout) const
+Socket::Read Socket::receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const
 {
   sockaddr_in sender = {};
   return receiveFrom(buffer, capacity, size, sender, timeout);
 }
 
-Socket::Read Socket::receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
-                                 sockaddr_in &sender, Milliseconds timeout) const
+Socket::Read Socket::receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender,
+                                 Milliseconds timeout) const
 {
   size = 0;
   if (!waitReadable(timeout))
     return Read::timeout;
   socklen_t length = sizeof(sender);
-  const ssize_t count =
-      recvfrom(m_descriptor, buffer, capacity, 0, reinterpret_cast<sockaddr *>(&sender), &length);
+  const ssize_t count = recvfrom(m_descriptor, buffer, capacity, 0, reinterpret_cast<sockaddr *>(&sender), &length);
   if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
     return Read::timeout;
   if (count <= 0)
@@ -161,8 +146,8 @@ bool Socket::send(const void *data, std::size_t size) const
 
 bool Socket::sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const
 {
-  return ::sendto(m_descriptor, data, size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr *>(&peer),
-                  sizeof(peer)) == static_cast<ssize_t>(size);
+  return ::sendto(m_descriptor, data, size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr *>(&peer), sizeof(peer)) ==
+         static_cast<ssize_t>(size);
 }
 
 std::int64_t Socket::sendSome(const std::uint8_t *data, std::size_t size) const

@@ -18,8 +18,7 @@ using Milliseconds = std::chrono::milliseconds;
 /// [ns] of the steady clock that every arrival is stamped with.
 inline std::int64_t steadyNowNs()
 {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
       .count();
 }
 
@@ -54,10 +53,9 @@ public:
     closed
   };
   /// One datagram, or what there is of a stream.
-  Read receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
-               Milliseconds timeout) const;
-  Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size,
-                   sockaddr_in &sender, Milliseconds timeout) const;
+  Read receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const;
+  Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender,
+                   Milliseconds timeout) const;
   bool send(const void *data, std::size_t size) const; ///< false on any failure
   bool sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const;
   /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is

@@ -9,17 +9,16 @@ namespace bole
 {
 namespace
 {
-constexpr const char *kOnlyUvlc =
-    "; only UVLC is decoded, not P264 (set the drone's video:video_codec to 32, not 64)";
+constexpr const char *kOnlyUvlc = "; only UVLC is decoded, not P264 (set the drone's video:video_codec to 32, not 64)";
 constexpr int kTableQuantiser = 31;
 constexpr std::uint32_t kEndOfSequence = 31;
 constexpr int kLargestResolution = 5;
 
 // Row and column of each coefficient in the order of the stream (JPEG's zigzag).
-constexpr std::array<std::uint8_t, 64> kZigzag = {
-    0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,  12, 19, 26, 33, 40, 48,
-    41, 34, 27, 20, 13, 6,  7,  14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23,
-    30, 37, 44, 51, 58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
+constexpr std::array<std::uint8_t, 64> kZigzag = {0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,
+                                                  12, 19, 26, 33, 40, 48, 41, 34, 27, 20, 13, 6,  7,  14, 21, 28,
+                                                  35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23, 30, 37, 44, 51,
+                                                  58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
 
 int quantiser(int index) { return 3 + 2 * (index / 8 + index % 8); }
 
@@ -30,8 +29,7 @@ const std::array<std::array<float, 8>, 8> &dctBasis()
     std::array<std::array<float, 8>, 8> b{};
     for (int x = 0; x < 8; ++x)
       for (int u = 0; u < 8; ++u)
-        b[x][u] = static_cast<float>((u == 0 ? std::sqrt(0.125) : 0.5) *
-                                     std::cos((2 * x + 1) * u * M_PI / 16));
+        b[x][u] = static_cast<float>((u == 0 ? std::sqrt(0.125) : 0.5) * std::cos((2 * x + 1) * u * M_PI / 16));
     return b;
   }();
   return basis;
@@ -109,10 +107,8 @@ struct Decoder
     const auto type = bits.read(3);
     quant = static_cast<int>(bits.read(5));
     const auto number = bits.read(32);
-    if (format < 1 || format > 2 || resolution < 1 || resolution > kLargestResolution ||
-        type != 0) {
-      complain(fmt::format("picture header: format {}, resolution {}, type {}{}", format, resolution,
-                           type, kOnlyUvlc));
+    if (format < 1 || format > 2 || resolution < 1 || resolution > kLargestResolution || type != 0) {
+      complain(fmt::format("picture header: format {}, resolution {}, type {}{}", format, resolution, type, kOnlyUvlc));
       return false;
     }
     YuvPicture &picture = result.picture;
@@ -148,14 +144,10 @@ struct Decoder
         return false;
       if (block < 4)
         reconstruct(levels, has_ac,
-                    picture.y.data() + (group * 16 + block / 2 * 8) * stride + column * 16 +
-                        block % 2 * 8,
-                    stride);
+                    picture.y.data() + (group * 16 + block / 2 * 8) * stride + column * 16 + block % 2 * 8, stride);
       else
         reconstruct(levels, has_ac,
-                    (block == 4 ? picture.cb : picture.cr).data() + group * 8 * (stride / 2) +
-                        column * 8,
-                    stride / 2);
+                    (block == 4 ? picture.cb : picture.cr).data() + group * 8 * (stride / 2) + column * 8, stride / 2);
     }
     return true;
   }
@@ -163,9 +155,7 @@ struct Decoder
   bool readGroup(int group)
   {
     if (quant != kTableQuantiser) {
-      complain(
-          fmt::format("group {}: quantiser {}, only {} is known{}", group, quant, kTableQuantiser,
-                      kOnlyUvlc));
+      complain(fmt::format("group {}: quantiser {}, only {} is known{}", group, quant, kTableQuantiser, kOnlyUvlc));
       return false;
     }
     const int columns = (result.picture.width + 15) / 16;
@@ -181,8 +171,7 @@ struct Decoder
   void crop()
   {
     YuvPicture &picture = result.picture;
-    const auto cut = [](std::vector<std::uint8_t> &plane, std::size_t stride, int width,
-                        int height) {
+    const auto cut = [](std::vector<std::uint8_t> &plane, std::size_t stride, int width, int height) {
       for (int row = 0; row < height; ++row)
         std::copy_n(plane.begin() + static_cast<std::ptrdiff_t>(row * stride), width,
                     plane.begin() + static_cast<std::ptrdiff_t>(row) * width);
@@ -196,10 +185,7 @@ struct Decoder
 };
 } // namespace
 
-UvlcBits::UvlcBits(const std::uint8_t *data, std::size_t size)
-    : m_data(data), m_size_bits(size / 4 * 32)
-{
-}
+UvlcBits::UvlcBits(const std::uint8_t *data, std::size_t size) : m_data(data), m_size_bits(size / 4 * 32) {}
 
 std::uint32_t UvlcBits::bit(std::size_t at) const
 {
@@ -242,16 +228,14 @@ bool readUvlcBlock(UvlcBits &bits, bool has_ac, std::array<int, 64> &levels)
     const int run_zeros = bits.countZeros();
     if (run_zeros > 6)
       return false;
-    const int run =
-        run_zeros == 0 ? 0 : (1 << (run_zeros - 1)) + static_cast<int>(bits.read(run_zeros - 1));
+    const int run = run_zeros == 0 ? 0 : (1 << (run_zeros - 1)) + static_cast<int>(bits.read(run_zeros - 1));
     const int level_zeros = bits.countZeros();
     if (level_zeros == 1)
       break;
     if (level_zeros > 10)
       return false;
     const int magnitude =
-        level_zeros == 0 ? 1
-                         : (1 << (level_zeros - 1)) + static_cast<int>(bits.read(level_zeros - 1));
+        level_zeros == 0 ? 1 : (1 << (level_zeros - 1)) + static_cast<int>(bits.read(level_zeros - 1));
     position += run + 1;
     if (position > 63)
       return false;
@@ -274,8 +258,7 @@ UvlcResult decodeUvlc(const std::uint8_t *data, std::size_t size)
   if (!decoder.readPictureHeader())
     return std::move(result);
 
-  for (std::optional<std::uint32_t> group = 0; group && *group != kEndOfSequence;
-       group = decoder.findStartCode()) {
+  for (std::optional<std::uint32_t> group = 0; group && *group != kEndOfSequence; group = decoder.findStartCode()) {
     const int index = static_cast<int>(*group);
     if (index > 0)
       decoder.quant = static_cast<int>(decoder.bits.read(5));

@@ -55,7 +55,7 @@ public:
   std::uint32_t read(int count);       ///< \param count 0 .. 32
   std::uint32_t peek(int count) const; ///< \param count 0 .. 32
   void skip(int count) { m_position += static_cast<std::size_t>(count); }
-  int countZeros(); ///< zeros in front of the next one, which is read too; at most 32
+  int countZeros();                                   ///< zeros in front of the next one, which is read too; at most 32
   std::size_t position() const { return m_position; } ///< [bit]
   std::size_t size() const { return m_size_bits; }    ///< [bit]
   bool exhausted() const { return m_position > m_size_bits; }

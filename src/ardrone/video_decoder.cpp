@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
+#include "ardrone/uvlc.h"
 
 #include <fmt/format.h>
 
@@ -23,8 +23,7 @@ double blockChange(const YuvPicture &a, const YuvPicture &b)
       int sum = 0;
       for (int v = top; v < top + kBlock; ++v)
         for (int u = left; u < left + kBlock; ++u)
-          sum += a.y[static_cast<std::size_t>(v) * a.width + u] -
-                 b.y[static_cast<std::size_t>(v) * a.width + u];
+          sum += a.y[static_cast<std::size_t>(v) * a.width + u] - b.y[static_cast<std::size_t>(v) * a.width + u];
       total += std::abs(sum) / static_cast<double>(kBlock * kBlock);
     }
   return blocks > 0 ? total / blocks : 0;
@@ -52,14 +51,13 @@ DecodedFrame VideoDecoder::decodePave(const PaveFrame &frame)
     out.message = "waits for a key frame";
     return out;
   }
-  const auto result = m_h264.decode(frame.payload, frame.header.display_width,
-                                    frame.header.display_height, out.picture);
+  const auto result =
+      m_h264.decode(frame.payload, frame.header.display_width, frame.header.display_height, out.picture);
   if (result != H264Decoder::Result::picture) {
     m_needs_key = true;
     m_h264.flush();
     out.status = FrameStatus::corrupt;
-    out.message =
-        result == H264Decoder::Result::nothing ? "the decoder gave no picture" : m_h264.message();
+    out.message = result == H264Decoder::Result::nothing ? "the decoder gave no picture" : m_h264.message();
   }
   out.picture.number = out.number;
   return out;
@@ -74,8 +72,7 @@ void VideoDecoder::judge(DecodedFrame &frame)
     }
     if (frame.picture.width != m_width || frame.picture.height != m_height) {
       frame.status = FrameStatus::resized;
-      frame.message = fmt::format("{}x{} after {}x{}", frame.picture.width, frame.picture.height,
-                                  m_width, m_height);
+      frame.message = fmt::format("{}x{} after {}x{}", frame.picture.width, frame.picture.height, m_width, m_height);
     }
     else if (frame.picture.y == m_last.y) {
       frame.status = FrameStatus::stale;

@@ -10,12 +10,10 @@ namespace
 constexpr std::int64_t kJump_ns = 5'000'000'000; // no link delays a packet so long
 } // namespace
 
-VideoStamps::Stamp VideoStamps::next(const std::optional<std::uint32_t> &timestamp_ms,
-                                     std::int64_t arrival_ns)
+VideoStamps::Stamp VideoStamps::next(const std::optional<std::uint32_t> &timestamp_ms, std::int64_t arrival_ns)
 {
-  Stamp stamp = timestamp_ms
-                    ? onDroneClock(m_unwrapper.unwrap(*timestamp_ms) * 1'000'000, arrival_ns)
-                    : Stamp{arrival_ns, true};
+  Stamp stamp =
+      timestamp_ms ? onDroneClock(m_unwrapper.unwrap(*timestamp_ms) * 1'000'000, arrival_ns) : Stamp{arrival_ns, true};
   if (m_has_last && stamp.ns <= m_last_ns) // two in a burst, or a damaged stamp
     stamp = {m_last_ns + 1, false};
   m_has_last = true;
@@ -31,9 +29,7 @@ VideoStamps::Stamp VideoStamps::onDroneClock(std::int64_t raw_ns, std::int64_t a
     m_jumped.reset();
     return {raw_ns + m_shift_ns, true};
   }
-  const bool agrees =
-      m_jumped &&
-      std::abs(raw_ns - m_jumped->raw_ns - (arrival_ns - m_jumped->arrival_ns)) <= kJump_ns;
+  const bool agrees = m_jumped && std::abs(raw_ns - m_jumped->raw_ns - (arrival_ns - m_jumped->arrival_ns)) <= kJump_ns;
   if (agrees) {
     m_shift_ns = expected_ns - raw_ns;
     ++m_jumps;

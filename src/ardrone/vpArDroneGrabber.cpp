@@ -10,11 +10,9 @@
 void vpArDroneGrabber::Options::validate() const
 {
   if (!(open_timeout_s > 0.1 && open_timeout_s < 600))
-    throw vpException(vpException::badValue, "open_timeout_s = %g, must be in (0.1, 600) s",
-                      open_timeout_s);
+    throw vpException(vpException::badValue, "open_timeout_s = %g, must be in (0.1, 600) s", open_timeout_s);
   if (!(frame_timeout_s > 0.02 && frame_timeout_s < 60))
-    throw vpException(vpException::badValue, "frame_timeout_s = %g, must be in (0.02, 60) s",
-                      frame_timeout_s);
+    throw vpException(vpException::badValue, "frame_timeout_s = %g, must be in (0.02, 60) s", frame_timeout_s);
   link.validate();
 }
 
@@ -23,8 +21,7 @@ vpArDroneGrabber::vpArDroneGrabber(const std::string &address)
 {
 }
 
-vpArDroneGrabber::vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options,
-                                   bole::LinkTap tap)
+vpArDroneGrabber::vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options, bole::LinkTap tap)
     : m_address(address), m_options(options), m_tap(std::move(tap))
 {
   m_options.validate();
@@ -42,8 +39,7 @@ void vpArDroneGrabber::waitForFirstImage()
 {
   close();
   connect();
-  const std::int64_t end_ns =
-      bole::steadyNowNs() + static_cast<std::int64_t>(m_options.open_timeout_s * 1e9);
+  const std::int64_t end_ns = bole::steadyNowNs() + static_cast<std::int64_t>(m_options.open_timeout_s * 1e9);
   std::string why; // the last image was no whole one
   do {
     if (!m_link->next(m_frame, 0.05))
@@ -58,10 +54,9 @@ void vpArDroneGrabber::waitForFirstImage()
   } while (bole::steadyNowNs() < end_ns);
   const bool answered = m_link->counters().connections > 0;
   close();
-  throw vpException(vpException::ioError,
-                    fmt::format("{}: {} within {} s{}{}", m_address.toString(),
-                                answered ? "no whole image" : "no drone answers",
-                                m_options.open_timeout_s, why.empty() ? "" : ": ", why));
+  throw vpException(vpException::ioError, fmt::format("{}: {} within {} s{}{}", m_address.toString(),
+                                                      answered ? "no whole image" : "no drone answers",
+                                                      m_options.open_timeout_s, why.empty() ? "" : ": ", why));
 }
 
 void vpArDroneGrabber::open(vpImage<unsigned char> &I)
@@ -89,9 +84,8 @@ void vpArDroneGrabber::grab()
     frame.number = last.number;
     frame.arrival_ns = last.arrival_ns;
     // On the drone's clock; half a timeout early, so that the frame that comes next is not before.
-    frame.stamp_ns = std::max(last.stamp_ns + 1,
-                              m_last_whole.stamp_ns + waited_ns -
-                                  static_cast<std::int64_t>(m_options.frame_timeout_s * 5e8));
+    frame.stamp_ns = std::max(last.stamp_ns + 1, m_last_whole.stamp_ns + waited_ns -
+                                                     static_cast<std::int64_t>(m_options.frame_timeout_s * 5e8));
     m_link->addMotion(frame);
   }
   m_frame = std::move(frame);
@@ -118,15 +112,11 @@ void vpArDroneGrabber::close()
   init = false;
 }
 
-bole::LinkCounters vpArDroneGrabber::getCounters() const
-{
-  return m_link ? m_link->counters() : bole::LinkCounters{};
-}
+bole::LinkCounters vpArDroneGrabber::getCounters() const { return m_link ? m_link->counters() : bole::LinkCounters{}; }
 
 bole::DroneLink &vpArDroneGrabber::getLink()
 {
   if (!m_link)
-    throw vpException(vpException::notInitialized,
-                      "the grabber is not open: call open() or connect() first");
+    throw vpException(vpException::notInitialized, "the grabber is not open: call open() or connect() first");
   return *m_link;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/body_velocity.h"
-#include <bole/pose.h>
 #include "input/camera_file.h"
+#include <bole/pose.h>
 #include <bole/vpRobotArDrone.h>
 
 #include "ardrone/socket.h"
@@ -15,15 +15,13 @@
 
 namespace
 {
-constexpr std::chrono::milliseconds kPeriod{
-    33};                    // commands every 30 ms fly smoothly, says the manufacturer
-constexpr int kRepeats = 3; // single datagrams get lost
+constexpr std::chrono::milliseconds kPeriod{33}; // commands every 30 ms fly smoothly, says the manufacturer
+constexpr int kRepeats = 3;                      // single datagrams get lost
 
 void require(const char *name, double value, double low, double high)
 {
   if (!(value > low && value < high))
-    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low,
-                      high);
+    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
 }
 } // namespace
 
@@ -63,8 +61,7 @@ struct vpRobotArDrone::State
     bole::AtChannel &commands = grabber.getLink().commands();
     const auto body = grabber.getLink().body();
     if (emergency_pulses > 0) {
-      commands.reference(false, emergency_pulses-- >
-                                    1); // a rising edge changes the state, so it must fall again
+      commands.reference(false, emergency_pulses-- > 1); // a rising edge changes the state, so it must fall again
       return;
     }
     if (!in_air) {
@@ -89,17 +86,15 @@ struct vpRobotArDrone::State
     }
     // Forward needs the nose down and leftward the left side down: both negative for the drone.
     const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body->velocity.head<2>());
-    commands.move(true, share(-tilt.y()), share(-tilt.x()),
-                  share(wanted.z() / options.largest_climb),
+    commands.move(true, share(-tilt.y()), share(-tilt.x()), share(wanted.z() / options.largest_climb),
                   share(-wanted.w() / options.largest_turn));
   }
 
   void requireOpen() const
   {
     if (!running)
-      throw vpRobotException(
-          vpRobotException::notInitialized,
-          "the robot was not opened with the permission to fly: nothing was sent");
+      throw vpRobotException(vpRobotException::notInitialized,
+                             "the robot was not opened with the permission to fly: nothing was sent");
   }
 };
 
@@ -194,8 +189,8 @@ void vpRobotArDrone::trim()
 void vpRobotArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
 {
   m_state->requireOpen();
-  const Eigen::Vector4d wanted = bole::bodyVelocity(
-      frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
+  const Eigen::Vector4d wanted =
+      bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
   const std::lock_guard<std::mutex> lock(m_state->mutex);
   m_state->wanted = wanted;
   m_state->has_wanted = true;
@@ -216,8 +211,7 @@ void vpRobotArDrone::get_eJe(vpMatrix &jacobian)
 
 void vpRobotArDrone::get_fJe(vpMatrix &)
 {
-  throw vpRobotException(vpRobotException::notImplementedError,
-                         "a flying body has no fixed frame to be moved in");
+  throw vpRobotException(vpRobotException::notImplementedError, "a flying body has no fixed frame to be moved in");
 }
 
 void vpRobotArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector &q)
@@ -240,8 +234,8 @@ void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVec
   if (!body)
     throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
   const std::lock_guard<std::mutex> lock(m_state->mutex);
-  const bole::Vector6d moved = m_state->last_position ? body->wMb.minus(*m_state->last_position)
-                                                      : bole::Vector6d::Zero().eval();
+  const bole::Vector6d moved =
+      m_state->last_position ? body->wMb.minus(*m_state->last_position) : bole::Vector6d::Zero().eval();
   m_state->last_position = body->wMb;
   q.resize(6, false);
   for (unsigned i = 0; i < 6; ++i)
@@ -250,6 +244,5 @@ void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVec
 
 void vpRobotArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)
 {
-  throw vpRobotException(vpRobotException::notImplementedError,
-                         "an AR.Drone obeys velocities, not positions");
+  throw vpRobotException(vpRobotException::notImplementedError, "an AR.Drone obeys velocities, not positions");
 }

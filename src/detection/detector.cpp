@@ -236,10 +236,7 @@ double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy)
   return high - low;
 }
 
-bool overlaps(const Detection &a, const Detection &b)
-{
-  return a.q_left > b.q_right && b.q_left > a.q_right;
-}
+bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
 
 /// Small residuals tell a trunk from chance; of two readings of the same place the wider is the silhouette, the
 /// narrower a shadow's edge on the bark.
@@ -252,9 +249,7 @@ double quality(const Detection &detection)
 /// Best first; a trunk that overlaps a better one in the image is another reading of the same lines.
 std::vector<Detection> suppress(std::vector<Detection> found)
 {
-  std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) {
-    return quality(a) > quality(b);
-  });
+  std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) { return quality(a) > quality(b); });
   std::vector<Detection> kept;
   for (const Detection &detection : found)
     if (std::none_of(kept.begin(), kept.end(), [&](const Detection &k) { return overlaps(k, detection); }))
@@ -303,8 +298,8 @@ bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double 
 {
   return std::any_of(known.begin(), known.end(), [&](const InhibitedRange &range) {
     const bool overlaps = q_left > range.q_right && q_right < range.q_left;
-    const bool holds_it = q_left > range.q_left && q_right < range.q_right &&
-                          q_left - q_right > 1.2 * (range.q_left - range.q_right);
+    const bool holds_it =
+        q_left > range.q_left && q_right < range.q_right && q_left - q_right > 1.2 * (range.q_left - range.q_right);
     return overlaps && !holds_it;
   });
 }
@@ -354,9 +349,8 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         if (!detection)
           continue;
         if (p_background)
-          detection->foreground =
-              foregroundBetween(*p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk),
-                                options.profile.range);
+          detection->foreground = foregroundBetween(
+              *p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk), options.profile.range);
         if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
             detection->foreground < options.foreground_min)
           continue;

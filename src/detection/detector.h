@@ -21,20 +21,20 @@ namespace bole
 struct DetectorOptions
 {
   ProfileOptions profile;
-  int window = 18;             ///< frames looked at together, 4 to 100
-  double range_min = 1.5;      ///< nearest trunk [m], 0.3 to 5
-  double range_max = 10.5;     ///< farthest trunk that matters for planning [m], 2 to 50
-  double radius_min = 0.06;    ///< [m]
-  double radius_max = 0.38;    ///< [m]
-  double agreement_min = 0.65; ///< mean agreement of the borders with the window, 0 to 1
-  double inliers_min = 0.7;    ///< part of the views within inlier_px of both borders, 0 to 1
-  double inlier_px = 2.5;      ///< [px]
-  double rms_max_px = 0.85;    ///< of the inliers, [px]
-  double parallax_min = 0.03;  ///< angle between the first and the last line of sight, [rad]
+  int window = 18;               ///< frames looked at together, 4 to 100
+  double range_min = 1.5;        ///< nearest trunk [m], 0.3 to 5
+  double range_max = 10.5;       ///< farthest trunk that matters for planning [m], 2 to 50
+  double radius_min = 0.06;      ///< [m]
+  double radius_max = 0.38;      ///< [m]
+  double agreement_min = 0.65;   ///< mean agreement of the borders with the window, 0 to 1
+  double inliers_min = 0.7;      ///< part of the views within inlier_px of both borders, 0 to 1
+  double inlier_px = 2.5;        ///< [px]
+  double rms_max_px = 0.85;      ///< of the inliers, [px]
+  double parallax_min = 0.03;    ///< angle between the first and the last line of sight, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
-  int views_min = 5;           ///< views within the window that see both borders
-  double near_range = 5.5;     ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
-  double foreground_min = 0.15;///< mean of 1 - p(background) between its borders then, 0 to 1
+  int views_min = 5;             ///< views within the window that see both borders
+  double near_range = 5.5;       ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
+  double foreground_min = 0.15;  ///< mean of 1 - p(background) between its borders then, 0 to 1
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -49,16 +49,16 @@ struct DetectorView
 /// A trunk found.
 struct Detection
 {
-  Trunk trunk;              ///< upright
+  Trunk trunk;                                              ///< upright
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< of (x, y, log r), given the poses
-  double range = 0;         ///< from the current camera [m]
-  double agreement = 0;     ///< 0 to 1
+  double range = 0;                                         ///< from the current camera [m]
+  double agreement = 0;                                     ///< 0 to 1
   double rms_px = 0;
-  double parallax = 0;      ///< [rad]
-  double foreground = 0;    ///< mean of 1 - p(background) between the borders, where known
+  double parallax = 0;   ///< [rad]
+  double foreground = 0; ///< mean of 1 - p(background) between the borders, where known
   int views = 0, inliers = 0;
-  double q_left = 0, q_right = 0;                ///< in the current profile
-  double left_contrast = 0, right_contrast = 0;  ///< signed
+  double q_left = 0, q_right = 0;               ///< in the current profile
+  double left_contrast = 0, right_contrast = 0; ///< signed
 };
 
 /// Part of the current profile taken by a known trunk.

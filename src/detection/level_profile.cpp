@@ -37,7 +37,8 @@ void findExtremes(LevelProfile &profile)
   profile.rising.assign(p.size(), 0.f);
   profile.falling.assign(p.size(), 0.f);
   for (std::size_t i = 2; i + 2 < p.size(); ++i) {
-    const auto [low, high] = std::minmax_element(p.begin() + static_cast<long>(i) - 2, p.begin() + static_cast<long>(i) + 3);
+    const auto [low, high] =
+        std::minmax_element(p.begin() + static_cast<long>(i) - 2, p.begin() + static_cast<long>(i) + 3);
     profile.rising[i] = std::max(*high, 0.f);
     profile.falling[i] = std::min(*low, 0.f);
   }

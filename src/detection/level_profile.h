@@ -7,8 +7,8 @@
 /// and the mean signed gradient along its part that any trunk within range must fill is one number. A frame is a
 /// 1-D profile; its local maxima are where a border of a trunk may be, either polarity.
 
-#include <bole/pose.h>
 #include "gradient/border_line.h"
+#include <bole/pose.h>
 
 #include <vector>
 
@@ -24,12 +24,12 @@ struct ProfilePeak
 struct LevelProfile
 {
   Eigen::Matrix3d cRl = Eigen::Matrix3d::Identity(); ///< level frame (forward, left, up) to camera
-  double step = 0.0025;         ///< in q between samples
-  double q_first = 0;           ///< q of sample 0; samples run to the left
-  std::vector<float> mean;      ///< signed mean gradient; 0 where the line is not in the image
-  std::vector<float> rising;    ///< largest mean within a pixel: the best dark-bright border, >= 0
-  std::vector<float> falling;   ///< smallest mean within a pixel: the best bright-dark border, <= 0
-  std::vector<ProfilePeak> peaks; ///< by rising q
+  double step = 0.0025;                              ///< in q between samples
+  double q_first = 0;                                ///< q of sample 0; samples run to the left
+  std::vector<float> mean;                           ///< signed mean gradient; 0 where the line is not in the image
+  std::vector<float> rising;                         ///< largest mean within a pixel: the best dark-bright border, >= 0
+  std::vector<float> falling;      ///< smallest mean within a pixel: the best bright-dark border, <= 0
+  std::vector<ProfilePeak> peaks;  ///< by rising q
   std::vector<float> rising_peak;  ///< q of the dark-bright peak nearest to each sample; NaN where there is none
   std::vector<float> falling_peak; ///< q of the bright-dark one
 
@@ -43,9 +43,9 @@ struct LevelProfile
 
 struct ProfileOptions
 {
-  ElevationRange range;         ///< of the lines, tan of elevation
-  double contrast_min = 0.008;  ///< weaker maxima are no peaks [full scale/px], 0.001 to 0.5
-  double rows_min = 0.4;        ///< least part of the line inside the image, or of the image that it crosses, 0.1 to 1
+  ElevationRange range;        ///< of the lines, tan of elevation
+  double contrast_min = 0.008; ///< weaker maxima are no peaks [full scale/px], 0.001 to 0.5
+  double rows_min = 0.4;       ///< least part of the line inside the image, or of the image that it crosses, 0.1 to 1
 };
 
 /// Profile of the gradient \p g seen by \p camera with the rotation \p wRc. Cost: about 0.5 ms at 320x240.

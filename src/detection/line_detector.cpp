@@ -62,13 +62,14 @@ std::vector<Line> maxima(const std::vector<double> &p, const LevelProfile &grid,
     const auto first = p.begin() + std::max(0, i - apart), last = p.begin() + std::min(n, i + apart + 1);
     const double value = p[static_cast<std::size_t>(i)];
     if (value >= threshold && std::max_element(first, last) - p.begin() == i)
-      lines.push_back({grid.q_first + grid.step * i, value, static_cast<double>(grid.mean[static_cast<std::size_t>(i)])});
+      lines.push_back(
+          {grid.q_first + grid.step * i, value, static_cast<double>(grid.mean[static_cast<std::size_t>(i)])});
   }
   return lines;
 }
 
-/// A line between the two borders that is as strong as they are: then they are no neighbours, and what is between them is
-/// no bark but a wall or a gap.
+/// A line between the two borders that is as strong as they are: then they are no neighbours, and what is between them
+/// is no bark but a wall or a gap.
 bool isDivided(const LevelProfile &profile, const Line &left, const Line &right)
 {
   const double weaker = std::min(std::abs(left.contrast), std::abs(right.contrast));

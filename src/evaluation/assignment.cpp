@@ -12,12 +12,10 @@ std::vector<int> assignRows(const Eigen::MatrixXd &cost)
 {
   const Eigen::Index rows = cost.rows(), columns = cost.cols();
   const Eigen::Index none = columns; // a column that does not exist: where each search starts
-  Eigen::VectorXd row_price = Eigen::VectorXd::Zero(rows),
-                  column_price = Eigen::VectorXd::Zero(columns + 1);
+  Eigen::VectorXd row_price = Eigen::VectorXd::Zero(rows), column_price = Eigen::VectorXd::Zero(columns + 1);
   std::vector<Eigen::Index> row_of(static_cast<std::size_t>(columns) + 1, -1);
   for (Eigen::Index row = 0; row < rows; ++row) {
-    Eigen::VectorXd slack =
-        Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
+    Eigen::VectorXd slack = Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
     std::vector<Eigen::Index> came_from(static_cast<std::size_t>(columns), none);
     std::vector<bool> is_done(static_cast<std::size_t>(columns) + 1, false);
     Eigen::Index at = none;
@@ -59,8 +57,7 @@ std::vector<int> assignRows(const Eigen::MatrixXd &cost)
   std::vector<int> column_of(static_cast<std::size_t>(rows), -1);
   for (Eigen::Index c = 0; c < columns; ++c)
     if (row_of[static_cast<std::size_t>(c)] >= 0)
-      column_of[static_cast<std::size_t>(row_of[static_cast<std::size_t>(c)])] =
-          static_cast<int>(c);
+      column_of[static_cast<std::size_t>(row_of[static_cast<std::size_t>(c)])] = static_cast<int>(c);
   return column_of;
 }
 } // namespace

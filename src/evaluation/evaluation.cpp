@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include <bole/evaluation.h>
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
+#include <bole/evaluation.h>
 
 #include <filesystem>
 #include <fmt/format.h>
@@ -67,18 +67,15 @@ Reference readSequence(const std::string &sequence)
 {
   const AslSource source(sequence);
   if (source.truth().empty())
-    throw vpException(
-        vpException::ioError,
-        fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
   Reference reference;
   reference.trajectory = source.truth();
   reference.odometry = source.odometry();
   reference.frames = source.size();
-  reference.first_stamp_ns =
-      source.stamps().empty() ? source.truth().front().stamp_ns : source.stamps().front();
+  reference.first_stamp_ns = source.stamps().empty() ? source.truth().front().stamp_ns : source.stamps().front();
   reference.trunks = readTruthTrunks(sequence);
-  reference.visibility =
-      trunkVisibility(reference.trunks, truePoses(source), source.bMc(), source.camera());
+  reference.visibility = trunkVisibility(reference.trunks, truePoses(source), source.bMc(), source.camera());
   return reference;
 }
 
@@ -104,19 +101,17 @@ bool isRun(const std::string &folder)
   return std::filesystem::exists(std::filesystem::path(folder) / "trajectory.tum");
 }
 
-std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns,
-                              const Trajectory &truth)
+std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns, const Trajectory &truth)
 {
   Trajectory estimate = readTumTrajectory(path);
   for (StampedPose &pose : estimate)
     pose.stamp_ns += shift_ns;
   std::vector<PosePair> pairs = pairPoses(estimate, truth);
   if (pairs.empty())
-    throw vpException(
-        vpException::badValue,
-        fmt::format("{}: none of its stamps lies in the ground truth's; if the run was live, "
-                    "--align-time finds the shift of its clock",
-                    path));
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: none of its stamps lies in the ground truth's; if the run was live, "
+                                  "--align-time finds the shift of its clock",
+                                  path));
   return pairs;
 }
 
@@ -126,17 +121,13 @@ std::int64_t shiftOf(const std::string &path, const Reference &reference)
   const Trajectory estimate = readTumTrajectory(path);
   if (estimate.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no poses", path));
-  return motionShift(estimate, reference.trajectory,
-                     reference.first_stamp_ns - estimate.front().stamp_ns);
+  return motionShift(estimate, reference.trajectory, reference.first_stamp_ns - estimate.front().stamp_ns);
 }
 } // namespace
 
-Evaluation evaluate(const std::string &run, const std::string &sequence,
-                    const EvaluationOptions &options)
+Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options)
 {
-  const auto in_run = [&](const char *name) {
-    return (std::filesystem::path(run) / name).string();
-  };
+  const auto in_run = [&](const char *name) { return (std::filesystem::path(run) / name).string(); };
   if (!std::filesystem::is_directory(run))
     throw vpException(vpException::ioError, fmt::format("{}: no such folder", run));
 
@@ -144,8 +135,7 @@ Evaluation evaluate(const std::string &run, const std::string &sequence,
   evaluation.run = run;
   evaluation.sequence = sequence;
   evaluation.is_against_run = isRun(sequence);
-  const Reference reference =
-      evaluation.is_against_run ? readRun(sequence) : readSequence(sequence);
+  const Reference reference = evaluation.is_against_run ? readRun(sequence) : readSequence(sequence);
   evaluation.frames = reference.frames;
   std::int64_t shift_ns = 0;
   if (options.align_time) {
@@ -173,9 +163,9 @@ Evaluation evaluate(const std::string &run, const std::string &sequence,
     evaluation.odometry = report(odometry);
   }
   if (!reference.trunks.empty() || evaluation.is_against_run)
-    evaluation.trunks = trunkMetrics(readTrunks(in_run("trunks.csv")), reference.trunks,
-                                     reference.visibility, alignAll(pairs),
-                                     world.scale == ScaleSource::odometry ? Alignment::xy_yaw : Alignment::xy_yaw_scale);
+    evaluation.trunks =
+        trunkMetrics(readTrunks(in_run("trunks.csv")), reference.trunks, reference.visibility, alignAll(pairs),
+                     world.scale == ScaleSource::odometry ? Alignment::xy_yaw : Alignment::xy_yaw_scale);
   return evaluation;
 }
 } // namespace bole

@@ -10,11 +10,10 @@ namespace bole
 namespace
 {
 using Json = nlohmann::ordered_json;
-constexpr std::array<Alignment, 4> kAlignments = {Alignment::none, Alignment::first_pose,
-                                                  Alignment::xy_yaw, Alignment::xy_yaw_scale};
+constexpr std::array<Alignment, 4> kAlignments = {Alignment::none, Alignment::first_pose, Alignment::xy_yaw,
+                                                  Alignment::xy_yaw_scale};
 
-template <typename... Arguments>
-void add(std::string &text, const char *format, const Arguments &...arguments)
+template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
 {
   fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
 }
@@ -24,26 +23,25 @@ std::size_t index(Alignment alignment) { return static_cast<std::size_t>(alignme
 void addTrajectory(std::string &text, const char *name, const TrajectoryReport &report)
 {
   const auto ate = [&](Alignment alignment) { return report.absolute[index(alignment)].ate; };
-  add(text, "  {:<10} {:8.3f} {:10.3f} {:10.3f} {:8.3f} {:10.2f} {:10.3f} {:10.2f}\n", name,
-      ate(Alignment::none), ate(Alignment::xy_yaw), ate(Alignment::xy_yaw_scale),
-      report.scaled.scale, report.absolute[index(Alignment::xy_yaw)].rotation_deg,
-      report.over_second.translation, report.over_second.rotation_deg);
+  add(text, "  {:<10} {:8.3f} {:10.3f} {:10.3f} {:8.3f} {:10.2f} {:10.3f} {:10.2f}\n", name, ate(Alignment::none),
+      ate(Alignment::xy_yaw), ate(Alignment::xy_yaw_scale), report.scaled.scale,
+      report.absolute[index(Alignment::xy_yaw)].rotation_deg, report.over_second.translation,
+      report.over_second.rotation_deg);
 }
 
 void addErrors(std::string &text, const std::string &name, const TrunkErrors &errors)
 {
-  add(text, "  {:<20} {:>3} of {:<3} {:6} {:8.3f} {:8.3f} {:8.3f} {:8.2f} {:9.3f} {:+9.3f}\n", name,
-      errors.found, errors.expected, errors.matches, errors.median[index(Alignment::xy_yaw)],
-      errors.rmse[index(Alignment::xy_yaw)], errors.predicted_sigma, errors.nees_half,
-      errors.radius_rmse, errors.radius_bias);
+  add(text, "  {:<20} {:>3} of {:<3} {:6} {:8.3f} {:8.3f} {:8.3f} {:8.2f} {:9.3f} {:+9.3f}\n", name, errors.found,
+      errors.expected, errors.matches, errors.median[index(Alignment::xy_yaw)], errors.rmse[index(Alignment::xy_yaw)],
+      errors.predicted_sigma, errors.nees_half, errors.radius_rmse, errors.radius_bias);
 }
 
 void addBins(std::string &text, const TrunkMetrics &trunks)
 {
   add(text, "  predicted sigma {:.3f} m, NEES/2 {:.2f} (first pose as gauge; 1 when honest)\n",
       trunks.all.predicted_sigma, trunks.all.nees_half);
-  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match",
-      "median", "RMSE", "sigma", "NEES/2", "r RMSE", "r bias");
+  add(text, "\n  {:<20} {:<10} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9}\n", "", "found", "match", "median", "RMSE",
+      "sigma", "NEES/2", "r RMSE", "r bias");
   addErrors(text, "all", trunks.all);
   add(text, "  by nearest range\n");
   for (const TrunkBin &bin : trunks.by_range)
@@ -83,15 +81,14 @@ void addVerbose(std::string &text, const TrunkMetrics &trunks)
         "  {:>5} <- {:<5} {:6.3f} / {:.3f} m  sigma {:.3f} m  NEES/2 {:6.2f}  r {:.3f} {:+.3f} m  "
         "seen {:3} frames from "
         "{:4.1f} m over {:5.1f} deg, {} observations{}\n",
-        match.truth.id, match.estimate.id, match.error[index(Alignment::none)],
-        match.error[index(Alignment::xy_yaw)], match.predicted_sigma, match.nees_half,
-        match.truth.radius, match.radius_error, match.visibility.frames, match.visibility.min_range,
-        match.visibility.bearing_change, match.estimate.observations,
+        match.truth.id, match.estimate.id, match.error[index(Alignment::none)], match.error[index(Alignment::xy_yaw)],
+        match.predicted_sigma, match.nees_half, match.truth.radius, match.radius_error, match.visibility.frames,
+        match.visibility.min_range, match.visibility.bearing_change, match.estimate.observations,
         match.visibility.is_expected ? "" : " (not expected)");
   add(text, "Missed trunks of the truth\n");
   for (const Unmatched &miss : trunks.misses) {
-    add(text, "  {:>5} seen {:3} frames from {:4.1f} m over {:5.1f} deg; ", miss.id,
-        miss.visibility.frames, miss.visibility.min_range, miss.visibility.bearing_change);
+    add(text, "  {:>5} seen {:3} frames from {:4.1f} m over {:5.1f} deg; ", miss.id, miss.visibility.frames,
+        miss.visibility.min_range, miss.visibility.bearing_change);
     if (miss.nearest_id < 0)
       add(text, "the map is empty\n");
     else
@@ -105,9 +102,8 @@ void addVerbose(std::string &text, const TrunkMetrics &trunks)
         "s: {} {} at {:.2f} m\n",
         extra.id, extra.estimate.xy.x(), extra.estimate.xy.y(), extra.estimate.radius,
         std::sqrt(std::max(0.0, extra.estimate.covariance_xy.trace())), extra.estimate.observations,
-        extra.estimate.first_seen_s, extra.estimate.last_seen_s,
-        extra.is_duplicate ? "duplicate of" : "nearest is", extra.nearest_id,
-        extra.nearest_distance);
+        extra.estimate.first_seen_s, extra.estimate.last_seen_s, extra.is_duplicate ? "duplicate of" : "nearest is",
+        extra.nearest_id, extra.nearest_distance);
 }
 
 Json toJson(const TrajectoryReport &report)
@@ -115,9 +111,8 @@ Json toJson(const TrajectoryReport &report)
   Json json;
   for (const Alignment alignment : kAlignments) {
     const TrajectoryErrors &errors = report.absolute[index(alignment)];
-    json["ate"][toString(alignment)] = {{"rmse_m", errors.ate},
-                                        {"rmse_xy_m", errors.ate_xy},
-                                        {"rotation_rmse_deg", errors.rotation_deg}};
+    json["ate"][toString(alignment)] = {
+        {"rmse_m", errors.ate}, {"rmse_xy_m", errors.ate_xy}, {"rotation_rmse_deg", errors.rotation_deg}};
   }
   json["poses"] = report.absolute[0].poses;
   json["scale"] = report.scaled.scale;
@@ -133,10 +128,8 @@ Json toJson(const TrajectoryReport &report)
 
 Json toJson(const TrunkErrors &errors)
 {
-  Json json = {{"expected", errors.expected},
-               {"found", errors.found},
-               {"recall", errors.recall()},
-               {"matches", errors.matches}};
+  Json json = {
+      {"expected", errors.expected}, {"found", errors.found}, {"recall", errors.recall()}, {"matches", errors.matches}};
   for (const Alignment alignment : kAlignments)
     json["position_m"][toString(alignment)] = {{"median", errors.median[index(alignment)]},
                                                {"rmse", errors.rmse[index(alignment)]}};
@@ -148,9 +141,12 @@ Json toJson(const TrunkErrors &errors)
 
 Json toJson(const TrunkMetrics &trunks)
 {
-  Json json = {{"confirmed", trunks.confirmed},   {"precision", trunks.precision},
-               {"recall", trunks.recall},         {"f1", trunks.f1},
-               {"duplicates", trunks.duplicates}, {"gate_m", kMatchGate},
+  Json json = {{"confirmed", trunks.confirmed},
+               {"precision", trunks.precision},
+               {"recall", trunks.recall},
+               {"f1", trunks.f1},
+               {"duplicates", trunks.duplicates},
+               {"gate_m", kMatchGate},
                {"matched_after", toString(trunks.matching)},
                {"all", toJson(trunks.all)}};
   for (const auto &[key, bins] :
@@ -169,9 +165,8 @@ Json toJson(const TrunkMetrics &trunks)
                                {"radius_error_m", match.radius_error}});
   json["missed"] = Json::array();
   for (const Unmatched &miss : trunks.misses)
-    json["missed"].push_back({{"truth", miss.id},
-                              {"nearest_map", miss.nearest_id},
-                              {"distance_m", miss.nearest_distance}});
+    json["missed"].push_back(
+        {{"truth", miss.id}, {"nearest_map", miss.nearest_id}, {"distance_m", miss.nearest_distance}});
   json["false_positives"] = Json::array();
   for (const Unmatched &extra : trunks.false_positives)
     json["false_positives"].push_back({{"map", extra.id},
@@ -188,13 +183,12 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
   add(text, "{} against {}: {} of {} frames\n", evaluation.run, evaluation.sequence,
       evaluation.smoothed.absolute[0].poses, evaluation.frames);
   if (evaluation.time_shift_s)
-    add(text, "  The run's stamps were shifted by {:+.3f} s, for its motion to fit.\n",
-        *evaluation.time_shift_s);
+    add(text, "  The run's stamps were shifted by {:+.3f} s, for its motion to fit.\n", *evaluation.time_shift_s);
   if (!evaluation.reference.empty())
     add(text, "{}\n", evaluation.reference);
   text += "\n";
-  add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]",
-      "x, y, yaw", "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");
+  add(text, "  {:<10} {:>8} {:>10} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "Trajectory", "ATE [m]", "x, y, yaw",
+      "and scale", "scale", "rot [deg]", "RPE 1s [m]", "[deg]");
   addTrajectory(text, "smoothed", evaluation.smoothed);
   if (evaluation.online)
     addTrajectory(text, "online", *evaluation.online);
@@ -210,8 +204,7 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
 
 std::string toJson(const Evaluation &evaluation)
 {
-  Json json = {
-      {"run", evaluation.run}, {"sequence", evaluation.sequence}, {"frames", evaluation.frames}};
+  Json json = {{"run", evaluation.run}, {"sequence", evaluation.sequence}, {"frames", evaluation.frames}};
   json["against_run"] = evaluation.is_against_run;
   if (evaluation.time_shift_s)
     json["time_shift_s"] = *evaluation.time_shift_s;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
 #include "evaluation/trajectory_metrics.h"
+#include "geometry/so3.h"
 
 #include <cmath>
 #include <limits>
@@ -41,10 +41,7 @@ Eigen::Matrix2d PlanarTransform::linear() const
   return scale * R;
 }
 
-Eigen::Vector2d PlanarTransform::operator*(const Eigen::Vector2d &xy) const
-{
-  return linear() * xy + t;
-}
+Eigen::Vector2d PlanarTransform::operator*(const Eigen::Vector2d &xy) const { return linear() * xy + t; }
 
 Eigen::Vector3d PlanarTransform::operator*(const Eigen::Vector3d &p) const
 {
@@ -52,10 +49,7 @@ Eigen::Vector3d PlanarTransform::operator*(const Eigen::Vector3d &p) const
   return {xy.x(), xy.y(), p.z() + dz};
 }
 
-Pose PlanarTransform::operator*(const Pose &wMb) const
-{
-  return {expSo3({0, 0, yaw}) * wMb.R, *this * wMb.t};
-}
+Pose PlanarTransform::operator*(const Pose &wMb) const { return {expSo3({0, 0, yaw}) * wMb.R, *this * wMb.t}; }
 
 std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &truth)
 {
@@ -66,8 +60,7 @@ std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &tr
   return pairs;
 }
 
-std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
-                         std::int64_t start_ns, double range_s)
+std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth, std::int64_t start_ns, double range_s)
 {
   const auto error = [&](std::int64_t shift_ns) {
     Trajectory shifted = estimate;
@@ -83,8 +76,7 @@ std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
   double least = error(start_ns);
   const auto search = [&](std::int64_t range_ns, std::int64_t step_ns) {
     const std::int64_t middle_ns = best_ns;
-    for (std::int64_t shift_ns = middle_ns - range_ns; shift_ns <= middle_ns + range_ns;
-         shift_ns += step_ns)
+    for (std::int64_t shift_ns = middle_ns - range_ns; shift_ns <= middle_ns + range_ns; shift_ns += step_ns)
       if (const double value = error(shift_ns); value < least) {
         least = value;
         best_ns = shift_ns;
@@ -128,8 +120,7 @@ PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment)
   return transform;
 }
 
-TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
-                                const PlanarTransform &transform)
+TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform)
 {
   double sum = 0, sum_xy = 0, sum_rotation = 0;
   for (const PosePair &pair : pairs) {
@@ -139,8 +130,7 @@ TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
     sum_xy += error.head<2>().squaredNorm();
     sum_rotation += logSo3(pair.truth.R.transpose() * aligned.R).squaredNorm();
   }
-  return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()),
-          rms(sum_rotation, pairs.size()) / kDegree};
+  return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()), rms(sum_rotation, pairs.size()) / kDegree};
 }
 
 RelativeErrors relativeErrors(const std::vector<PosePair> &pairs, double delta_s)

@@ -13,9 +13,9 @@ namespace bole
 /// What is taken from the estimate before it is compared with the truth.
 enum class Alignment
 {
-  none,       ///< both are taken in the world as they stand
-  first_pose, ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
-  xy_yaw,     ///< least squares over the trajectory in x, y and yaw; z stays
+  none,        ///< both are taken in the world as they stand
+  first_pose,  ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
+  xy_yaw,      ///< least squares over the trajectory in x, y and yaw; z stays
   xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
 };
 const char *toString(Alignment alignment);
@@ -48,8 +48,8 @@ std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &tr
 /// the shifts within \p range_s of \p start_ns, the one with the least relative error (translation
 /// in m plus rotation in rad, over 0.3 s), to a millisecond. Where the two lie in the world does not
 /// matter; a flight that changes neither speed nor attitude says nothing of its time.
-std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth,
-                         std::int64_t start_ns, double range_s = 2);
+std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth, std::int64_t start_ns,
+                         double range_s = 2);
 
 /// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products
 /// of the centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory
@@ -65,8 +65,7 @@ struct TrajectoryErrors
 };
 
 /// Errors after \p transform.
-TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs,
-                                const PlanarTransform &transform);
+TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform);
 
 struct RelativeErrors
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "evaluation/assignment.h"
 #include "evaluation/trunk_metrics.h"
+#include "evaluation/assignment.h"
 
 #include <Eigen/LU>
 
@@ -33,8 +33,8 @@ double halfNees(const TrunkRecord &estimate, const TruthTrunk &truth, const Plan
   return P.determinant() > 0 ? 0.5 * error.dot(P.inverse() * error) : 0;
 }
 
-TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth,
-                   const TrunkVisibility &visibility, const Alignments &alignments)
+TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth, const TrunkVisibility &visibility,
+                   const Alignments &alignments)
 {
   TrunkMatch match{estimate, truth, visibility};
   for (std::size_t a = 0; a < alignments.size(); ++a)
@@ -46,8 +46,7 @@ TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth,
 }
 
 /// Figures of the matches and of the expected trunks of the truth that \p counts.
-TrunkErrors summarize(const TrunkMetrics &metrics,
-                      const std::function<bool(const TrunkVisibility &)> &counts)
+TrunkErrors summarize(const TrunkMetrics &metrics, const std::function<bool(const TrunkVisibility &)> &counts)
 {
   TrunkErrors errors;
   std::array<std::vector<double>, 4> distances;
@@ -68,10 +67,9 @@ TrunkErrors summarize(const TrunkMetrics &metrics,
       radius2 += match.radius_error * match.radius_error;
     }
   }
-  errors.expected =
-      errors.found + static_cast<std::size_t>(std::count_if(
-                         metrics.misses.begin(), metrics.misses.end(),
-                         [&](const Unmatched &miss) { return counts(miss.visibility); }));
+  errors.expected = errors.found + static_cast<std::size_t>(
+                                       std::count_if(metrics.misses.begin(), metrics.misses.end(),
+                                                     [&](const Unmatched &miss) { return counts(miss.visibility); }));
   if (errors.matches == 0)
     return errors;
   const auto count = static_cast<double>(errors.matches);
@@ -91,29 +89,27 @@ TrunkErrors summarize(const TrunkMetrics &metrics,
   return errors;
 }
 
-std::vector<TrunkBin> binned(const TrunkMetrics &metrics, const std::vector<double> &limits,
-                             const std::string &unit, double TrunkVisibility::*value)
+std::vector<TrunkBin> binned(const TrunkMetrics &metrics, const std::vector<double> &limits, const std::string &unit,
+                             double TrunkVisibility::*value)
 {
   std::vector<TrunkBin> bins;
   for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
     const double from = limits[i], to = limits[i + 1];
     const auto number = [](double v) { return std::to_string(std::lround(v)); };
-    const std::string name = to > 1e3 ? number(from) + " " + unit + " or more"
-                                      : number(from) + " to " + number(to) + " " + unit;
+    const std::string name =
+        to > 1e3 ? number(from) + " " + unit + " or more" : number(from) + " to " + number(to) + " " + unit;
     bins.push_back({name, summarize(metrics, [=](const TrunkVisibility &seen) {
                       return seen.frames > 0 && seen.*value >= from && seen.*value < to;
                     })});
   }
-  bins.push_back({"never in view", summarize(metrics, [](const TrunkVisibility &seen) {
-                    return seen.frames == 0;
-                  })});
+  bins.push_back({"never in view", summarize(metrics, [](const TrunkVisibility &seen) { return seen.frames == 0; })});
   return bins;
 }
 
 /// Nearest of \p count points to \p point.
 template <typename Position>
-void findNearest(Unmatched &entry, const Eigen::Vector2d &point, std::size_t count,
-                 const Position &position, std::size_t &index)
+void findNearest(Unmatched &entry, const Eigen::Vector2d &point, std::size_t count, const Position &position,
+                 std::size_t &index)
 {
   entry.nearest_distance = count == 0 ? 0 : std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count; ++i) {
@@ -135,8 +131,8 @@ Alignments alignAll(const std::vector<PosePair> &pairs)
 }
 
 TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector<TruthTrunk> &truth,
-                          const std::vector<TrunkVisibility> &visibility,
-                          const Alignments &alignments, Alignment matching)
+                          const std::vector<TrunkVisibility> &visibility, const Alignments &alignments,
+                          Alignment matching)
 {
   const PlanarTransform &aligned = at(alignments, matching);
   std::vector<TrunkRecord> confirmed;
@@ -145,9 +141,8 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
   Eigen::MatrixXd distance(confirmed.size(), truth.size());
   for (Eigen::Index i = 0; i < distance.rows(); ++i)
     for (Eigen::Index j = 0; j < distance.cols(); ++j)
-      distance(i, j) = (aligned * confirmed[static_cast<std::size_t>(i)].xy -
-                        truth[static_cast<std::size_t>(j)].xy)
-                           .norm();
+      distance(i, j) =
+          (aligned * confirmed[static_cast<std::size_t>(i)].xy - truth[static_cast<std::size_t>(j)].xy).norm();
   const std::vector<int> partner = assign(distance, kMatchGate);
 
   TrunkMetrics metrics;
@@ -167,8 +162,7 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
     extra.id = confirmed[i].id;
     extra.estimate = confirmed[i];
     findNearest(
-        extra, aligned * confirmed[i].xy, truth.size(), [&](std::size_t k) { return truth[k].xy; },
-        nearest);
+        extra, aligned * confirmed[i].xy, truth.size(), [&](std::size_t k) { return truth[k].xy; }, nearest);
     extra.nearest_id = truth.empty() ? -1 : truth[nearest].id;
     extra.is_duplicate = !truth.empty() && extra.nearest_distance <= kMatchGate;
     duplicates += extra.is_duplicate ? 1 : 0;
@@ -193,15 +187,13 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
   metrics.all = summarize(metrics, [](const TrunkVisibility &) { return true; });
   metrics.recall = metrics.all.recall();
   if (metrics.confirmed > 0) {
-    metrics.precision =
-        static_cast<double>(metrics.matches.size()) / static_cast<double>(metrics.confirmed);
+    metrics.precision = static_cast<double>(metrics.matches.size()) / static_cast<double>(metrics.confirmed);
     metrics.duplicates = static_cast<double>(duplicates) / static_cast<double>(metrics.confirmed);
   }
   if (metrics.precision + metrics.recall > 0)
     metrics.f1 = 2 * metrics.precision * metrics.recall / (metrics.precision + metrics.recall);
   metrics.by_range = binned(metrics, {0, 2, 4, 6, 8.001}, "m", &TrunkVisibility::min_range);
-  metrics.by_parallax =
-      binned(metrics, {0, 3, 10, 30, 60, 1e9}, "degrees", &TrunkVisibility::bearing_change);
+  metrics.by_parallax = binned(metrics, {0, 3, 10, 30, 60, 1e9}, "degrees", &TrunkVisibility::bearing_change);
   return metrics;
 }
 } // namespace bole

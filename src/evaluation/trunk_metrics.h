@@ -3,10 +3,10 @@
 /// \file
 /// How good a map of trunks is.
 
-#include "input/truth.h"
-#include <bole/trunk_record.h>
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/visibility.h"
+#include "input/truth.h"
+#include <bole/trunk_record.h>
 
 #include <array>
 #include <string>
@@ -14,8 +14,8 @@
 
 namespace bole
 {
-/// [m] how far, after the alignment in x, y and yaw (TrunkMetrics::matching), a trunk may be from the one of the truth it
-/// stands for.
+/// [m] how far, after the alignment in x, y and yaw (TrunkMetrics::matching), a trunk may be from the one of the truth
+/// it stands for.
 constexpr double kMatchGate = 0.5;
 
 /// Transforms of the four alignments, by the order of the enumeration.
@@ -34,8 +34,8 @@ struct TrunkMatch
   TrunkVisibility visibility;
   std::array<double, 4> error{}; ///< distance under each Alignment [m]
   double nees_half = 0;          ///< e^T P^-1 e / 2, first pose as gauge
-  double predicted_sigma = 0; ///< sqrt(trace P) [m], to be compared with the RMSE of the distance
-  double radius_error = 0;    ///< estimate - truth [m], 0 where the truth has no radius
+  double predicted_sigma = 0;    ///< sqrt(trace P) [m], to be compared with the RMSE of the distance
+  double radius_error = 0;       ///< estimate - truth [m], 0 where the truth has no radius
 };
 
 /// A trunk of the map without partner, or one of the truth that was expected and not found.
@@ -44,9 +44,9 @@ struct Unmatched
   int id = 0;
   int nearest_id = -1;         ///< in the other set (for a miss: any status), -1 if that is empty
   double nearest_distance = 0; ///< [m], after TrunkMetrics::matching
-  bool is_duplicate = false;  ///< within the gate of a trunk of the truth that has a better partner
-  TrunkRecord estimate;       ///< false positive: the trunk; miss: the nearest of the map
-  TrunkVisibility visibility; ///< of the missed trunk
+  bool is_duplicate = false;   ///< within the gate of a trunk of the truth that has a better partner
+  TrunkRecord estimate;        ///< false positive: the trunk; miss: the nearest of the map
+  TrunkVisibility visibility;  ///< of the missed trunk
 };
 
 /// Figures of a set of matches.
@@ -58,10 +58,7 @@ struct TrunkErrors
   double nees_half = 0;                    ///< mean; near 1 when covariances are honest
   double predicted_sigma = 0;              ///< root mean square [m]
   double radius_rmse = 0, radius_bias = 0; ///< [m]
-  double recall() const
-  {
-    return expected == 0 ? 0 : static_cast<double>(found) / static_cast<double>(expected);
-  }
+  double recall() const { return expected == 0 ? 0 : static_cast<double>(found) / static_cast<double>(expected); }
 };
 
 struct TrunkBin
@@ -89,6 +86,6 @@ struct TrunkMetrics
 /// measures them. Misses, false positives and duplicates
 /// always count. \param visibility of each trunk of \p truth.
 TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector<TruthTrunk> &truth,
-                          const std::vector<TrunkVisibility> &visibility,
-                          const Alignments &alignments, Alignment matching = Alignment::xy_yaw);
+                          const std::vector<TrunkVisibility> &visibility, const Alignments &alignments,
+                          Alignment matching = Alignment::xy_yaw);
 } // namespace bole

@@ -32,10 +32,8 @@ View viewOf(const TruthTrunk &trunk, const Pose &wMc, const PinholeCamera &camer
   view.is_in_image = true;
   for (const double side : {-1.0, 1.0}) {
     const double angle = view.bearing + side * view.half_width;
-    const Eigen::Vector3d direction =
-        wMc.R.transpose() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
-    view.is_in_image =
-        view.is_in_image && direction.z() > 1e-6 && camera.contains(camera.project(direction));
+    const Eigen::Vector3d direction = wMc.R.transpose() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+    view.is_in_image = view.is_in_image && direction.z() > 1e-6 && camera.contains(camera.project(direction));
   }
   return view;
 }
@@ -64,9 +62,8 @@ double hiddenShare(const std::vector<View> &views, std::size_t at)
 }
 } // namespace
 
-std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks,
-                                             const std::vector<Pose> &wMb, const Pose &bMc,
-                                             const PinholeCamera &camera,
+std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
+                                             const Pose &bMc, const PinholeCamera &camera,
                                              const VisibilityOptions &options)
 {
   struct Range
@@ -82,8 +79,7 @@ std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trun
                    [&](const TruthTrunk &trunk) { return viewOf(trunk, wMc, camera); });
     for (std::size_t i = 0; i < trunks.size(); ++i) {
       const View &view = views[i];
-      if (!view.is_in_image || view.range > options.max_range ||
-          hiddenShare(views, i) >= options.max_hidden)
+      if (!view.is_in_image || view.range > options.max_range || hiddenShare(views, i) >= options.max_hidden)
         continue;
       TrunkVisibility &seen = result[i];
       Range &range = bearings[i];
@@ -99,8 +95,8 @@ std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trun
   }
   for (std::size_t i = 0; i < trunks.size(); ++i) {
     result[i].bearing_change = (bearings[i].most - bearings[i].least) * 180 / M_PI;
-    result[i].is_expected = result[i].frames >= options.min_frames &&
-                            result[i].bearing_change >= options.min_bearing_change;
+    result[i].is_expected =
+        result[i].frames >= options.min_frames && result[i].bearing_change >= options.min_bearing_change;
   }
   return result;
 }

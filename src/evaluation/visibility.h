@@ -3,9 +3,9 @@
 /// \file
 /// Which trunks of the truth a flight had a fair chance to map.
 
-#include <bole/camera.h>
 #include "input/trajectory.h"
 #include "input/truth.h"
+#include <bole/camera.h>
 
 #include <vector>
 
@@ -34,8 +34,7 @@ struct TrunkVisibility
 /// A trunk is inside the image when both of its borders are at the height of the camera; it is
 /// hidden as far as the bearings between its borders are covered by those of nearer trunks. Trunks
 /// without radius (far ones) neither hide nor are expected.
-std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks,
-                                             const std::vector<Pose> &wMb, const Pose &bMc,
-                                             const PinholeCamera &camera,
+std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
+                                             const Pose &bMc, const PinholeCamera &camera,
                                              const VisibilityOptions &options = {});
 } // namespace bole

@@ -10,10 +10,10 @@
 
 namespace bole
 {
-/// vx, vy, vz [m/s] and wz [rad/s] of the body (x forward, y left, z up). \p velocity is a twist (vx, vy, vz, wx, wy, wz)
-/// of the camera (vpRobot::CAMERA_FRAME) or of the body (vpRobot::REFERENCE_FRAME); as vpRobot does, the whole of it is
-/// slowed until no linear component exceeds \p translation_max [m/s] and no angular one \p rotation_max [rad/s]. wx and wy
-/// of the body, which a quadrotor needs for its own balance, are dropped.
+/// vx, vy, vz [m/s] and wz [rad/s] of the body (x forward, y left, z up). \p velocity is a twist (vx, vy, vz, wx, wy,
+/// wz) of the camera (vpRobot::CAMERA_FRAME) or of the body (vpRobot::REFERENCE_FRAME); as vpRobot does, the whole of
+/// it is slowed until no linear component exceeds \p translation_max [m/s] and no angular one \p rotation_max [rad/s].
+/// wx and wy of the body, which a quadrotor needs for its own balance, are dropped.
 ///
 /// \throw vpRobotException on another length than 6, another frame, or numbers that are not finite.
 Eigen::Vector4d bodyVelocity(vpRobot::vpControlFrameType frame, const vpColVector &velocity,

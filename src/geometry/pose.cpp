@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/pose.h>
 #include "geometry/so3.h"
+#include <bole/pose.h>
 
 #include <Eigen/Geometry>
 
 namespace bole
 {
-Pose::Pose(const Eigen::Matrix3d &rotation, const Eigen::Vector3d &translation)
-  : R(rotation), t(translation)
-{
-}
+Pose::Pose(const Eigen::Matrix3d &rotation, const Eigen::Vector3d &translation) : R(rotation), t(translation) {}
 
 Pose Pose::fromQuaternion(double qw, double qx, double qy, double qz, const Eigen::Vector3d &t)
 {
@@ -38,10 +35,7 @@ vpHomogeneousMatrix Pose::toVisp() const
   return aMb;
 }
 
-Pose Pose::plus(const Vector6d &xi) const
-{
-  return {orthonormalized(R * expSo3(xi.tail<3>())), t + R * xi.head<3>()};
-}
+Pose Pose::plus(const Vector6d &xi) const { return {orthonormalized(R * expSo3(xi.tail<3>())), t + R * xi.head<3>()}; }
 
 Vector6d Pose::minus(const Pose &x) const
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/trunk.h>
 #include "geometry/so3.h"
+#include <bole/trunk.h>
 
 #include <Eigen/Geometry>
 
@@ -50,8 +50,7 @@ Vector3d RelativeTrunk::borderNormal(Border border) const
   return cRt * Vector3d(-s, side * std::sqrt(1 - s * s), 0);
 }
 
-RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose,
-                            Matrix45d *J_trunk)
+RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose, Matrix45d *J_trunk)
 {
   const Vector3d wpc = wMb * bMc.t;
   const Vector3d n(trunk.lean.x(), trunk.lean.y(), 1);

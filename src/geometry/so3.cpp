@@ -58,8 +58,5 @@ Matrix3d inverseRightJacobianSo3(const Vector3d &phi)
   return Matrix3d::Identity() + 0.5 * S + (1 - half / std::tan(half)) / angle2 * S * S;
 }
 
-Matrix3d orthonormalized(const Matrix3d &R)
-{
-  return Eigen::Quaterniond(R).normalized().toRotationMatrix();
-}
+Matrix3d orthonormalized(const Matrix3d &R) { return Eigen::Quaterniond(R).normalized().toRotationMatrix(); }
 } // namespace bole

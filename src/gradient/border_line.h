@@ -42,8 +42,8 @@ BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative
 
 /// Jacobian (2x4) of the horizontal displacements [px] of the first and last row of \p line by the tangent
 /// of the relative trunk: what MeanGradient is differentiated by, carried to theta^r.
-Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const RelativeTrunk &relative,
-                                           Border border, const BorderLine &line);
+Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,
+                                           const BorderLine &line);
 
 /// Mean of an image along a line, one sample a row, cubic between columns, and its derivatives by the
 /// horizontal displacement of the first and last row. Samples outside the image count as zero.
@@ -58,7 +58,7 @@ MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line);
 double meanAlongOnly(const vpImage<float> &g, const BorderLine &line);
 
 /// How evenly a border of the \p sign runs along the whole line: the squared mean of eight parts over their mean
-/// square, each part at its strongest within a pixel. 1: all parts alike, as on the silhouette of a trunk; 1/8: one part
-/// alone, as on a branch that crosses; 0: the parts are against the sign.
+/// square, each part at its strongest within a pixel. 1: all parts alike, as on the silhouette of a trunk; 1/8: one
+/// part alone, as on a branch that crosses; 0: the parts are against the sign.
 double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sign);
 } // namespace bole

@@ -50,8 +50,7 @@ std::vector<GyroSample> readGyro(const fs::path &imu0)
   CsvReader csv((imu0 / "data.csv").string(), {4});
   while (csv.next()) {
     const std::int64_t stamp_ns = csv.risingStampNs(0);
-    gyro.push_back({stamp_ns, bRs * Eigen::Vector3d(csv.number(1, "w_x"), csv.number(2, "w_y"),
-                                                    csv.number(3, "w_z"))});
+    gyro.push_back({stamp_ns, bRs * Eigen::Vector3d(csv.number(1, "w_x"), csv.number(2, "w_y"), csv.number(3, "w_z"))});
   }
   return gyro;
 }
@@ -68,8 +67,7 @@ Trajectory readPoses(const fs::path &sensor)
 }
 
 /// Size of the images: that of the first one that can be read, which must be the camera's.
-void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model,
-                       const std::string &camera_path)
+void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model, const std::string &camera_path)
 {
   std::string first_fault;
   for (const Row &row : rows) {
@@ -78,13 +76,11 @@ void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model,
       first_fault = first_fault.empty() ? file.message : first_fault;
       continue;
     }
-    const int width = static_cast<int>(file.image.getWidth()),
-              height = static_cast<int>(file.image.getHeight());
+    const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
     if (width != model.pinhole.width || height != model.pinhole.height)
       throw vpException(vpException::dimensionError,
-                        fmt::format("{}: image of {}x{} px, must be {}x{} as {} says",
-                                    row.image_path, width, height, model.pinhole.width,
-                                    model.pinhole.height, camera_path));
+                        fmt::format("{}: image of {}x{} px, must be {}x{} as {} says", row.image_path, width, height,
+                                    model.pinhole.width, model.pinhole.height, camera_path));
     return;
   }
   throw vpException(vpException::ioError,
@@ -100,13 +96,11 @@ struct AslSource::State
   std::unique_ptr<FrameBuilder> builder;
 };
 
-AslSource::AslSource(const std::string &folder, const SourceOptions &options)
-    : m_state(std::make_unique<State>())
+AslSource::AslSource(const std::string &folder, const SourceOptions &options) : m_state(std::make_unique<State>())
 {
   options.validate();
   if (!accepts(folder))
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: no ASL folder (cam0/data.csv is missing)", folder));
+    throw vpException(vpException::ioError, fmt::format("{}: no ASL folder (cam0/data.csv is missing)", folder));
   const fs::path root = sensorRoot(folder);
   m_state->name = folder;
   m_state->rows = readImageRows(root / "cam0");
@@ -116,11 +110,9 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options)
   requireCameraSize(m_state->rows, camera.model, camera_path);
 
   Recording recording;
-  recording.odometry =
-      options.odometry_path.empty() ? readPoses(root / "odom0") : readOdometry(options);
+  recording.odometry = options.odometry_path.empty() ? readPoses(root / "odom0") : readOdometry(options);
   requireOverlap(recording.odometry, m_state->rows.front().stamp_ns, m_state->rows.back().stamp_ns,
-                 options.odometry_path.empty() ? (root / "odom0" / "data.csv").string()
-                                               : options.odometry_path,
+                 options.odometry_path.empty() ? (root / "odom0" / "data.csv").string() : options.odometry_path,
                  folder);
   recording.truth = readPoses(root / "state_groundtruth_estimate0");
   recording.gyro = readGyro(root / "imu0");

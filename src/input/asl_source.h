@@ -3,9 +3,9 @@
 /// \file
 /// Recorded flights in EuRoC / ASL folders.
 
+#include "input/trajectory.h"
 #include <bole/frame.h>
 #include <bole/source_options.h>
-#include "input/trajectory.h"
 
 namespace bole
 {

@@ -91,24 +91,22 @@ std::set<std::string> cameraNames(const std::string &path)
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   const std::regex pattern("<name>\\s*([^<]*?)\\s*</name>");
   std::set<std::string> names;
-  for (auto it = std::sregex_iterator(text.begin(), text.end(), pattern);
-       it != std::sregex_iterator(); ++it)
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), pattern); it != std::sregex_iterator(); ++it)
     names.insert((*it)[1]);
   return names;
 }
 
-bool readXmlModel(const std::string &path, const std::string &name, int width, int height,
-                  CameraModel &model)
+bool readXmlModel(const std::string &path, const std::string &name, int width, int height, CameraModel &model)
 {
-  for (const auto type : {vpCameraParameters::perspectiveProjWithDistortion,
-                          vpCameraParameters::perspectiveProjWithoutDistortion}) {
+  for (const auto type :
+       {vpCameraParameters::perspectiveProjWithDistortion, vpCameraParameters::perspectiveProjWithoutDistortion}) {
     vpXmlParserCamera parser;
     vpCameraParameters cam;
-    if (parser.parse(cam, path, name, type, static_cast<unsigned>(width),
-                     static_cast<unsigned>(height)) != vpXmlParserCamera::SEQUENCE_OK)
+    if (parser.parse(cam, path, name, type, static_cast<unsigned>(width), static_cast<unsigned>(height)) !=
+        vpXmlParserCamera::SEQUENCE_OK)
       continue;
-    model.pinhole = PinholeCamera::fromVisp(cam, static_cast<int>(parser.getWidth()),
-                                            static_cast<int>(parser.getHeight()));
+    model.pinhole =
+        PinholeCamera::fromVisp(cam, static_cast<int>(parser.getWidth()), static_cast<int>(parser.getHeight()));
     if (type == vpCameraParameters::perspectiveProjWithDistortion && cam.get_kud() != 0) {
       model.distortion = Distortion::radial_tangential;
       model.coefficients = {{cam.get_kud(), 0, 0, 0}};
@@ -126,16 +124,14 @@ MountedCamera readXml(const std::string &path, int width, int height)
     found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
   const std::string size = width > 0 ? fmt::format(" for {}x{} images", width, height) : "";
   if (found != 1)
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: {} ViSP cameras{} in it, must be one", path, found, size));
+    throw vpException(vpException::ioError, fmt::format("{}: {} ViSP cameras{} in it, must be one", path, found, size));
   PinholeCamera &pinhole = camera.model.pinhole;
   if (pinhole.width == 0 || pinhole.height == 0) {
     pinhole.width = width;
     pinhole.height = height;
   }
   if (!(pinhole.fx > 0) || !(pinhole.fy > 0) || pinhole.width <= 0 || pinhole.height <= 0)
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: px, py, image_width and image_height must be > 0", path));
+    throw vpException(vpException::ioError, fmt::format("{}: px, py, image_width and image_height must be > 0", path));
   return camera;
 }
 } // namespace
@@ -156,8 +152,7 @@ MountedCamera readCamera(const std::string &path, int width, int height)
     return readXml(path, width, height);
   if (extension == ".yaml" || extension == ".yml")
     return readYaml(path);
-  throw vpException(vpException::ioError,
-                    fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
+  throw vpException(vpException::ioError, fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
 }
 
 Pose readSensorPose(const std::string &path)

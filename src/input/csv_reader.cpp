@@ -38,8 +38,7 @@ bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
 }
 } // namespace
 
-CsvReader::CsvReader(const std::string &path, CsvFormat format)
-    : m_path(path), m_format(std::move(format))
+CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_path(path), m_format(std::move(format))
 {
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
@@ -52,8 +51,7 @@ CsvReader::CsvReader(const std::string &path, CsvFormat format)
   std::getline(m_file, line);
   m_line = 1;
   if (trimmed(line) != m_format.header)
-    fail(fmt::format("the header is \"{}\", must be \"{}\"", trimmed(line).substr(0, 120),
-                     m_format.header));
+    fail(fmt::format("the header is \"{}\", must be \"{}\"", trimmed(line).substr(0, 120), m_format.header));
 }
 
 void CsvReader::fail(const std::string &message) const
@@ -72,8 +70,7 @@ void CsvReader::split(const std::string &line)
         break;
     }
     const std::size_t end =
-        std::min(m_format.separator == ' ' ? line.find_first_of(" \t", begin)
-                                           : line.find(m_format.separator, begin),
+        std::min(m_format.separator == ' ' ? line.find_first_of(" \t", begin) : line.find(m_format.separator, begin),
                  line.size());
     m_fields.emplace_back(trimmed(std::string_view(line).substr(begin, end - begin)));
     begin = end + 1;
@@ -127,16 +124,12 @@ std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
 std::int64_t CsvReader::rising(std::int64_t stamp_ns)
 {
   if (m_rows > 1 && stamp_ns <= m_last_stamp_ns)
-    fail(fmt::format("timestamp = {} ns, must be later than the {} ns of the row before", stamp_ns,
-                     m_last_stamp_ns));
+    fail(fmt::format("timestamp = {} ns, must be later than the {} ns of the row before", stamp_ns, m_last_stamp_ns));
   m_last_stamp_ns = stamp_ns;
   return stamp_ns;
 }
 
-std::int64_t CsvReader::risingStampNs(std::size_t column)
-{
-  return rising(integer(column, "timestamp"));
-}
+std::int64_t CsvReader::risingStampNs(std::size_t column) { return rising(integer(column, "timestamp")); }
 
 std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
 {

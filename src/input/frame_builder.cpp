@@ -18,8 +18,7 @@ bool samePixels(const vpImage<unsigned char> &a, const vpImage<unsigned char> &b
 }
 } // namespace
 
-FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options,
-                           Recording recording)
+FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
     : m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
       m_recording(std::move(recording)),
@@ -31,12 +30,11 @@ void FrameBuilder::judge(ImageFile &file)
 {
   if (file.image.getSize() == 0)
     return;
-  const int width = static_cast<int>(file.image.getWidth()),
-            height = static_cast<int>(file.image.getHeight());
+  const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
   if (width != m_rectifier.inputWidth() || height != m_rectifier.inputHeight()) {
     file.status = FrameStatus::resized;
-    file.message = fmt::format("image of {}x{} px, must be {}x{}", width, height,
-                               m_rectifier.inputWidth(), m_rectifier.inputHeight());
+    file.message = fmt::format("image of {}x{} px, must be {}x{}", width, height, m_rectifier.inputWidth(),
+                               m_rectifier.inputHeight());
     file.image.resize(0, 0);
     return;
   }
@@ -82,15 +80,13 @@ Trajectory readOdometry(const SourceOptions &options)
 void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int64_t last_ns,
                     const std::string &odometry_path, const std::string &source)
 {
-  if (odometry.empty() ||
-      (odometry.front().stamp_ns <= last_ns && odometry.back().stamp_ns >= first_ns))
+  if (odometry.empty() || (odometry.front().stamp_ns <= last_ns && odometry.back().stamp_ns >= first_ns))
     return;
-  throw vpException(
-      vpException::badValue,
-      fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s "
-                  "(odometry_offset_s, --odometry-offset, shifts them)",
-                  odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9,
-                  source, first_ns * 1e-9, last_ns * 1e-9));
+  throw vpException(vpException::badValue,
+                    fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s "
+                                "(odometry_offset_s, --odometry-offset, shifts them)",
+                                odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9,
+                                source, first_ns * 1e-9, last_ns * 1e-9));
 }
 
 MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note)
@@ -107,9 +103,8 @@ MountedCamera cameraFor(const SourceOptions &options, int width, int height, std
   const PinholeCamera &pinhole = camera.model.pinhole;
   if (pinhole.width != width || pinhole.height != height)
     throw vpException(vpException::dimensionError,
-                      fmt::format("{}: resolution = {}x{}, must be {}x{} as the images are",
-                                  options.camera_path, pinhole.width, pinhole.height, width,
-                                  height));
+                      fmt::format("{}: resolution = {}x{}, must be {}x{} as the images are", options.camera_path,
+                                  pinhole.width, pinhole.height, width, height));
   return camera;
 }
 } // namespace bole

@@ -6,10 +6,10 @@
 #include "input/image_file.h"
 
 #include "input/camera_file.h"
-#include <bole/frame.h>
 #include "input/rectifier.h"
-#include <bole/source_options.h>
 #include "input/trajectory.h"
+#include <bole/frame.h>
+#include <bole/source_options.h>
 
 #include <optional>
 

@@ -39,8 +39,7 @@ std::uint32_t crc32(const unsigned char *data, std::size_t size)
 
 std::uint32_t bigEndian32(const unsigned char *p)
 {
-  return (std::uint32_t(p[0]) << 24) | (std::uint32_t(p[1]) << 16) | (std::uint32_t(p[2]) << 8) |
-         p[3];
+  return (std::uint32_t(p[0]) << 24) | (std::uint32_t(p[1]) << 16) | (std::uint32_t(p[2]) << 8) | p[3];
 }
 
 /// Walks the chunks of a PNG: all of them whole, each with its checksum, the last one IEND.
@@ -66,8 +65,7 @@ std::string jpegFault(const Bytes &bytes)
   const std::array<unsigned char, 2> end_marker{{0xFF, 0xD9}};
   const std::size_t tail = std::min<std::size_t>(bytes.size(), 4096);
   const auto first = bytes.end() - static_cast<std::ptrdiff_t>(tail);
-  const bool has_end =
-      std::search(first, bytes.end(), end_marker.begin(), end_marker.end()) != bytes.end();
+  const bool has_end = std::search(first, bytes.end(), end_marker.begin(), end_marker.end()) != bytes.end();
   return has_end ? std::string() : fmt::format("truncated JPEG of {} bytes", bytes.size());
 }
 

@@ -12,12 +12,18 @@ namespace bole
 const char *toString(ImageFault fault)
 {
   switch (fault) {
-  case ImageFault::none: return "none";
-  case ImageFault::wrong_size: return "wrong size";
-  case ImageFault::black: return "black";
-  case ImageFault::noise: return "noise";
-  case ImageFault::frozen: return "frozen";
-  case ImageFault::smeared: return "smeared";
+  case ImageFault::none:
+    return "none";
+  case ImageFault::wrong_size:
+    return "wrong size";
+  case ImageFault::black:
+    return "black";
+  case ImageFault::noise:
+    return "noise";
+  case ImageFault::frozen:
+    return "frozen";
+  case ImageFault::smeared:
+    return "smeared";
   }
   return "?";
 }

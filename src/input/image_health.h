@@ -11,7 +11,15 @@
 
 namespace bole
 {
-enum class ImageFault { none, wrong_size, black, noise, frozen, smeared };
+enum class ImageFault
+{
+  none,
+  wrong_size,
+  black,
+  noise,
+  frozen,
+  smeared
+};
 const char *toString(ImageFault fault);
 
 /// Remembers the last image and the last good one. Cost: about 0.05 ms at 320x240.
@@ -20,12 +28,13 @@ class ImageHealth
 public:
   struct Options
   {
-    double min_deviation = 3;     ///< standard deviation of the grey levels below which an image is blank (0 .. 50)
-    double max_roughness = 0.75;  ///< mean difference of neighbours over deviation; white noise has 1.1 (0.3 .. 1)
-    double max_repeated = 0.15;   ///< share of rows or columns equal to their neighbour, beyond the last good image's (0 .. 1)
-    double same_pixels = 0.999;   ///< share of equal pixels that makes an image the one before (0.5 .. 1)
-    bool detect_frozen = true;    ///< off for a camera that may stand still without any noise
-    void validate() const;        ///< throws vpException "name = value, must be ..."
+    double min_deviation = 3;    ///< standard deviation of the grey levels below which an image is blank (0 .. 50)
+    double max_roughness = 0.75; ///< mean difference of neighbours over deviation; white noise has 1.1 (0.3 .. 1)
+    double max_repeated =
+        0.15; ///< share of rows or columns equal to their neighbour, beyond the last good image's (0 .. 1)
+    double same_pixels = 0.999; ///< share of equal pixels that makes an image the one before (0.5 .. 1)
+    bool detect_frozen = true;  ///< off for a camera that may stand still without any noise
+    void validate() const;      ///< throws vpException "name = value, must be ..."
   };
   ImageHealth() = default;
   explicit ImageHealth(const Options &options) : m_options(options) { m_options.validate(); }

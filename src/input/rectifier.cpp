@@ -18,8 +18,8 @@ CameraModel shrunk(const CameraModel &model, int max_width_px)
   CameraModel small = model;
   PinholeCamera &pinhole = small.pinhole;
   pinhole.width = max_width_px;
-  pinhole.height = std::max(1, static_cast<int>(std::lround(static_cast<double>(full.height) *
-                                                            max_width_px / full.width)));
+  pinhole.height =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(full.height) * max_width_px / full.width)));
   const double sx = static_cast<double>(pinhole.width) / full.width;
   const double sy = static_cast<double>(pinhole.height) / full.height;
   pinhole.fx = full.fx * sx;
@@ -98,20 +98,15 @@ int Rectifier::inputWidth() const { return m_map->input_width; }
 int Rectifier::inputHeight() const { return m_map->input_height; }
 const PinholeCamera &Rectifier::camera() const { return m_map->output; }
 
-bool Rectifier::isIdentity() const
-{
-  return m_map->map_xy.empty() && m_map->output.width == m_map->input_width;
-}
+bool Rectifier::isIdentity() const { return m_map->map_xy.empty() && m_map->output.width == m_map->input_width; }
 
 void Rectifier::apply(vpImage<unsigned char> &image) const
 {
   Map &map = *m_map;
-  const int width = static_cast<int>(image.getWidth()),
-            height = static_cast<int>(image.getHeight());
+  const int width = static_cast<int>(image.getWidth()), height = static_cast<int>(image.getHeight());
   if (width != map.input_width || height != map.input_height)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("image size = {}x{}, must be {}x{} as the camera's", width,
-                                  height, map.input_width, map.input_height));
+    throw vpException(vpException::dimensionError, fmt::format("image size = {}x{}, must be {}x{} as the camera's",
+                                                               width, height, map.input_width, map.input_height));
   if (isIdentity())
     return;
   const cv::Size size(map.output.width, map.output.height);
@@ -125,7 +120,6 @@ void Rectifier::apply(vpImage<unsigned char> &image) const
   if (map.map_xy.empty())
     map.small.copyTo(output);
   else
-    cv::remap(map.small, output, map.map_xy, map.map_fraction, cv::INTER_LINEAR,
-              cv::BORDER_REPLICATE);
+    cv::remap(map.small, output, map.map_xy, map.map_fraction, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
 }
 } // namespace bole

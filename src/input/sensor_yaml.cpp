@@ -11,8 +11,7 @@ namespace bole
 {
 namespace
 {
-[[noreturn]] void failAt(const std::string &path, const YAML::Mark &mark,
-                         const std::string &message)
+[[noreturn]] void failAt(const std::string &path, const YAML::Mark &mark, const std::string &message)
 {
   throw vpException(vpException::ioError, fmt::format("{}:{}: {}", path, mark.line + 1, message));
 }
@@ -39,8 +38,7 @@ void appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
 }
 } // namespace
 
-SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &known_keys)
-    : m_path(path)
+SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &known_keys) : m_path(path)
 {
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
@@ -66,8 +64,7 @@ YAML::Node SensorYaml::at(const std::string &key) const
 {
   const YAML::Node node = m_root[key];
   if (!node)
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: the key \"{}\" is missing", m_path, key));
+    throw vpException(vpException::ioError, fmt::format("{}: the key \"{}\" is missing", m_path, key));
   return node;
 }
 
@@ -110,11 +107,9 @@ Pose SensorYaml::rigidMotion(const std::string &key) const
   }
   if (values.size() != 16)
     fail(key, "16 numbers");
-  const Eigen::Matrix4d T =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  const bool is_rigid = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 &&
-                        R.determinant() > 0 &&
+  const bool is_rigid = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0 &&
                         (T.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() < 1e-9;
   if (!is_rigid)
     fail(key, "a rigid motion");

@@ -29,10 +29,8 @@ std::smatch placeholderOf(const std::string &name)
 {
   static const std::regex kPlaceholder("%(0[0-9]{1,2})?d");
   std::smatch match;
-  if (!std::regex_search(name, match, kPlaceholder) ||
-      std::count(name.begin(), name.end(), '%') != 1)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: must have one number such as %04d in its name", name));
+  if (!std::regex_search(name, match, kPlaceholder) || std::count(name.begin(), name.end(), '%') != 1)
+    throw vpException(vpException::badValue, fmt::format("{}: must have one number such as %04d in its name", name));
   return match;
 }
 
@@ -42,14 +40,12 @@ std::string imagePath(const std::string &pattern, long number)
   const std::smatch match = placeholderOf(name);
   const std::string digits = match[1].matched ? match[1].str().substr(1) : "0";
   const std::string padded = fmt::format("{:0{}d}", number, std::stoi("0" + digits));
-  return (fs::path(pattern).parent_path() / (match.prefix().str() + padded + match.suffix().str()))
-      .string();
+  return (fs::path(pattern).parent_path() / (match.prefix().str() + padded + match.suffix().str())).string();
 }
 
 Numbers numbersOf(const std::string &pattern)
 {
-  const fs::path folder =
-      fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
+  const fs::path folder = fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
   const std::string name = fs::path(pattern).filename().string();
   placeholderOf(name);
   if (!fs::is_directory(folder))
@@ -77,8 +73,7 @@ ImageFile firstReadable(const std::string &pattern, const Numbers &numbers)
       return file;
     fault = fault.empty() ? file.message : fault;
   }
-  throw vpException(vpException::ioError,
-                    fmt::format("{}: none of the images can be read; {}", pattern, fault));
+  throw vpException(vpException::ioError, fmt::format("{}: none of the images can be read; {}", pattern, fault));
 }
 
 bool isImage(const fs::path &path)
@@ -123,8 +118,7 @@ SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &
                                          static_cast<int>(first.image.getHeight()), state.note);
   Recording recording;
   recording.odometry = readOdometry(options);
-  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path,
-                 state.pattern);
+  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path, state.pattern);
   state.builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
@@ -136,8 +130,7 @@ bool SequenceSource::next(Frame &frame)
   if (state.at > state.numbers.last)
     return false;
   const long number = state.at++;
-  state.builder->build(state.stampOf(number), readImageFile(imagePath(state.pattern, number)),
-                       frame);
+  state.builder->build(state.stampOf(number), readImageFile(imagePath(state.pattern, number)), frame);
   return true;
 }
 
@@ -162,21 +155,18 @@ std::string SequenceSource::patternOf(const std::string &folder)
   for (const auto &entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     std::smatch match;
-    if (!isImage(entry.path()) || name.find('%') != std::string::npos ||
-        !std::regex_match(name, match, kNumbered))
+    if (!isImage(entry.path()) || name.find('%') != std::string::npos || !std::regex_match(name, match, kNumbered))
       continue;
     const std::string digits = match[2].str();
     const bool is_padded = digits.size() > 1 && digits.front() == '0';
-    ++counts[match[1].str() + (is_padded ? fmt::format("%0{}d", digits.size()) : "%d") +
-             match[3].str()];
+    ++counts[match[1].str() + (is_padded ? fmt::format("%0{}d", digits.size()) : "%d") + match[3].str()];
   }
   // image0099.png counts for %04d, image1000.png for %d: the padded pattern knows both.
   std::string best;
   for (const auto &[pattern, count] : counts) {
     const bool is_padded = pattern.find("%d") == std::string::npos;
     const bool best_is_padded = !best.empty() && best.find("%d") == std::string::npos;
-    if (best.empty() || is_padded > best_is_padded ||
-        (is_padded == best_is_padded && count > counts[best]))
+    if (best.empty() || is_padded > best_is_padded || (is_padded == best_is_padded && count > counts[best]))
       best = pattern;
   }
   return best.empty() ? best : (fs::path(folder) / best).string();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/csv_reader.h"
 #include "input/trajectory.h"
+#include "input/csv_reader.h"
 
 #include <algorithm>
 #include <array>
@@ -35,12 +35,10 @@ Trajectory nonEmpty(Trajectory trajectory, const std::string &path)
 }
 } // namespace
 
-std::optional<Pose> interpolate(const Trajectory &trajectory, std::int64_t stamp_ns,
-                                std::int64_t max_gap_ns)
+std::optional<Pose> interpolate(const Trajectory &trajectory, std::int64_t stamp_ns, std::int64_t max_gap_ns)
 {
-  const auto after =
-      std::lower_bound(trajectory.begin(), trajectory.end(), stamp_ns,
-                       [](const StampedPose &pose, std::int64_t t) { return pose.stamp_ns < t; });
+  const auto after = std::lower_bound(trajectory.begin(), trajectory.end(), stamp_ns,
+                                      [](const StampedPose &pose, std::int64_t t) { return pose.stamp_ns < t; });
   if (after == trajectory.end())
     return std::nullopt;
   if (after->stamp_ns == stamp_ns)
@@ -50,8 +48,8 @@ std::optional<Pose> interpolate(const Trajectory &trajectory, std::int64_t stamp
   const auto before = after - 1;
   if (after->stamp_ns - before->stamp_ns > max_gap_ns)
     return std::nullopt;
-  const double part = static_cast<double>(stamp_ns - before->stamp_ns) /
-                      static_cast<double>(after->stamp_ns - before->stamp_ns);
+  const double part =
+      static_cast<double>(stamp_ns - before->stamp_ns) / static_cast<double>(after->stamp_ns - before->stamp_ns);
   return before->wMb.plus(part * after->wMb.minus(before->wMb));
 }
 

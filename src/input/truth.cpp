@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/csv_reader.h"
 #include "input/truth.h"
+#include "input/csv_reader.h"
 
 #include <cmath>
 #include <filesystem>
@@ -14,8 +14,7 @@ namespace bole
 {
 namespace
 {
-void readTrees(const std::string &path, bool is_far, std::set<int> &ids,
-               std::vector<TruthTrunk> &trunks)
+void readTrees(const std::string &path, bool is_far, std::set<int> &ids, std::vector<TruthTrunk> &trunks)
 {
   CsvReader csv(path, is_far ? CsvFormat{3, ',', "id,x [m],y [m]"}
                              : CsvFormat{5, ',', "id,x [m],y [m],radius [m],lean [deg]"});
@@ -59,8 +58,7 @@ vpImage<float> readDepth(const std::string &path)
     for (int u = 0; u < depth.cols; ++u) {
       const auto millimetres = depth.at<unsigned short>(v, u);
       metres[static_cast<unsigned>(v)][static_cast<unsigned>(u)] =
-          millimetres == 65535 ? std::numeric_limits<float>::infinity()
-                               : 1e-3f * static_cast<float>(millimetres);
+          millimetres == 65535 ? std::numeric_limits<float>::infinity() : 1e-3f * static_cast<float>(millimetres);
     }
   return metres;
 }

@@ -88,9 +88,8 @@ bool hasLumaPlane(AVPixelFormat format)
 bool isFullRange(const AVFrame &frame)
 {
   const auto format = static_cast<AVPixelFormat>(frame.format);
-  return frame.color_range == AVCOL_RANGE_JPEG || format == AV_PIX_FMT_YUVJ420P ||
-         format == AV_PIX_FMT_YUVJ422P || format == AV_PIX_FMT_YUVJ444P ||
-         format == AV_PIX_FMT_GRAY8;
+  return frame.color_range == AVCOL_RANGE_JPEG || format == AV_PIX_FMT_YUVJ420P || format == AV_PIX_FMT_YUVJ422P ||
+         format == AV_PIX_FMT_YUVJ444P || format == AV_PIX_FMT_GRAY8;
 }
 
 /// Luma 16 .. 235 of video to 0 .. 255.
@@ -99,8 +98,7 @@ const std::array<unsigned char, 256> &fullRangeTable()
   static const auto kTable = [] {
     std::array<unsigned char, 256> table{};
     for (int i = 0; i < 256; ++i)
-      table[static_cast<std::size_t>(i)] =
-          cv::saturate_cast<unsigned char>((i - 16) * 255.0 / 219.0);
+      table[static_cast<std::size_t>(i)] = cv::saturate_cast<unsigned char>((i - 16) * 255.0 / 219.0);
     return table;
   }();
   return kTable;
@@ -128,17 +126,15 @@ cv::Mat VideoDecoder::Libav::grey(const AVFrame &picture)
     const bool is_full = isFullRange(picture);
     const auto &table = fullRangeTable();
     for (int v = 0; v < picture.height; ++v) {
-      const unsigned char *line =
-          picture.data[0] + static_cast<std::ptrdiff_t>(v) * picture.linesize[0];
+      const unsigned char *line = picture.data[0] + static_cast<std::ptrdiff_t>(v) * picture.linesize[0];
       unsigned char *out = image.ptr(v);
       for (int u = 0; u < picture.width; ++u)
         out[u] = is_full ? line[u] : table[line[u]];
     }
   }
   else {
-    scaler.reset(sws_getCachedContext(scaler.release(), picture.width, picture.height, pixel_format,
-                                      picture.width, picture.height, AV_PIX_FMT_GRAY8, SWS_POINT,
-                                      nullptr, nullptr, nullptr));
+    scaler.reset(sws_getCachedContext(scaler.release(), picture.width, picture.height, pixel_format, picture.width,
+                                      picture.height, AV_PIX_FMT_GRAY8, SWS_POINT, nullptr, nullptr, nullptr));
     if (!scaler)
       return {};
     unsigned char *out[] = {image.data};
@@ -152,8 +148,7 @@ cv::Mat VideoDecoder::Libav::grey(const AVFrame &picture)
   return image;
 }
 
-VideoDecoder::VideoDecoder(const std::string &path)
-    : m_path(path), m_libav(std::make_unique<Libav>())
+VideoDecoder::VideoDecoder(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
 {
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));

@@ -17,8 +17,8 @@ struct VideoSource::State
   {
     readAhead();
     const Picture &first = ahead.back();
-    camera = cameraFor(options, static_cast<int>(first.image.getWidth()),
-                       static_cast<int>(first.image.getHeight()), note);
+    camera =
+        cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), note);
   }
 
   /// Reads up to the first whole picture, whose size is that of the video.
@@ -30,9 +30,8 @@ struct VideoSource::State
       if (!ahead.back().is_damaged)
         return;
     }
-    throw vpException(
-        vpException::ioError,
-        fmt::format("{}: none of its {} pictures can be decoded", name, ahead.size()));
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: none of its {} pictures can be decoded", name, ahead.size()));
   }
 
   bool take(Picture &picture)
@@ -60,8 +59,7 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
   const std::int64_t duration_ns = m_state->decoder.duration_ns();
-  requireOverlap(recording.odometry, 0,
-                 duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
+  requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_state->builder = std::make_unique<FrameBuilder>(m_state->camera, options, std::move(recording));
 }
@@ -74,9 +72,7 @@ bool VideoSource::next(Frame &frame)
   if (!m_state->take(picture))
     return false;
   ImageFile file;
-  file.status = picture.is_missing   ? FrameStatus::missing
-                : picture.is_damaged ? FrameStatus::corrupt
-                                     : FrameStatus::ok;
+  file.status = picture.is_missing ? FrameStatus::missing : picture.is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
   file.message = std::move(picture.message);
   file.image = std::move(picture.image);
   m_state->builder->build(picture.stamp_ns, std::move(file), frame);

@@ -13,16 +13,16 @@ namespace
 /// paths, some through H.264). On 15 other flights, the rendered ones among them, the area under its ROC curve is .93.
 /// kLookedThrough was added to it later, chosen between .6 and 1 on the flights of seeds 31 to 60.
 constexpr double kBias = 3.35;
-constexpr double kInnovation = -2.29;     ///< a pixel of rms between prediction and what was found
-constexpr double kMissed = -3.77;         ///< share of frames in which it should have been seen and was not
-constexpr double kLogRadius = -1.58;      ///< wide ones are more often gaps between trunks
-constexpr double kLogRadius2 = -1.99;     ///< a log-normal prior with a sigma of 0.5
+constexpr double kInnovation = -2.29; ///< a pixel of rms between prediction and what was found
+constexpr double kMissed = -3.77;     ///< share of frames in which it should have been seen and was not
+constexpr double kLogRadius = -1.58;  ///< wide ones are more often gaps between trunks
+constexpr double kLogRadius2 = -1.99; ///< a log-normal prior with a sigma of 0.5
 constexpr double kForegroundKnown = -0.77;
-constexpr double kForeground = 1.91;      ///< moved like something near, 0 to 1
-constexpr double kLookedThrough = -0.8;   ///< log of 1 + MapTrunk::lookedThrough
+constexpr double kForeground = 1.91;    ///< moved like something near, 0 to 1
+constexpr double kLookedThrough = -0.8; ///< log of 1 + MapTrunk::lookedThrough
 constexpr double kLogParallax = 0.69;
 constexpr double kLogContrast = 0.49;
-constexpr double kFoundAgain = 0.54;      ///< log of 1 + times the detector came to the same reading
+constexpr double kFoundAgain = 0.54; ///< log of 1 + times the detector came to the same reading
 constexpr double kLogPositionSigma = -0.73;
 } // namespace
 
@@ -31,10 +31,11 @@ double TrunkMap::evidence(const MapTrunk &trunk) const
   const double log_radius = trunk.trunk.log_radius - std::log(m_options.usual_radius);
   const double missed = trunk.misses / (trunk.hits + trunk.misses + 2.0);
   const double foreground_known = std::min(trunk.foreground_count, 5) / 5.0;
-  return kBias + kInnovation * std::sqrt(trunk.innovation2) / m_options.innovation_unit_px + kMissed * missed + kLogRadius * log_radius +
-         kLogRadius2 * log_radius * log_radius + foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
+  return kBias + kInnovation * std::sqrt(trunk.innovation2) / m_options.innovation_unit_px + kMissed * missed +
+         kLogRadius * log_radius + kLogRadius2 * log_radius * log_radius +
+         foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
          kLookedThrough * std::log1p(trunk.lookedThrough()) + kLogParallax * std::log(trunk.parallax() + 0.01) +
-         kLogContrast * std::log(trunk.contrast + 0.005) +
-         kFoundAgain * std::log1p(trunk.found_again) + kLogPositionSigma * std::log(trunk.positionSigma() + 1e-3);
+         kLogContrast * std::log(trunk.contrast + 0.005) + kFoundAgain * std::log1p(trunk.found_again) +
+         kLogPositionSigma * std::log(trunk.positionSigma() + 1e-3);
 }
 } // namespace bole

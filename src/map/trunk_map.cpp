@@ -121,8 +121,7 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
            trunk.evenness >= m_options.turning_evenness && trunk.contrast >= m_options.turning_contrast;
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
-         trunk.parallax() >= m_options.confirm_parallax &&
-         r >= m_options.radius_min && r <= m_options.radius_max &&
+         trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
          trunk.positionSigma() <= m_options.confirm_position_sigma && evidence(trunk) >= m_options.confirm_evidence;
 }
 
@@ -189,8 +188,7 @@ bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
     const MapTrunk &rival = m_trunks[i];
     return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
            rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
-           (margin > 0 || evidence(rival) >= m_options.confirm_evidence) &&
-           advantage(rival, trunk) > margin;
+           (margin > 0 || evidence(rival) >= m_options.confirm_evidence) && advantage(rival, trunk) > margin;
   });
 }
 
@@ -241,8 +239,9 @@ std::vector<MapChange> TrunkMap::review(bool has_ranges)
         change(*gone, TrunkStatus::merged, gone == &a ? b.id : a.id);
       }
     }
-  m_active.erase(std::remove_if(m_active.begin(), m_active.end(), [this](std::size_t i) { return m_trunks[i].removed; }),
-                 m_active.end());
+  m_active.erase(
+      std::remove_if(m_active.begin(), m_active.end(), [this](std::size_t i) { return m_trunks[i].removed; }),
+      m_active.end());
   return changes;
 }
 

@@ -21,31 +21,31 @@ namespace bole
 {
 struct MapOptions
 {
-  int confirm_observations = 10;      ///< views before a candidate may be confirmed, 2 to 1000
-  int confirm_predicted = 3;          ///< of them after it was found, where its place was predicted, 0 to 1000
-  double confirm_parallax = 0.05;     ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
+  int confirm_observations = 10;        ///< views before a candidate may be confirmed, 2 to 1000
+  int confirm_predicted = 3;            ///< of them after it was found, where its place was predicted, 0 to 1000
+  double confirm_parallax = 0.05;       ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
   double confirm_position_sigma = 0.40; ///< standard deviation of the place at which it may be [m], 0.01 to 10
   double confirm_evidence = 0.5;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
-                                      ///< trunks, and fewer that are none
-  double turning_evenness = 0.35;     ///< what must speak for a trunk where the camera has only turned and no parallax
-                                      ///< does: how evenly its borders run along their length, 0 to 1,
-  double turning_contrast = 0.008;    ///< and the mean of the weaker one [full scale/px], 0 to 0.5
-  int doubt_observations = 8;         ///< views before a trunk may be given up for its evidence, 3 to 1000
-  double doubt_candidate = -3;        ///< log odds below which a candidate is given up, -50 to 0
-  double doubt_confirmed = -1.5;      ///< log odds below which a confirmed trunk is, -50 to 0
-  double doubt_rival = 1.5;             ///< log odds by which another candidate for the same place must be better for one
-                                      ///< to be given up, 0 to 50
-  double near_range = 5.5;            ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
-  double through_range = 9;           ///< whether points behind a trunk are seen through it is asked nearer than this
-                                      ///< [m], 0 (never) to 100
-  double innovation_unit_px = 1;      ///< rms of prediction against what was found that counts as one pixel of a camera
-                                      ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
-  double usual_radius = 0.15;         ///< median radius of the trunks to be found [m], 0.001 to 10
-  int lost_misses = 8;                ///< misses in a row before a trunk is lost, 1 to 1000
-  double candidate_memory_s = 5;      ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
-  double merge_distance = 0.30;       ///< two trunks with less than this between their bark are one [m], 0 to 5
-  double radius_min = 0.05;           ///< thinner is no trunk [m]
-  double radius_max = 0.60;           ///< thicker is no trunk [m]
+                                        ///< trunks, and fewer that are none
+  double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
+                                   ///< does: how evenly its borders run along their length, 0 to 1,
+  double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
+  int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
+  double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
+  double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
+  double doubt_rival = 1.5;        ///< log odds by which another candidate for the same place must be better for one
+                                   ///< to be given up, 0 to 50
+  double near_range = 5.5;         ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
+  double through_range = 9;        ///< whether points behind a trunk are seen through it is asked nearer than this
+                                   ///< [m], 0 (never) to 100
+  double innovation_unit_px = 1;   ///< rms of prediction against what was found that counts as one pixel of a camera
+                                   ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
+  double usual_radius = 0.15;      ///< median radius of the trunks to be found [m], 0.001 to 10
+  int lost_misses = 8;             ///< misses in a row before a trunk is lost, 1 to 1000
+  double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
+  double merge_distance = 0.30;    ///< two trunks with less than this between their bark are one [m], 0 to 5
+  double radius_min = 0.05;        ///< thinner is no trunk [m]
+  double radius_max = 0.60;        ///< thicker is no trunk [m]
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -56,24 +56,24 @@ struct MapTrunk
   int id = 0;
   std::size_t smoother_id = 0;
   TrunkStatus status = TrunkStatus::candidate;
-  Trunk trunk;                               ///< as the smoother has it now
+  Trunk trunk; ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
-  int observations = 0;                      ///< summary factors
+  int observations = 0;                     ///< summary factors
   std::optional<Eigen::Vector3d> seen_from; ///< the camera's place at its last view [m]
-  int turned_in_a_row = 0; ///< frames in which its borders had the other sign where they were expected
+  int turned_in_a_row = 0;                  ///< frames in which its borders had the other sign where they were expected
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
   int found_again = 0;                           ///< times the detector came to the same reading later
   double contrast = 0;                           ///< running mean of the weaker border's
   double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
-  double bearing_first = 0;                  ///< world bearing of the first view [rad]
-  double bearing_low = 0, bearing_high = 0;  ///< extremes of the bearing from the first one [rad]
-  double innovation2 = 0;                    ///< running mean of TrunkView::innovation2
-  double foreground = 0;                     ///< mean of 1 - p(background) inside it
+  double bearing_first = 0;                            ///< world bearing of the first view [rad]
+  double bearing_low = 0, bearing_high = 0;            ///< extremes of the bearing from the first one [rad]
+  double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
+  double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
-  int points_on = 0, points_behind = 0;      ///< of the scene, seen inside its borders, over all frames
-  bool removed = false;                      ///< out of the smoother (merged, or a candidate given up)
+  int points_on = 0, points_behind = 0; ///< of the scene, seen inside its borders, over all frames
+  bool removed = false;                 ///< out of the smoother (merged, or a candidate given up)
 
   double parallax() const { return bearing_high - bearing_low; }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
@@ -85,9 +85,9 @@ struct MapTrunk
 struct TrunkView
 {
   double time_s = 0;
-  double bearing = 0; ///< of the trunk from the camera, world [rad]
+  double bearing = 0;                           ///< of the trunk from the camera, world [rad]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
-  double evenness = 0; ///< of the borders along their length, 0 to 1
+  double evenness = 0;                          ///< of the borders along their length, 0 to 1
   double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], less the
                           ///< wider the trunk stands in the image (its borders are rougher)
 };
@@ -125,9 +125,9 @@ public:
   /// \p has_ranges: false while the camera has only turned, so that a trunk earns its place by its bearing and width.
   std::vector<MapChange> review(bool has_ranges = true);
 
-  /// Candidates that were left behind before they could be confirmed, and are not active any more. What was seen of them
-  /// stands: they stay in the smoother and in records(). Those of which nothing was ever seen are removed; returns their
-  /// ids: a drone that rests is offered the same wrong ones in every frame.
+  /// Candidates that were left behind before they could be confirmed, and are not active any more. What was seen of
+  /// them stands: they stay in the smoother and in records(). Those of which nothing was ever seen are removed; returns
+  /// their ids: a drone that rests is offered the same wrong ones in every frame.
   std::vector<int> leaveBehind(double now_s);
 
   /// Gives up all that is active. Returns their ids.

@@ -144,7 +144,8 @@ std::vector<ContrastPeak> contrastPeaks(const std::vector<float> &g)
   std::vector<ContrastPeak> peaks;
   const int n = int(g.size()), half = n / 2;
   for (int k = 1; k + 1 < n; ++k) {
-    const double a = std::abs(g[std::size_t(k - 1)]), b = std::abs(g[std::size_t(k)]), c = std::abs(g[std::size_t(k + 1)]);
+    const double a = std::abs(g[std::size_t(k - 1)]), b = std::abs(g[std::size_t(k)]),
+                 c = std::abs(g[std::size_t(k + 1)]);
     if (!(b > a && b >= c) || b <= 0)
       continue;
     const double curvature = a - 2 * b + c;

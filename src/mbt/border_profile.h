@@ -12,8 +12,8 @@
 /// Offsets are in pixels along the outward normal of the border (out of the trunk). Signed contrast: positive
 /// where the background is brighter than the trunk.
 
-#include <bole/camera.h>
 #include "geometry/cylinder.h"
+#include <bole/camera.h>
 
 #include <optional>
 #include <vector>
@@ -35,17 +35,16 @@ struct VisibleBorder
 /// The border \p side of the cylinder \p c (camera frame), cut at its ends, at \p near_m in front of the camera
 /// and at \p margin_px inside the image; nullopt where nothing of it is left.
 std::optional<VisibleBorder> visibleBorder(const PinholeCamera &camera, const Cylinder &c,
-                                           const RelativeTrunk &relative, Border side, double near_m,
-                                           double margin_px);
+                                           const RelativeTrunk &relative, Border side, double near_m, double margin_px);
 
 /// Mean grey level at each offset -half .. half (step 1 px) along pieces of a border.
 struct BorderProfile
 {
   int half = 0;
   int pieces = 0;
-  std::vector<float> mean;     ///< pieces x (2 half + 1), piece after piece from foot to top
-  std::vector<float> visible;  ///< share of each piece that was sampled, 0 .. 1
-  std::vector<double> centre;  ///< place of each piece on the border, 0 foot .. 1 top
+  std::vector<float> mean;    ///< pieces x (2 half + 1), piece after piece from foot to top
+  std::vector<float> visible; ///< share of each piece that was sampled, 0 .. 1
+  std::vector<double> centre; ///< place of each piece on the border, 0 foot .. 1 top
 
   int width() const { return 2 * half + 1; }
   /// Signed contrast (derivative of the profile blurred with sigma 1 px, grey levels a pixel) of piece

@@ -26,10 +26,10 @@ struct BallotBorder
 
 struct VoteOptions
 {
-  double weight = 2;     ///< log-likelihood of a full response against none (0.1 .. 20)
-  double step_px = 1.5;  ///< of the grid, at the border that moves most (0.5 .. 5)
-  double sigmas = 3;     ///< half-width of the grid (1 .. 5)
-  int max_poses = 6000;  ///< limit of the grid (100 .. 1e6)
+  double weight = 2;    ///< log-likelihood of a full response against none (0.1 .. 20)
+  double step_px = 1.5; ///< of the grid, at the border that moves most (0.5 .. 5)
+  double sigmas = 3;    ///< half-width of the grid (1 .. 5)
+  int max_poses = 6000; ///< limit of the grid (100 .. 1e6)
 };
 
 struct Vote

@@ -9,7 +9,8 @@
 /// and so keeps trunks apart that look alike. Along one direction ("up": what the trunks do not tell) the
 /// velocity is never seen; the camera is expected to stay there, since what is not measured must not be integrated.
 ///
-/// Frames: pose cMo; covariances of the camera's twist (m, rad; camera frame); velocity in metres a frame, object frame.
+/// Frames: pose cMo; covariances of the camera's twist (m, rad; camera frame); velocity in metres a frame, object
+/// frame.
 ///
 /// \code
 /// CameraMotion motion;
@@ -42,7 +43,8 @@ public:
 
   /// The camera stands at \p cMo, its velocity is not known.
   void start(const Pose &cMo, const Matrix6d &covariance);
-  /// \p frames after the last update (1 ..), turned by \p c2Rc1 since then (\p turn_sigma_rad about each axis); \p up: unit, object frame.
+  /// \p frames after the last update (1 ..), turned by \p c2Rc1 since then (\p turn_sigma_rad about each axis); \p up:
+  /// unit, object frame.
   Expected predict(int frames, const Eigen::Matrix3d &c2Rc1, double turn_sigma_rad, const Eigen::Vector3d &up);
   /// What the frame of the last predict() made of the expectation; the covariance has taken it in already.
   void update(const Pose &cMo, const Matrix6d &covariance);
@@ -57,7 +59,8 @@ private:
   Pose m_cMo, m_expected;
   Matrix6d m_covariance = Matrix6d::Zero(), m_expected_covariance = Matrix6d::Identity();
   Eigen::Vector3d m_velocity = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d m_velocity_covariance = Eigen::Matrix3d::Zero(), m_expected_velocity_covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d m_velocity_covariance = Eigen::Matrix3d::Zero(),
+                  m_expected_velocity_covariance = Eigen::Matrix3d::Zero();
   Matrix63d m_cross = Matrix63d::Zero(), m_expected_cross = Matrix63d::Zero(); ///< pose and velocity
 };
 } // namespace bole

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
 #include "mbt/rotation_aligner.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Dense>
 
@@ -185,7 +185,8 @@ RotationAlignment RotationAligner::align(const Reference &first, const Reference
   double best = -2;
   for (int dv = -max_dv; dv <= max_dv; ++dv)
     for (int du = -max_du; du <= max_du; ++du) {
-      const double score = shiftedCorrelation(first.coarse, second.coarse, du, dv) - 0.002 * (std::abs(du) + std::abs(dv));
+      const double score =
+          shiftedCorrelation(first.coarse, second.coarse, du, dv) - 0.002 * (std::abs(du) + std::abs(dv));
       if (score > best)
         best = score, best_u = du, best_v = dv;
     }

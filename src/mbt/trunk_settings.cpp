@@ -166,7 +166,8 @@ const std::map<std::string, Setter> &trunkKeys()
 void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf> &leaves, TrunkSettings &settings)
 {
   const std::string section = "conf/trunk/";
-  for (auto it = leaves.lower_bound(section); it != leaves.end() && it->first.compare(0, section.size(), section) == 0; ++it) {
+  for (auto it = leaves.lower_bound(section); it != leaves.end() && it->first.compare(0, section.size(), section) == 0;
+       ++it) {
     const std::string key = it->first.substr(section.size());
     const auto setter = trunkKeys().find(key);
     if (setter == trunkKeys().end())

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The ViSP side of vpMbTrunkTracker; its estimation is in vpMbTrunkTrackerPose.cpp and ...Servo.cpp, its display in ...Display.cpp.
+// The ViSP side of vpMbTrunkTracker; its estimation is in vpMbTrunkTrackerPose.cpp and ...Servo.cpp, its display in
+// ...Display.cpp.
 #include "mbt/cao_reader.h"
 #include "mbt/trunk_settings.h"
 #include <bole/vpMbTrunkTracker.h>
@@ -27,12 +28,18 @@ vpMbTrunkTracker::Status statusOf(ImageFault fault)
 {
   using Status = vpMbTrunkTracker::Status;
   switch (fault) {
-  case ImageFault::wrong_size: return Status::wrong_size;
-  case ImageFault::black: return Status::black;
-  case ImageFault::noise: return Status::noise;
-  case ImageFault::frozen: return Status::frozen;
-  case ImageFault::smeared: return Status::smeared;
-  case ImageFault::none: break;
+  case ImageFault::wrong_size:
+    return Status::wrong_size;
+  case ImageFault::black:
+    return Status::black;
+  case ImageFault::noise:
+    return Status::noise;
+  case ImageFault::frozen:
+    return Status::frozen;
+  case ImageFault::smeared:
+    return Status::smeared;
+  case ImageFault::none:
+    break;
   }
   return Status::tracked;
 }
@@ -71,17 +78,28 @@ void vpMbTrunkTracker::Options::validate() const
 const char *vpMbTrunkTracker::toString(Status status)
 {
   switch (status) {
-  case Status::not_initialised: return "not initialised";
-  case Status::tracked: return "tracked";
-  case Status::partly_on_prior: return "partly on the prior";
-  case Status::no_trunk: return "no trunk in view";
-  case Status::uncertain: return "uncertain";
-  case Status::lost: return "lost";
-  case Status::wrong_size: return "wrong size";
-  case Status::black: return "black";
-  case Status::noise: return "noise";
-  case Status::frozen: return "frozen";
-  case Status::smeared: return "smeared";
+  case Status::not_initialised:
+    return "not initialised";
+  case Status::tracked:
+    return "tracked";
+  case Status::partly_on_prior:
+    return "partly on the prior";
+  case Status::no_trunk:
+    return "no trunk in view";
+  case Status::uncertain:
+    return "uncertain";
+  case Status::lost:
+    return "lost";
+  case Status::wrong_size:
+    return "wrong size";
+  case Status::black:
+    return "black";
+  case Status::noise:
+    return "noise";
+  case Status::frozen:
+    return "frozen";
+  case Status::smeared:
+    return "smeared";
   }
   return "?";
 }
@@ -114,8 +132,8 @@ void vpMbTrunkTracker::setOptions(const Options &options)
 void vpMbTrunkTracker::setMotionPrior(const vpHomogeneousMatrix &cMo, const vpMatrix &covariance)
 {
   if (covariance.getRows() != 6 || covariance.getCols() != 6)
-    throw vpException(vpException::dimensionError, fmt::format("covariance = {}x{}, must be 6x6", covariance.getRows(),
-                                                               covariance.getCols()));
+    throw vpException(vpException::dimensionError,
+                      fmt::format("covariance = {}x{}, must be 6x6", covariance.getRows(), covariance.getCols()));
   MotionPrior prior;
   prior.cMo = cMo;
   for (unsigned i = 0; i < 6; ++i)
@@ -266,8 +284,10 @@ void vpMbTrunkTracker::reInitModel(const vpImage<unsigned char> &I, const std::s
 /// Why the pose just found is not to be vouched for; empty: it is.
 std::string vpMbTrunkTracker::doubt() const
 {
-  const double metres = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.topLeftCorner<3, 3>()).eigenvalues()(2));
-  const double radians = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.bottomRightCorner<3, 3>()).eigenvalues()(2));
+  const double metres =
+      std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.topLeftCorner<3, 3>()).eigenvalues()(2));
+  const double radians =
+      std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m_posterior.bottomRightCorner<3, 3>()).eigenvalues()(2));
   if (metres > m_options.max_sigma_m)
     return fmt::format("the position is known to {:.2g} m only", metres);
   if (radians > m_options.max_sigma_rad)

@@ -14,8 +14,8 @@ using bole::kBorders;
 namespace
 {
 template <class Image>
-void draw(const Image &I, const std::vector<std::vector<double>> &lines, const std::vector<std::vector<double>> &features,
-          const vpColor &colour, unsigned int thickness)
+void draw(const Image &I, const std::vector<std::vector<double>> &lines,
+          const std::vector<std::vector<double>> &features, const vpColor &colour, unsigned int thickness)
 {
   for (const auto &l : lines)
     vpDisplay::displayLine(I, vpImagePoint(l[1], l[2]), vpImagePoint(l[3], l[4]), colour, thickness);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The estimation of vpMbTrunkTracker: predict, scan, choose, judge; the servoing is in vpMbTrunkTrackerServo.cpp.
-#include "tracking/borders.h"
 #include "mbt/camera_twist.h"
+#include "tracking/borders.h"
 
 #include <bole/vpMbTrunkTracker.h>
 
@@ -55,9 +55,11 @@ vpMbTrunkTracker::Prediction vpMbTrunkTracker::predictAlone()
   const int width = int(m_reference_image.getWidth()), height = int(m_reference_image.getHeight());
   if (m_reference.empty())
     m_reference = bole::RotationAligner::reduce(m_reference_image);
-  const bole::RotationAlignment turn = m_aligner.align(m_reference, m_thumbnails, bole::PinholeCamera::fromVisp(m_cam, width, height));
-  const auto expected = m_motion.predict(frames, turn.ok ? turn.c2Rc1 : Matrix3d::Identity(),
-                                         turn.ok ? m_options.turn_sigma_rad : 0.05 * std::sqrt(double(frames)), alongTrunks());
+  const bole::RotationAlignment turn =
+      m_aligner.align(m_reference, m_thumbnails, bole::PinholeCamera::fromVisp(m_cam, width, height));
+  const auto expected =
+      m_motion.predict(frames, turn.ok ? turn.c2Rc1 : Matrix3d::Identity(),
+                       turn.ok ? m_options.turn_sigma_rad : 0.05 * std::sqrt(double(frames)), alongTrunks());
   return {moved(m_cMo, estimated(twistBetween(m_cMo, expected.cMo.toVisp()))), expected.covariance};
 }
 
@@ -237,7 +239,8 @@ void vpMbTrunkTracker::learn(const vpImage<unsigned char> &I)
       int best = -1;
       double strongest = 0;
       for (int p = 0; p < int(peaks.size()); ++p) {
-        const double strength = std::abs(peaks[std::size_t(p)].contrast) * (1 - 0.15 * std::abs(peaks[std::size_t(p)].offset_px));
+        const double strength =
+            std::abs(peaks[std::size_t(p)].contrast) * (1 - 0.15 * std::abs(peaks[std::size_t(p)].offset_px));
         if (strength > strongest)
           strongest = strength, best = p;
       }

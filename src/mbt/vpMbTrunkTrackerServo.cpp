@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The virtual visual servoing of vpMbTrunkTracker: from found places to a pose and its covariance.
-#include "tracking/borders.h"
 #include "mbt/camera_twist.h"
+#include "tracking/borders.h"
 
 #include <bole/vpMbTrunkTracker.h>
 

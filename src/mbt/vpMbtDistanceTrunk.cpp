@@ -17,7 +17,8 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr double kProfileRate = 0.5; ///< how fast the remembered profile follows: the background moves on behind the border
+constexpr double kProfileRate =
+    0.5; ///< how fast the remembered profile follows: the background moves on behind the border
 
 void check(const char *name, double value, double low, double high)
 {
@@ -123,7 +124,8 @@ void vpMbtDistanceTrunk::scan(const vpImage<unsigned char> &I, int half_px)
     state.peaks.clear();
     if (!state.visible)
       continue;
-    state.profile = bole::sampleBorder(I, state.line, half_px + kProfileReach, m_options.samples, m_options.pieces, state.hidden);
+    state.profile =
+        bole::sampleBorder(I, state.line, half_px + kProfileReach, m_options.samples, m_options.pieces, state.hidden);
     state.whole = state.profile.whole();
     state.contrast = state.profile.contrast(-1);
     state.peaks = bole::contrastPeaks(state.contrast);
@@ -170,7 +172,8 @@ void vpMbtDistanceTrunk::search(const vpImage<unsigned char> &I, int half_px)
     const BorderState &state = border(side);
     int best = -1;
     for (int k = 0; k < int(state.peaks.size()); ++k)
-      if (best < 0 || std::abs(state.peaks[std::size_t(k)].contrast) > std::abs(state.peaks[std::size_t(best)].contrast))
+      if (best < 0 ||
+          std::abs(state.peaks[std::size_t(k)].contrast) > std::abs(state.peaks[std::size_t(best)].contrast))
         best = k;
     choose(side, best, 3);
   }

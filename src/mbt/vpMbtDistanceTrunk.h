@@ -69,15 +69,15 @@ public:
   struct BorderState
   {
     bool visible = false;
-    bole::VisibleBorder line;        ///< predicted
-    std::vector<bool> hidden;        ///< samples behind another trunk
-    bole::BorderProfile profile;     ///< last search
-    std::vector<float> whole;        ///< its mean over the whole border
-    std::vector<float> contrast;     ///< of the whole border at each offset of the last search
+    bole::VisibleBorder line;    ///< predicted
+    std::vector<bool> hidden;    ///< samples behind another trunk
+    bole::BorderProfile profile; ///< last search
+    std::vector<float> whole;    ///< its mean over the whole border
+    std::vector<float> contrast; ///< of the whole border at each offset of the last search
     std::vector<bole::ContrastPeak> peaks;
-    int chosen = -1;                 ///< peak of the whole border that the pieces follow
+    int chosen = -1; ///< peak of the whole border that the pieces follow
     std::vector<Piece> pieces;
-    double remembered_contrast = 0;  ///< signed, mean over the frames before; 0: none yet
+    double remembered_contrast = 0; ///< signed, mean over the frames before; 0: none yet
     int remembered_frames = 0;
     std::vector<float> remembered_profile; ///< grey across the border in the frames before, kProfileReach to each side
 

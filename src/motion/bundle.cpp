@@ -10,10 +10,9 @@
 
 namespace bole::motion
 {
-Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a,
-                             double inverse_depth, const Eigen::Vector2d &xy_b,
-                             Eigen::Matrix<double, 2, 6> *J_a, Eigen::Matrix<double, 2, 6> *J_b,
-                             Eigen::Vector2d *J_q)
+Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a, double inverse_depth,
+                             const Eigen::Vector2d &xy_b, Eigen::Matrix<double, 2, 6> *J_a,
+                             Eigen::Matrix<double, 2, 6> *J_b, Eigen::Vector2d *J_q)
 {
   const Eigen::Vector3d ray = xy_a.homogeneous();
   const Eigen::Matrix3d bRa = wMb.R.transpose() * wMa.R;
@@ -51,8 +50,7 @@ struct System
 class Bundle
 {
 public:
-  Bundle(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
-         const BundleOptions &options)
+  Bundle(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points, const BundleOptions &options)
       : m_frames(frames), m_points(points), m_options(options)
   {
     for (const BundleFrame &frame : frames) {
@@ -131,18 +129,16 @@ public:
   }
 
 private:
-  static Eigen::Vector2d residualOf(const std::vector<BundleFrame> &frames,
-                                    const BundlePoint &point, const BundleObservation &seen)
+  static Eigen::Vector2d residualOf(const std::vector<BundleFrame> &frames, const BundlePoint &point,
+                                    const BundleObservation &seen)
   {
     return reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                        frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
-                        point.inverse_depth, seen.xy);
+                        frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy);
   }
 
   static Eigen::Vector3d rotationResidual(const std::vector<BundleFrame> &frames, std::size_t i)
   {
-    return logSo3(frames[i].previousRthis->transpose() * frames[i - 1].wMc.R.transpose() *
-                  frames[i].wMc.R);
+    return logSo3(frames[i].previousRthis->transpose() * frames[i - 1].wMc.R.transpose() * frames[i].wMc.R);
   }
 
   double baselineResidual(const std::vector<BundleFrame> &frames) const
@@ -161,10 +157,9 @@ private:
       const int b = m_offset[static_cast<std::size_t>(seen.frame)];
       Eigen::Matrix<double, 2, 6> J_a, J_b;
       Eigen::Vector2d J_q;
-      const Eigen::Vector2d e =
-          reprojection(m_frames[static_cast<std::size_t>(point.anchor)].wMc,
-                       m_frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
-                       point.inverse_depth, seen.xy, &J_a, &J_b, &J_q);
+      const Eigen::Vector2d e = reprojection(m_frames[static_cast<std::size_t>(point.anchor)].wMc,
+                                             m_frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
+                                             point.inverse_depth, seen.xy, &J_a, &J_b, &J_q);
       seen.weight = weightOf(e.norm() / m_options.sigma, m_options.kernel);
       const double w = seen.weight / (m_options.sigma * m_options.sigma);
       H_q += w * J_q.squaredNorm();
@@ -223,8 +218,8 @@ private:
     }
     // The first frame is fixed wherever the baseline is asked for.
     const Eigen::Vector3d between = m_frames[1].wMc.t - m_frames[0].wMc.t;
-    const Eigen::Vector3d J = m_frames[1].wMc.R.transpose() * between.normalized() /
-                              (kBaselineSigma * *m_options.first_baseline);
+    const Eigen::Vector3d J =
+        m_frames[1].wMc.R.transpose() * between.normalized() / (kBaselineSigma * *m_options.first_baseline);
     const int b = m_offset[1];
     system.H.block<3, 3>(b, b) += J * J.transpose();
     system.g.segment<3>(b) += J * baselineResidual(m_frames);
@@ -244,9 +239,9 @@ double bulkOf(const std::vector<BundleFrame> &frames, const std::vector<BundlePo
   std::vector<double> all;
   for (const BundlePoint &point : points) {
     for (const BundleObservation &seen : point.seen) {
-      const Eigen::Vector2d e = reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                                             frames[static_cast<std::size_t>(seen.frame)].wMc,
-                                             point.xy, point.inverse_depth, seen.xy);
+      const Eigen::Vector2d e =
+          reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
+                       frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy);
       all.push_back(e.x());
       all.push_back(e.y());
     }

@@ -35,7 +35,7 @@ struct BundlePoint
   Eigen::Vector2d xy;       ///< of the ray (x, y, 1) in the anchor
   double inverse_depth = 0; ///< along z of the anchor [1/unit]
   double prior = 0, prior_information = 0;
-  double information = 0; ///< of the inverse depth, the poses taken as known; after solveBundle()
+  double information = 0;              ///< of the inverse depth, the poses taken as known; after solveBundle()
   std::vector<BundleObservation> seen; ///< in other frames than the anchor
 };
 
@@ -51,19 +51,16 @@ struct BundleOptions
 struct BundleResult
 {
   bool solved = false;
-  double sigma = 0;   ///< of the bulk of the observations
-  double inliers = 0; ///< share of observations of weight above 1/2
-  Matrix6d last_covariance =
-      Matrix6d::Identity(); ///< of the last frame, the other poses taken as known, per sigma
+  double sigma = 0;                                ///< of the bulk of the observations
+  double inliers = 0;                              ///< share of observations of weight above 1/2
+  Matrix6d last_covariance = Matrix6d::Identity(); ///< of the last frame, the other poses taken as known, per sigma
 };
 
 /// Residual (predicted - seen) of a point in a frame, derivatives by the tangents (rho, phi) of
 /// both poses and by the inverse depth (each may be nullptr).
-Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a,
-                             double inverse_depth, const Eigen::Vector2d &xy_b,
-                             Eigen::Matrix<double, 2, 6> *J_a = nullptr,
-                             Eigen::Matrix<double, 2, 6> *J_b = nullptr,
-                             Eigen::Vector2d *J_q = nullptr);
+Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a, double inverse_depth,
+                             const Eigen::Vector2d &xy_b, Eigen::Matrix<double, 2, 6> *J_a = nullptr,
+                             Eigen::Matrix<double, 2, 6> *J_b = nullptr, Eigen::Vector2d *J_q = nullptr);
 
 BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                          const BundleOptions &options);

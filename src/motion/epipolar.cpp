@@ -12,9 +12,8 @@
 
 namespace bole
 {
-double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b,
-                       const Eigen::Matrix3d &aRb, const Eigen::Vector3d &direction,
-                       Eigen::Matrix<double, 1, 5> *J)
+double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
+                       const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J)
 {
   const motion::Epipolar epipolar({aRb, direction});
   if (J == nullptr) {
@@ -53,8 +52,7 @@ MotionPrior::MotionPrior(const RelativePosePrior &prior)
     const Matrix32d B = directionBasis(direction);
     // The larger of the two tangent variances; beyond 0.6 rad a Gaussian on the sphere says
     // nothing.
-    const Eigen::Matrix2d tangent =
-        B.transpose() * prior.translation_covariance * B / (length * length);
+    const Eigen::Matrix2d tangent = B.transpose() * prior.translation_covariance * B / (length * length);
     const double variance = 0.5 * tangent.trace() + 1e-10;
     has_direction = true;
     direction_information = variance < 0.36 ? 1 / variance : 0;
@@ -91,8 +89,8 @@ double bulkSigma(std::vector<double> residuals)
 namespace
 {
 /// Flow of one match that a rotation leaves, in the image of a, and its derivative by the rotation.
-Eigen::Vector2d transferResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b,
-                                 const Eigen::Matrix3d &aRb, Eigen::Matrix<double, 2, 3> *J)
+Eigen::Vector2d transferResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
+                                 Eigen::Matrix<double, 2, 3> *J)
 {
   const Eigen::Vector3d p = aRb * x_b;
   const double z = std::max(p.z(), 1e-3);
@@ -133,8 +131,7 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
     }
     fit.information = H + prior.rotation_information;
     g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
-    const Eigen::Vector3d step =
-        -(fit.information + 1e-9 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
+    const Eigen::Vector3d step = -(fit.information + 1e-9 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
     fit.aRb = orthonormalized(fit.aRb * expSo3(step));
     if (step.norm() < 1e-7) {
       break;
@@ -147,16 +144,14 @@ namespace
 {
 Motion moved(const Motion &motion, const Vector5d &xi)
 {
-  return {orthonormalized(motion.aRb * expSo3(xi.head<3>())),
-          directionPlus(motion.direction, xi.tail<2>())};
+  return {orthonormalized(motion.aRb * expSo3(xi.head<3>())), directionPlus(motion.direction, xi.tail<2>())};
 }
 
 double priorCost(const Motion &motion, const MotionPrior &prior)
 {
   const Eigen::Vector3d phi = logSo3(prior.aRb.transpose() * motion.aRb);
   const Eigen::Vector2d tau = directionMinus(prior.direction, motion.direction);
-  return 0.5 * phi.dot(prior.rotation_information * phi) +
-         0.5 * prior.direction_information * tau.squaredNorm();
+  return 0.5 * phi.dot(prior.rotation_information * phi) + 0.5 * prior.direction_information * tau.squaredNorm();
 }
 
 double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
@@ -165,15 +160,13 @@ double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, 
   double cost = 0;
   const Epipolar epipolar(motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    cost += epipolar.trust(rays.a[i]) *
-            costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, options.kernel);
+    cost += epipolar.trust(rays.a[i]) * costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, options.kernel);
   }
   return cost / options.inflation + priorCost(motion, prior);
 }
 
 /// Information and gradient of the matches at \p motion, inflation not applied.
-void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H,
-               Vector5d &g)
+void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H, Vector5d &g)
 {
   H.setZero();
   g.setZero();
@@ -188,8 +181,7 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, double kern
 }
 
 /// Levenberg-Marquardt with a fixed sigma.
-void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior,
-             const RelativePoseOptions &options)
+void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const RelativePoseOptions &options)
 {
   double damping = 1e-4;
   fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
@@ -202,8 +194,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior,
     H(3, 3) += prior.direction_information;
     H(4, 4) += prior.direction_information;
     g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
-    g.tail<2>() -=
-        prior.direction_information * directionMinus(prior.direction, fit.motion.direction);
+    g.tail<2>() -= prior.direction_information * directionMinus(prior.direction, fit.motion.direction);
     bool better = false;
     Vector5d step = Vector5d::Zero();
     for (int attempt = 0; attempt < 4 && !better; ++attempt) {
@@ -230,8 +221,8 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior,
 }
 } // namespace
 
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma,
-                   double min_sigma, const RelativePoseOptions &options)
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
+                   const RelativePoseOptions &options)
 {
   JointFit fit;
   fit.motion = start;
@@ -270,11 +261,9 @@ Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double
     const Eigen::Vector2d flow = rays.a[i].head<2>() - at;
     lengths.push_back(flow.norm());
     // A point of positive depth is seen from a further along the direction than from b.
-    const Eigen::Vector2d line =
-        (motion.direction.head<2>() - at * motion.direction.z()).normalized();
+    const Eigen::Vector2d line = (motion.direction.head<2>() - at * motion.direction.z()).normalized();
     const double w = weightOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, kernel);
-    const double u = flow.dot(line) / sigma,
-                 v = (flow.x() * line.y() - flow.y() * line.x()) / sigma;
+    const double u = flow.dot(line) / sigma, v = (flow.x() * line.y() - flow.y() * line.x()) / sigma;
     along += w * std::min(u * u, 400.0);
     across += w * v * v;
     sum += w;
@@ -298,8 +287,7 @@ namespace
 std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i, std::size_t j,
                                                  const Eigen::Matrix3d &aRb)
 {
-  const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]),
-                        normal_j = rays.a[j].cross(aRb * rays.b[j]);
+  const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]), normal_j = rays.a[j].cross(aRb * rays.b[j]);
   const Eigen::Vector3d d = normal_i.cross(normal_j);
   if (d.norm() < 1e-12) {
     return std::nullopt;
@@ -320,8 +308,7 @@ Rays drawn(const Rays &rays, std::mt19937 &random, std::size_t n)
 }
 } // namespace
 
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
-                                 const MotionPrior &prior, double sigma,
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
                                  const RelativePoseOptions &options)
 {
   std::mt19937 random(options.seed);
@@ -332,8 +319,7 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
-  for (int hypothesis = 0;
-       hypothesis < (rotation_known ? (options.hypotheses + 1) / 2 : options.hypotheses);
+  for (int hypothesis = 0; hypothesis < (rotation_known ? (options.hypotheses + 1) / 2 : options.hypotheses);
        ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
@@ -349,17 +335,14 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
     scored.emplace_back(costAt(rays, motion, free, sigma, options), motion);
   }
   if (prior.has_direction) {
-    scored.emplace_back(costAt(rays, {aRb, prior.direction}, free, sigma, options),
-                        Motion{aRb, prior.direction});
+    scored.emplace_back(costAt(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
   }
-  std::sort(scored.begin(), scored.end(),
-            [](const auto &x, const auto &y) { return x.first < y.first; });
+  std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
   std::vector<Motion> starts;
   for (const auto &[cost, motion] : scored) {
-    const bool seen =
-        std::any_of(starts.begin(), starts.end(), [&motion = motion](const Motion &other) {
-          return std::abs(other.direction.dot(motion.direction)) > 0.95;
-        });
+    const bool seen = std::any_of(starts.begin(), starts.end(), [&motion = motion](const Motion &other) {
+      return std::abs(other.direction.dot(motion.direction)) > 0.95;
+    });
     if (!seen) {
       starts.push_back(motion);
     }

@@ -35,17 +35,14 @@ class Epipolar
 {
 public:
   explicit Epipolar(const Motion &motion)
-      : m_R(motion.aRb),
-        m_E(skew(motion.direction) * motion.aRb),
-        m_B(directionBasis(motion.direction))
+      : m_R(motion.aRb), m_E(skew(motion.direction) * motion.aRb), m_B(directionBasis(motion.direction))
   {
   }
 
   double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b) const
   {
     const Eigen::Vector3d line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
-    return x_a.dot(line_a) /
-           std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24);
+    return x_a.dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24);
   }
   /// \p J by (phi, tau).
   double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J) const
@@ -55,10 +52,9 @@ public:
     const double S = flat_a.squaredNorm() + flat_b.squaredNorm() + 1e-24;
     const double inverse_root = 1 / std::sqrt(S), algebraic = x_a.dot(line_a);
     const double share = algebraic / S;
-    const Eigen::Vector3d by_direction =
-        p.cross(x_a - share * flat_a) - share * (m_R * flat_b).cross(x_a);
-    J.head<3>() = inverse_root * (x_b.cross(line_b - share * (m_E.transpose() * flat_a)) +
-                                  share * line_b.cross(flat_b));
+    const Eigen::Vector3d by_direction = p.cross(x_a - share * flat_a) - share * (m_R * flat_b).cross(x_a);
+    J.head<3>() =
+        inverse_root * (x_b.cross(line_b - share * (m_E.transpose() * flat_a)) + share * line_b.cross(flat_b));
     J.tail<2>() = inverse_root * (m_B.transpose() * by_direction);
     return algebraic * inverse_root;
   }
@@ -106,7 +102,7 @@ struct RotationFit
 {
   Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< with the prior [1/rad^2]
-  double sigma = 0; ///< of one coordinate of one image [normalised]
+  double sigma = 0;                                      ///< of one coordinate of one image [normalised]
   std::vector<double> weights;
 };
 RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
@@ -119,8 +115,8 @@ struct JointFit
   Matrix5d information = Matrix5d::Zero(); ///< of the matches alone, inflation not applied
   double sigma = 0, cost = 0;
 };
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma,
-                   double min_sigma, const RelativePoseOptions &options);
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
+                   const RelativePoseOptions &options);
 
 /// Flow that is left when the rotation is taken out, along and across the epipolar lines
 /// [normalised].
@@ -133,7 +129,6 @@ struct Parallax
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel);
 
 /// Starts for fitMotion(): the prior's direction and the best of two-point directions.
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb,
-                                 const MotionPrior &prior, double sigma,
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
                                  const RelativePoseOptions &options);
 } // namespace bole::motion

@@ -34,8 +34,8 @@ double residual_px(const std::vector<PointMatch> &matches, const PinholeCamera &
   camera.fx *= std::exp(log_factor);
   camera.fy *= std::exp(log_factor);
   constexpr double kLeast_px = 0.05;
-  const double sigma = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx,
-                                           RelativePoseOptions())
+  const double sigma = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}),
+                                           kLeast_px / camera.fx, RelativePoseOptions())
                            .sigma;
   return sigma * camera.fx;
 }

@@ -5,11 +5,11 @@
 ///
 /// Idea: under the right focal length one rotation carries all far points from one frame to another; under a wrong one
 /// those at the border of the image are left behind. So each pair of frames that the camera turned between is explained
-/// by a robust rotation under a grid of focal lengths, and the one with the smallest residuals over all pairs wins. A flight does not
-/// qualify: its flow is no rotation under any focal length.
+/// by a robust rotation under a grid of focal lengths, and the one with the smallest residuals over all pairs wins. A
+/// flight does not qualify: its flow is no rotation under any focal length.
 ///
-/// Laws (each a test): points seen by a turning camera give its focal length from a guess that is off by a factor of two;
-/// a camera that flies past points leaves it unknown.
+/// Laws (each a test): points seen by a turning camera give its focal length from a guess that is off by a factor of
+/// two; a camera that flies past points leaves it unknown.
 ///
 /// Cost: 2 ms a frame on top of the tracker. Not thread-safe.
 
@@ -55,7 +55,7 @@ public:
 private:
   PinholeCamera m_guess;
   FocalOptions m_options;
-  int m_frames = 0, m_moved = 0; ///< frames seen; pairs with flow enough
+  int m_frames = 0, m_moved = 0;             ///< frames seen; pairs with flow enough
   std::vector<std::vector<double>> m_curves; ///< log residual over the focal length, of the pairs that are rotations
 };
 } // namespace bole

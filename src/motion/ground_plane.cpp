@@ -19,8 +19,8 @@ struct Height
   double value, variance;
 };
 
-double weightedMean(const std::vector<Height> &heights, double centre, double gate,
-                    double roughness2, double &variance, int &used)
+double weightedMean(const std::vector<Height> &heights, double centre, double gate, double roughness2, double &variance,
+                    int &used)
 {
   double sum = 0, weights = 0;
   used = 0;
@@ -41,8 +41,8 @@ double weightedMean(const std::vector<Height> &heights, double centre, double ga
 void GroundOptions::validate() const
 {
   using motion::require;
-  require(min_depression_deg >= 1 && min_depression_deg <= 80, "ground.min_depression_deg",
-          min_depression_deg, "in 1 .. 80");
+  require(min_depression_deg >= 1 && min_depression_deg <= 80, "ground.min_depression_deg", min_depression_deg,
+          "in 1 .. 80");
   require(max_relative_sigma > 0, "ground.max_relative_sigma", max_relative_sigma, "above 0");
   require(up_sigma_deg > 0, "ground.up_sigma_deg", up_sigma_deg, "above 0");
   require(roughness > 0, "ground.roughness", roughness, "above 0");
@@ -76,8 +76,8 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
     const double roughness = options.roughness * candidate.value;
     double support = 0;
     for (const Height &h : heights) {
-      const double u2 = (h.value - candidate.value) * (h.value - candidate.value) /
-                        (h.variance + roughness * roughness);
+      const double u2 =
+          (h.value - candidate.value) * (h.value - candidate.value) / (h.variance + roughness * roughness);
       support += std::exp(-0.5 * u2);
     }
     if (support > best_support) {
@@ -139,7 +139,6 @@ double ScaleFromHeight::relativeSigma() const
   }
   const double excess = std::max(1.0, spread / double(m_logs.size()));
   constexpr double kShared = 0.07;
-  return std::sqrt(std::min<double>(10, double(m_logs.size())) * excess / weights +
-                   kShared * kShared);
+  return std::sqrt(std::min<double>(10, double(m_logs.size())) * excess / weights + kShared * kShared);
 }
 } // namespace bole

@@ -12,8 +12,7 @@ namespace bole
 namespace
 {
 /// Rate at a stamp: linear between the samples around it, held before the first and after the last.
-Eigen::Vector3d rateAt(const std::vector<GyroSample> &samples, std::size_t next,
-                       std::int64_t stamp_ns)
+Eigen::Vector3d rateAt(const std::vector<GyroSample> &samples, std::size_t next, std::int64_t stamp_ns)
 {
   if (next == 0) {
     return samples.front().rate;
@@ -56,8 +55,7 @@ void GyroOptions::validate() const
 
 GyroBias GyroBias::unknown(const GyroOptions &options)
 {
-  return {Eigen::Vector3d::Zero(),
-          options.bias_sigma * options.bias_sigma * Eigen::Matrix3d::Identity()};
+  return {Eigen::Vector3d::Zero(), options.bias_sigma * options.bias_sigma * Eigen::Matrix3d::Identity()};
 }
 
 GyroRotation GyroRotation::then(const GyroRotation &next) const
@@ -70,26 +68,23 @@ GyroRotation GyroRotation::then(const GyroRotation &next) const
   const double scale = duration + next.duration;
   both.bias = duration > next.duration
                   ? Eigen::Matrix3d(bias * (scale * scale / std::max(1e-18, duration * duration)))
-                  : Eigen::Matrix3d(next.bias * (scale * scale /
-                                                 std::max(1e-18, next.duration * next.duration)));
+                  : Eigen::Matrix3d(next.bias * (scale * scale / std::max(1e-18, next.duration * next.duration)));
   both.complete = complete && next.complete;
   return both;
 }
 
-GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns,
-                           std::int64_t to_ns, const GyroBias &bias, const GyroOptions &options)
+GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::int64_t to_ns,
+                           const GyroBias &bias, const GyroOptions &options)
 {
   GyroRotation result;
   result.duration = 1e-9 * double(to_ns - from_ns);
   const double dt_all = result.duration;
   const double gap = samples.empty() ? dt_all : longestGap(samples, from_ns, to_ns);
   result.complete = !samples.empty() && gap <= options.max_gap;
-  result.white =
-      options.noise_density * options.noise_density * dt_all * Eigen::Matrix3d::Identity();
+  result.white = options.noise_density * options.noise_density * dt_all * Eigen::Matrix3d::Identity();
   result.bias = bias.covariance * dt_all * dt_all;
   if (!result.complete) {
-    result.white +=
-        options.gap_rate_sigma * options.gap_rate_sigma * gap * gap * Eigen::Matrix3d::Identity();
+    result.white += options.gap_rate_sigma * options.gap_rate_sigma * gap * gap * Eigen::Matrix3d::Identity();
   }
   if (samples.empty()) {
     return result;
@@ -100,8 +95,7 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   }
   std::int64_t stamp = from_ns;
   while (stamp < to_ns) {
-    const std::int64_t end =
-        next < samples.size() ? std::min(samples[next].stamp_ns, to_ns) : to_ns;
+    const std::int64_t end = next < samples.size() ? std::min(samples[next].stamp_ns, to_ns) : to_ns;
     const Eigen::Vector3d rate = 0.5 * (rateAt(samples, next, stamp) + rateAt(samples, next, end));
     result.R = result.R * expSo3((rate - bias.mean) * (1e-9 * double(end - stamp)));
     stamp = end;
@@ -119,14 +113,13 @@ GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen
   // the bias.
   const Eigen::Vector3d phi = logSo3(prior.R.transpose() * R);
   const Eigen::Matrix3d prior_covariance = prior.covariance();
-  const Eigen::Matrix3d gain = -prior.duration * bias.covariance *
-                               prior_covariance.ldlt().solve(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d gain =
+      -prior.duration * bias.covariance * prior_covariance.ldlt().solve(Eigen::Matrix3d::Identity());
   GyroBias refined;
   refined.mean = bias.mean + gain * phi;
   refined.covariance = bias.covariance - gain * (prior_covariance - covariance) * gain.transpose();
   refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
-  refined.covariance +=
-      options.bias_walk * options.bias_walk * prior.duration * Eigen::Matrix3d::Identity();
+  refined.covariance += options.bias_walk * options.bias_walk * prior.duration * Eigen::Matrix3d::Identity();
   return refined;
 }
 } // namespace bole

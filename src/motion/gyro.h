@@ -52,11 +52,10 @@ struct GyroBias
 struct GyroRotation
 {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d white =
-      Eigen::Matrix3d::Zero(); ///< covariance by the white noise and by gaps [rad^2]
-  Eigen::Matrix3d bias = Eigen::Matrix3d::Zero(); ///< covariance by the uncertain bias [rad^2]
-  double duration = 0;                            ///< [s]
-  bool complete = false;                          ///< samples covered the interval without a gap
+  Eigen::Matrix3d white = Eigen::Matrix3d::Zero(); ///< covariance by the white noise and by gaps [rad^2]
+  Eigen::Matrix3d bias = Eigen::Matrix3d::Zero();  ///< covariance by the uncertain bias [rad^2]
+  double duration = 0;                             ///< [s]
+  bool complete = false;                           ///< samples covered the interval without a gap
 
   Eigen::Matrix3d covariance() const { return white + bias; }
   /// This interval followed by the next one, under the same bias.
@@ -66,9 +65,8 @@ struct GyroRotation
 /// Integrates \p samples (oldest first; those outside of the interval only help its ends) from \p
 /// from_ns to \p to_ns, rates less the bias, linear between samples, held at the ends. Without any
 /// sample: identity, not complete, with the covariance of a gap. Cost: 0.1 us a sample.
-GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns,
-                           std::int64_t to_ns, const GyroBias &bias = {},
-                           const GyroOptions &options = {});
+GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::int64_t to_ns,
+                           const GyroBias &bias = {}, const GyroOptions &options = {});
 
 /// Bias after the rotation \p prior was refined to \p R with the covariance \p covariance [rad^2],
 /// the prior having been used in the refinement (a conditional Gaussian: exact to first order).

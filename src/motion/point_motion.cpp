@@ -13,18 +13,14 @@ void PointMotionOptions::validate() const
   relative_pose.validate();
   gyro.validate();
   for (int back : frames_back) {
-    motion::require(back >= 1 && back < points.history, "motion.frames_back", back,
-                    "in 1 .. points.history - 1");
+    motion::require(back >= 1 && back < points.history, "motion.frames_back", back, "in 1 .. points.history - 1");
   }
   motion::require(odometry_walk > 0, "motion.odometry_walk", odometry_walk, "above 0");
-  motion::require(odometry_height_sigma > 0, "motion.odometry_height_sigma", odometry_height_sigma,
-                  "above 0");
-  motion::require(odometry_relative_sigma > 0, "motion.odometry_relative_sigma",
-                  odometry_relative_sigma, "above 0");
+  motion::require(odometry_height_sigma > 0, "motion.odometry_height_sigma", odometry_height_sigma, "above 0");
+  motion::require(odometry_relative_sigma > 0, "motion.odometry_relative_sigma", odometry_relative_sigma, "above 0");
 }
 
-PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc,
-                         const PointMotionOptions &options)
+PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc, const PointMotionOptions &options)
     : m_camera(camera), m_bMc(bMc), m_options(options), m_tracker(camera, options.points)
 {
   options.validate();
@@ -47,8 +43,7 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
     }
   }
   m_tracker.track(frame.image, expected);
-  m_seen.push_back(
-      {frame.stamp_ns, frame.index, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
+  m_seen.push_back({frame.stamp_ns, frame.index, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
   if (m_seen.size() > static_cast<std::size_t>(m_options.points.history)) {
     m_seen.pop_front();
   }
@@ -64,10 +59,9 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
     }
   }
   if (!motions.empty()) {
-    learnBias(*std::max_element(motions.begin(), motions.end(),
-                                [](const RelativeMotion &x, const RelativeMotion &y) {
-                                  return x.frames_back < y.frames_back;
-                                }));
+    learnBias(*std::max_element(motions.begin(), motions.end(), [](const RelativeMotion &x, const RelativeMotion &y) {
+      return x.frames_back < y.frames_back;
+    }));
   }
   return motions;
 }
@@ -99,29 +93,24 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
     const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
     step.odometry = (wMa.inverse() * wMb).t;
     prior.translation = step.odometry;
-    const double walk2 =
-        m_options.odometry_walk * m_options.odometry_walk * 1e-9 * double(b.stamp_ns - a.stamp_ns);
+    const double walk2 = m_options.odometry_walk * m_options.odometry_walk * 1e-9 * double(b.stamp_ns - a.stamp_ns);
     const double height2 = m_options.odometry_height_sigma * m_options.odometry_height_sigma;
     const Eigen::Matrix3d world = Eigen::Vector3d(walk2, walk2, height2).asDiagonal();
     const double relative = m_options.odometry_relative_sigma * step.odometry->norm();
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
   }
-  step.estimate = estimateRelativePose(m_tracker.matches(frames_back), m_camera, prior,
-                                       m_options.relative_pose);
+  step.estimate = estimateRelativePose(m_tracker.matches(frames_back), m_camera, prior, m_options.relative_pose);
   return step;
 }
 
 void PointMotion::learnBias(const RelativeMotion &step)
 {
-  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() ||
-      step.a_ns < m_bias_until_ns) {
+  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns) {
     return;
   }
-  m_bias =
-      refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
-                 m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(),
-                 m_options.gyro);
+  m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
+                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(), m_options.gyro);
   m_bias_until_ns = step.b_ns;
 }
 } // namespace bole

@@ -56,9 +56,8 @@ struct RelativeMotion
   std::int64_t a_ns = 0, b_ns = 0;
   std::size_t a_index = 0, b_index = 0; ///< Frame::index
   RelativePoseEstimate estimate;
-  std::optional<GyroRotation> gyro; ///< of the body, the prior that was used
-  std::optional<Eigen::Vector3d>
-      odometry; ///< aMb's translation by the pose filter, camera axes [m]
+  std::optional<GyroRotation> gyro;        ///< of the body, the prior that was used
+  std::optional<Eigen::Vector3d> odometry; ///< aMb's translation by the pose filter, camera axes [m]
 };
 
 class PointMotion

@@ -52,8 +52,7 @@ struct Record
 };
 
 constexpr double kDegree = M_PI / 180;
-constexpr double kHeldSigma =
-    1.0; // of a translation that was not seen, in units of the first baseline
+constexpr double kHeldSigma = 1.0; // of a translation that was not seen, in units of the first baseline
 // Prior on an unseen depth, in typical inverse depths. Wide: at twice the typical one it pulled far
 // points nearer and the unit of length drifted by 40 % over pine-arc, at ten times by 2 %.
 constexpr double kDepthPrior = 10;
@@ -109,25 +108,21 @@ const char *toString(PointOdometryStatus status)
 void PointOdometryOptions::validate() const
 {
   using motion::require;
-  require(key_frames >= 3 && key_frames <= 30, "point_odometry.key_frames", key_frames,
-          "in 3 .. 30");
-  require(held_key_frames >= 2 && held_key_frames < key_frames, "point_odometry.held_key_frames",
-          held_key_frames, "in 2 .. key_frames - 1");
+  require(key_frames >= 3 && key_frames <= 30, "point_odometry.key_frames", key_frames, "in 3 .. 30");
+  require(held_key_frames >= 2 && held_key_frames < key_frames, "point_odometry.held_key_frames", held_key_frames,
+          "in 2 .. key_frames - 1");
   require(key_parallax_deg > 0, "point_odometry.key_parallax_deg", key_parallax_deg, "above 0");
   require(key_shared >= 0 && key_shared <= 1, "point_odometry.key_shared", key_shared, "in 0 .. 1");
-  require(start_parallax_deg > 0, "point_odometry.start_parallax_deg", start_parallax_deg,
-          "above 0");
+  require(start_parallax_deg > 0, "point_odometry.start_parallax_deg", start_parallax_deg, "above 0");
   require(start_sigma_deg > 0, "point_odometry.start_sigma_deg", start_sigma_deg, "above 0");
   require(min_points >= 6, "point_odometry.min_points", min_points, "6 or more");
-  require(iterations >= 1 && iterations <= 100, "point_odometry.iterations", iterations,
-          "in 1 .. 100");
+  require(iterations >= 1 && iterations <= 100, "point_odometry.iterations", iterations, "in 1 .. 100");
   require(min_sigma_px > 0, "point_odometry.min_sigma_px", min_sigma_px, "above 0");
   require(inflation >= 1, "point_odometry.inflation", inflation, "1 or more");
   relative_pose.validate();
 }
 
-PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options)
-    : m_state(new State)
+PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options) : m_state(new State)
 {
   options.validate();
   m_state->camera = camera;
@@ -146,8 +141,7 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int
   for (const PointTrack &track : tracker.tracks()) {
     state.seen[track.id] = state.camera.ray(track.current()).head<2>();
   }
-  if (turned && (state.turned || state.records.empty() ||
-                 state.window.back().frame + 1 == state.records.size())) {
+  if (turned && (state.turned || state.records.empty() || state.window.back().frame + 1 == state.records.size())) {
     state.turned = state.turned ? state.turned->then(*turned) : *turned;
   }
   else {
@@ -159,8 +153,7 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int
   if (turned) {
     state.velocity.R = turned->R;
   }
-  PointOdometryResult result =
-      state.started ? state.place(turned.has_value()) : state.begin(tracker);
+  PointOdometryResult result = state.started ? state.place(turned.has_value()) : state.begin(tracker);
   result.wMc = state.wMc;
   result.previousMc = before.inverse() * state.wMc;
   if (state.started && result.status == PointOdometryStatus::ok) {
@@ -203,14 +196,12 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   const auto estimate = estimateRelativePose(matches, camera, prior, options.relative_pose);
   const double wanted_px = options.start_parallax_deg * kDegree * focal();
   const bool translates =
-      options.focal_known ||
-      unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
+      options.focal_known || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
   if (!translates && matches.size() >= 6) {
     // What looks like a flight past a wall is taken for a pan.
-    wMc.R = window.front().wMc.R *
-            motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
-                                options.min_sigma_px / focal(), options.relative_pose)
-                .aRb;
+    wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
+                                                       options.min_sigma_px / focal(), options.relative_pose)
+                                       .aRb;
   }
   else if (estimate.hasRotation()) {
     wMc.R = window.front().wMc.R * estimate.aRb;
@@ -220,19 +211,16 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   result.covariance.topLeftCorner<3, 3>() = kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
   result.covariance.bottomRightCorner<3, 3>() = estimate.covariance.topLeftCorner<3, 3>();
   result.sigma_px = estimate.sigma_px;
-  const double direction_sigma =
-      std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
-  if (translates && estimate.hasDirection() &&
-      direction_sigma < options.start_sigma_deg * kDegree && estimate.parallax_px > wanted_px &&
-      start(tracker, estimate, back)) {
+  const double direction_sigma = std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
+  if (translates && estimate.hasDirection() && direction_sigma < options.start_sigma_deg * kDegree &&
+      estimate.parallax_px > wanted_px && start(tracker, estimate, back)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
     result.key_frame = true;
     return result;
   }
   // Too little is left of what the first key frame saw: go on from here.
-  if (matches.size() <
-      static_cast<std::size_t>(std::max(2 * options.relative_pose.min_matches, 30))) {
+  if (matches.size() < static_cast<std::size_t>(std::max(2 * options.relative_pose.min_matches, 30))) {
     restart();
   }
   return result;
@@ -248,15 +236,14 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
     other.fx *= factor;
     other.fy *= factor;
     const double pixel = 1 / (factor * focal());
-    const auto fit = motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}),
-                                         0.05 * pixel, options.relative_pose);
+    const auto fit =
+        motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel, options.relative_pose);
     least = std::min(least, fit.sigma / pixel);
   }
   return least;
 }
 
-bool PointOdometry::State::start(const PointTracker &tracker, const RelativePoseEstimate &first,
-                                 int back)
+bool PointOdometry::State::start(const PointTracker &tracker, const RelativePoseEstimate &first, int back)
 {
   const KeyFrame &origin = window.front();
   wMc = origin.wMc * Pose(first.aRb, first.direction);
@@ -270,8 +257,7 @@ bool PointOdometry::State::start(const PointTracker &tracker, const RelativePose
     double q = 0.05;
     for (int iteration = 0; iteration < 5; ++iteration) {
       Eigen::Vector2d J;
-      const Eigen::Vector2d e =
-          motion::reprojection(origin.wMc, wMc, xy_a, q, found->second, nullptr, nullptr, &J);
+      const Eigen::Vector2d e = motion::reprojection(origin.wMc, wMc, xy_a, q, found->second, nullptr, nullptr, &J);
       q -= J.dot(e) / (J.squaredNorm() + 1e-12);
     }
     landmarks[id] = {origin.frame, xy_a, std::max(q, 0.0), 0, 0};
@@ -333,13 +319,11 @@ bool PointOdometry::State::start(const PointTracker &tracker, const RelativePose
   return true;
 }
 
-void PointOdometry::State::assemble(std::vector<BundleFrame> &frames,
-                                    std::vector<BundlePoint> &points,
+void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                                     std::vector<std::uint64_t> &ids) const
 {
   std::map<std::size_t, int> index;
-  const int held =
-      window.size() <= 3 ? 1 : std::min<int>(options.held_key_frames, int(window.size()) - 2);
+  const int held = window.size() <= 3 ? 1 : std::min<int>(options.held_key_frames, int(window.size()) - 2);
   for (const KeyFrame &key : window) {
     BundleFrame frame;
     frame.wMc = key.wMc;
@@ -368,8 +352,7 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames,
     point.xy = landmark.xy;
     point.inverse_depth = landmark.inverse_depth;
     point.prior = typical;
-    point.prior_information =
-        1 / (kDepthPrior * kDepthPrior * typical * typical + kRestSigma * kRestSigma);
+    point.prior_information = 1 / (kDepthPrior * kDepthPrior * typical * typical + kRestSigma * kRestSigma);
     for (std::size_t k = 0; k < window.size(); ++k) {
       if (static_cast<int>(k) == point.anchor) {
         continue;
@@ -390,8 +373,7 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames,
   }
 }
 
-void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames,
-                                       const std::vector<BundlePoint> &points,
+void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points,
                                        const std::vector<std::uint64_t> &ids)
 {
   for (std::size_t k = 0; k < window.size(); ++k) {
@@ -409,8 +391,8 @@ void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames,
     for (const auto &observation : points[k].seen) {
       good += observation.weight > 0.4;
     }
-    const bool bad = good < 0.5 * double(points[k].seen.size()) ||
-                     points[k].inverse_depth * std::sqrt(points[k].information) < -4;
+    const bool bad =
+        good < 0.5 * double(points[k].seen.size()) || points[k].inverse_depth * std::sqrt(points[k].information) < -4;
     landmark.misses = bad ? landmark.misses + 1 : 0;
   }
   for (auto landmark = landmarks.begin(); landmark != landmarks.end();) {
@@ -454,12 +436,10 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     sigma = 0.9 * sigma + 0.1 * solved.sigma;
     disassemble(frames, points, ids);
     result.points = known();
-    result.status = result.points >= options.min_points ? PointOdometryStatus::ok
-                                                        : PointOdometryStatus::rotation_only;
+    result.status = result.points >= options.min_points ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
     result.covariance = options.inflation * solved.last_covariance;
     if (result.status == PointOdometryStatus::rotation_only) {
-      result.covariance.topLeftCorner<3, 3>() +=
-          kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
+      result.covariance.topLeftCorner<3, 3>() += kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
     }
   }
   else {
@@ -511,16 +491,14 @@ void PointOdometry::State::dropOldest()
       ++it;
       continue;
     }
-    const auto next =
-        std::find_if(window.begin(), window.end(),
-                     [id = it->first](const KeyFrame &key) { return key.seen.count(id) > 0; });
+    const auto next = std::find_if(window.begin(), window.end(),
+                                   [id = it->first](const KeyFrame &key) { return key.seen.count(id) > 0; });
     if (next == window.end()) {
       it = landmarks.erase(it);
       continue;
     }
-    const Eigen::Vector3d y =
-        next->wMc.R.transpose() * (oldest.wMc.R * landmark.xy.homogeneous() +
-                                   landmark.inverse_depth * (oldest.wMc.t - next->wMc.t));
+    const Eigen::Vector3d y = next->wMc.R.transpose() * (oldest.wMc.R * landmark.xy.homogeneous() +
+                                                         landmark.inverse_depth * (oldest.wMc.t - next->wMc.t));
     if (y.z() < 0.05) {
       it = landmarks.erase(it);
       continue;
@@ -546,8 +524,7 @@ int PointOdometry::State::known() const
 {
   int n = 0;
   for (const auto &[id, landmark] : landmarks) {
-    n += seen.count(id) > 0 && landmark.information > 0 &&
-         landmark.inverse_depth * std::sqrt(landmark.information) > 4;
+    n += seen.count(id) > 0 && landmark.information > 0 && landmark.inverse_depth * std::sqrt(landmark.information) > 4;
   }
   return n;
 }
@@ -581,8 +558,7 @@ std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
   for (const auto &[id, landmark] : m_state->landmarks) {
     const auto seen = m_state->seen.find(id);
     const auto anchor = m_state->key_poses.find(landmark.anchor);
-    if (seen == m_state->seen.end() || anchor == m_state->key_poses.end() ||
-        landmark.information <= 0) {
+    if (seen == m_state->seen.end() || anchor == m_state->key_poses.end() || landmark.information <= 0) {
       continue;
     }
     const Pose cMa = m_state->wMc.inverse() * anchor->second;
@@ -593,12 +569,10 @@ std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
     const double sigma = 1 / std::sqrt(landmark.information) / y.z();
     const double inverse_depth = landmark.inverse_depth / y.z();
     if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma) {
-      depths.push_back(
-          {m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
+      depths.push_back({m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
     }
   }
-  std::sort(depths.begin(), depths.end(),
-            [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });
+  std::sort(depths.begin(), depths.end(), [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });
   return depths;
 }
 } // namespace bole

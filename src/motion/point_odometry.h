@@ -17,10 +17,10 @@
 ///
 /// Cost: about 1.3 ms a frame with 150 points (benchmark_motion). Not thread-safe.
 
-#include <bole/pose.h>
 #include "motion/gyro.h"
 #include "motion/point_tracker.h"
 #include "motion/relative_pose.h"
+#include <bole/pose.h>
 
 #include <memory>
 #include <vector>
@@ -32,10 +32,9 @@ struct PointOdometryOptions
   int key_frames = 8;            ///< of the window, 3 .. 30
   int held_key_frames = 3;       ///< oldest of them, not moved any more, 2 .. key_frames - 1
   double key_parallax_deg = 1.2; ///< median flow without rotation that makes a new key frame, > 0
-  double key_shared =
-      0.5; ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
+  double key_shared = 0.5;       ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
   double start_parallax_deg = 1; ///< of the first baseline, > 0
-  double start_sigma_deg = 3; ///< the first baseline's direction must be known as well as this, > 0
+  double start_sigma_deg = 3;    ///< the first baseline's direction must be known as well as this, > 0
   /// False where the focal length is a guess: a pan past a wall then looks like a sideways flight,
   /// so a start also needs flow that no rotation explains under any focal length from 0.7 to 3
   /// times the guess.

@@ -41,14 +41,8 @@ Eigen::Vector2d toEigen(const cv::Point2f &p) { return {double(p.x), double(p.y)
 class Occupancy
 {
 public:
-  Occupancy(const cv::Size &size, double distance)
-      : m_mask(size, CV_8U, cv::Scalar(0)), m_distance(distance)
-  {
-  }
-  void add(const cv::Point2f &p)
-  {
-    cv::circle(m_mask, p, cvRound(m_distance), cv::Scalar(1), cv::FILLED);
-  }
+  Occupancy(const cv::Size &size, double distance) : m_mask(size, CV_8U, cv::Scalar(0)), m_distance(distance) {}
+  void add(const cv::Point2f &p) { cv::circle(m_mask, p, cvRound(m_distance), cv::Scalar(1), cv::FILLED); }
   bool taken(const cv::Point &p) const { return m_mask.at<unsigned char>(p) != 0; }
 
 private:
@@ -70,10 +64,8 @@ Eigen::Vector2d refined(const cv::Mat &response, const cv::Point &at)
     return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
   };
   const float middle = response.at<float>(at);
-  return {
-      at.x + vertex(response.at<float>(at.y, at.x - 1), middle, response.at<float>(at.y, at.x + 1)),
-      at.y +
-          vertex(response.at<float>(at.y - 1, at.x), middle, response.at<float>(at.y + 1, at.x))};
+  return {at.x + vertex(response.at<float>(at.y, at.x - 1), middle, response.at<float>(at.y, at.x + 1)),
+          at.y + vertex(response.at<float>(at.y - 1, at.x), middle, response.at<float>(at.y + 1, at.x))};
 }
 } // namespace
 
@@ -86,8 +78,7 @@ void PointOptions::validate() const
   require(min_distance_px >= 1, "points.min_distance_px", min_distance_px, "1 or more");
   require(quality >= 0 && quality <= 1, "points.quality", quality, "in 0 .. 1");
   require(min_response >= 0, "points.min_response", min_response, "0 or more");
-  require(window_px >= 5 && window_px <= 51 && window_px % 2 == 1, "points.window_px", window_px,
-          "odd and in 5 .. 51");
+  require(window_px >= 5 && window_px <= 51 && window_px % 2 == 1, "points.window_px", window_px, "odd and in 5 .. 51");
   require(levels >= 0 && levels <= 6, "points.levels", levels, "in 0 .. 6");
   require(iterations >= 1 && iterations <= 100, "points.iterations", iterations, "in 1 .. 100");
   require(max_backward_px > 0, "points.max_backward_px", max_backward_px, "above 0");
@@ -95,8 +86,7 @@ void PointOptions::validate() const
   require(history >= 2 && history <= 1000, "points.history", history, "in 2 .. 1000");
 }
 
-PointTracker::PointTracker(const PinholeCamera &camera, const PointOptions &options)
-    : m_state(new State)
+PointTracker::PointTracker(const PinholeCamera &camera, const PointOptions &options) : m_state(new State)
 {
   options.validate();
   m_state->camera = camera;
@@ -111,14 +101,13 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
   const cv::Mat current = wrap(image);
   if (current.cols != m_state->camera.width || current.rows != m_state->camera.height) {
     throw vpException(vpException::dimensionError,
-                      fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols,
-                                  current.rows, m_state->camera.width, m_state->camera.height));
+                      fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
+                                  m_state->camera.width, m_state->camera.height));
   }
   const PointOptions &options = m_state->options;
   std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(current, pyramid, cv::Size(options.window_px, options.window_px),
-                              options.levels, true, cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT,
-                              false);
+  cv::buildOpticalFlowPyramid(current, pyramid, cv::Size(options.window_px, options.window_px), options.levels, true,
+                              cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
     m_state->follow(pyramid, aRb);
   }
@@ -137,8 +126,7 @@ void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::
     to[i] = turned.z() > 0.1 ? toCv(camera.project(turned)) : from[i];
   }
   const cv::Size window(options.window_px, options.window_px);
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options.iterations,
-                              0.01);
+  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options.iterations, 0.01);
   std::vector<unsigned char> found, found_back;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(pyramid, next, from, to, found, error, window, options.levels, stop,
@@ -146,8 +134,8 @@ void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::
   // Back again from where it arrived, started at where it came from: one level settles whether it
   // is the same corner.
   back = from;
-  cv::calcOpticalFlowPyrLK(next, pyramid, to, back, found_back, error, window,
-                           std::min(1, options.levels), stop, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  cv::calcOpticalFlowPyrLK(next, pyramid, to, back, found_back, error, window, std::min(1, options.levels), stop,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   std::vector<PointTrack> kept;
   kept.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -201,8 +189,7 @@ void PointTracker::State::replenish(const cv::Mat &image)
     }
   }
   for (auto &cell : corners) {
-    std::sort(cell.begin(), cell.end(),
-              [](const Corner &a, const Corner &b) { return a.response < b.response; });
+    std::sort(cell.begin(), cell.end(), [](const Corner &a, const Corner &b) { return a.response < b.response; });
   }
   // Fill the emptiest cells first, one corner a cell and round.
   for (int level = 0; missing > 0; ++level) {

@@ -23,15 +23,13 @@ using motion::RotationFit;
 constexpr double kSharedError = 0.1;
 constexpr double kUnknownDirection = 1e2; // variance of a direction that nobody has seen [rad^2]
 
-void takePrior(RelativePoseEstimate &estimate, const RelativePosePrior &given,
-               const MotionPrior &prior)
+void takePrior(RelativePoseEstimate &estimate, const RelativePosePrior &given, const MotionPrior &prior)
 {
   estimate.aRb = prior.aRb;
   estimate.direction = prior.direction;
   estimate.covariance.setZero();
   estimate.covariance.topLeftCorner<3, 3>() =
-      prior.has_rotation ? given.rotation_covariance
-                         : Eigen::Matrix3d(10 * Eigen::Matrix3d::Identity());
+      prior.has_rotation ? given.rotation_covariance : Eigen::Matrix3d(10 * Eigen::Matrix3d::Identity());
   estimate.covariance.bottomRightCorner<2, 2>() =
       (prior.direction_information > 0 ? 1 / prior.direction_information : kUnknownDirection) *
       Eigen::Matrix2d::Identity();
@@ -40,8 +38,7 @@ void takePrior(RelativePoseEstimate &estimate, const RelativePosePrior &given,
 void takeRotation(RelativePoseEstimate &estimate, const RotationFit &fit)
 {
   estimate.aRb = fit.aRb;
-  estimate.covariance.topLeftCorner<3, 3>() =
-      fit.information.ldlt().solve(Eigen::Matrix3d::Identity());
+  estimate.covariance.topLeftCorner<3, 3>() = fit.information.ldlt().solve(Eigen::Matrix3d::Identity());
   estimate.weights = fit.weights;
 }
 
@@ -63,9 +60,8 @@ Matrix5d covarianceOf(const JointFit &fit, const MotionPrior &prior, double rati
 
 /// Best of the fits from all starts, signs of the directions settled by the depths; and whether
 /// another is as good.
-JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const MotionPrior &prior,
-                 double sigma, double min_sigma, const RelativePoseOptions &options,
-                 bool &ambiguous)
+JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const MotionPrior &prior, double sigma,
+                 double min_sigma, const RelativePoseOptions &options, bool &ambiguous)
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
@@ -75,16 +71,13 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
     fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
   }
   // Costs count in sigmas of the best fit's noise.
-  const auto best =
-      std::min_element(fits.begin(), fits.end(), [](const JointFit &x, const JointFit &y) {
-        return x.cost * x.sigma * x.sigma < y.cost * y.sigma * y.sigma;
-      });
+  const auto best = std::min_element(fits.begin(), fits.end(), [](const JointFit &x, const JointFit &y) {
+    return x.cost * x.sigma * x.sigma < y.cost * y.sigma * y.sigma;
+  });
   ambiguous = false;
   for (const JointFit &fit : fits) {
-    const double angle =
-        std::acos(std::clamp(std::abs(fit.motion.direction.dot(best->motion.direction)), 0.0, 1.0));
-    const double excess =
-        fit.cost * fit.sigma * fit.sigma / (best->sigma * best->sigma) - best->cost;
+    const double angle = std::acos(std::clamp(std::abs(fit.motion.direction.dot(best->motion.direction)), 0.0, 1.0));
+    const double excess = fit.cost * fit.sigma * fit.sigma / (best->sigma * best->sigma) - best->cost;
     const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, options.kernel);
     ambiguous = ambiguous || (angle > 0.2 && excess < 4 && std::abs(parallax.score) > 3);
   }
@@ -114,22 +107,16 @@ void RelativePoseOptions::validate() const
   using motion::require;
   require(min_matches >= 6, "relative_pose.min_matches", min_matches, "6 or more");
   require(min_sigma_px > 0, "relative_pose.min_sigma_px", min_sigma_px, "above 0");
-  require(max_sigma_px > min_sigma_px, "relative_pose.max_sigma_px", max_sigma_px,
-          "above min_sigma_px");
+  require(max_sigma_px > min_sigma_px, "relative_pose.max_sigma_px", max_sigma_px, "above min_sigma_px");
   require(kernel > 0, "relative_pose.kernel", kernel, "above 0");
-  require(iterations >= 1 && iterations <= 100, "relative_pose.iterations", iterations,
-          "in 1 .. 100");
-  require(hypotheses >= 1 && hypotheses <= 10000, "relative_pose.hypotheses", hypotheses,
-          "in 1 .. 10000");
-  require(min_parallax_ratio > 1, "relative_pose.min_parallax_ratio", min_parallax_ratio,
-          "above 1");
+  require(iterations >= 1 && iterations <= 100, "relative_pose.iterations", iterations, "in 1 .. 100");
+  require(hypotheses >= 1 && hypotheses <= 10000, "relative_pose.hypotheses", hypotheses, "in 1 .. 10000");
+  require(min_parallax_ratio > 1, "relative_pose.min_parallax_ratio", min_parallax_ratio, "above 1");
   require(inflation >= 1, "relative_pose.inflation", inflation, "1 or more");
 }
 
-RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches,
-                                          const PinholeCamera &camera,
-                                          const RelativePosePrior &given,
-                                          const RelativePoseOptions &options)
+RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
+                                          const RelativePosePrior &given, const RelativePoseOptions &options)
 {
   RelativePoseEstimate estimate;
   const MotionPrior prior(given);
@@ -164,8 +151,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
     takeRotation(estimate, motion::fitRotation(rays, prior, min_sigma, options));
     return estimate;
   }
-  estimate.status =
-      ambiguous && !prior.has_rotation ? RelativePoseStatus::ambiguous : RelativePoseStatus::ok;
+  estimate.status = ambiguous && !prior.has_rotation ? RelativePoseStatus::ambiguous : RelativePoseStatus::ok;
   estimate.aRb = fit.motion.aRb;
   estimate.direction = fit.motion.direction;
   estimate.covariance = covarianceOf(fit, prior, parallax.ratio, options.inflation);
@@ -175,8 +161,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
   const motion::Epipolar epipolar(fit.motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    estimate.weights[i] =
-        motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, options.kernel);
+    estimate.weights[i] = motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, options.kernel);
   }
   return estimate;
 }

@@ -24,10 +24,10 @@
 ///
 /// Cost: about 0.3 ms for 150 matches with a gyro, 1 ms without.
 
-#include <bole/camera.h>
 #include "geometry/direction.h"
-#include <bole/trunk.h>
 #include "motion/point_tracker.h"
+#include <bole/camera.h>
+#include <bole/trunk.h>
 
 #include <optional>
 #include <vector>
@@ -36,14 +36,13 @@ namespace bole
 {
 struct RelativePoseOptions
 {
-  int min_matches = 12;       ///< below it nothing is estimated, >= 6
-  double min_sigma_px = 0.05; ///< floor of the residual noise, > 0
-  double max_sigma_px = 1.5;  ///< above it the matches do not agree on one motion, > min_sigma_px
-  double kernel = 3;          ///< residuals lose half their weight near this many sigmas, > 0
-  int iterations = 12;        ///< of Gauss-Newton, 1 .. 100
-  int hypotheses = 48;        ///< two-point directions tried without a prior, 1 .. 10000
-  double min_parallax_ratio =
-      2; ///< variance of the flow along over across the epipolar lines for a translation, > 1
+  int min_matches = 12;          ///< below it nothing is estimated, >= 6
+  double min_sigma_px = 0.05;    ///< floor of the residual noise, > 0
+  double max_sigma_px = 1.5;     ///< above it the matches do not agree on one motion, > min_sigma_px
+  double kernel = 3;             ///< residuals lose half their weight near this many sigmas, > 0
+  int iterations = 12;           ///< of Gauss-Newton, 1 .. 100
+  int hypotheses = 48;           ///< two-point directions tried without a prior, 1 .. 10000
+  double min_parallax_ratio = 2; ///< variance of the flow along over across the epipolar lines for a translation, > 1
   /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent.
   /// Chosen so that the normalised error squared of the rendered flights is near its degrees of
   /// freedom.
@@ -57,9 +56,9 @@ struct RelativePoseOptions
 /// What is known before the matches are looked at.
 struct RelativePosePrior
 {
-  std::optional<Eigen::Matrix3d> aRb;                            ///< gyro
-  Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero(); ///< right tangent of aRb [rad^2]
-  std::optional<Eigen::Vector3d> translation; ///< pose filter: b's centre in a [m]
+  std::optional<Eigen::Matrix3d> aRb;                               ///< gyro
+  Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();    ///< right tangent of aRb [rad^2]
+  std::optional<Eigen::Vector3d> translation;                       ///< pose filter: b's centre in a [m]
   Eigen::Matrix3d translation_covariance = Eigen::Matrix3d::Zero(); ///< [m^2]
 };
 
@@ -85,22 +84,16 @@ struct RelativePoseEstimate
   double parallax_ratio = 0;                  ///< see RelativePoseOptions::min_parallax_ratio
   std::vector<double> weights;                ///< of the matches, 0 .. 1
 
-  bool hasRotation() const
-  {
-    return status == RelativePoseStatus::ok || status == RelativePoseStatus::no_parallax;
-  }
+  bool hasRotation() const { return status == RelativePoseStatus::ok || status == RelativePoseStatus::no_parallax; }
   bool hasDirection() const { return status == RelativePoseStatus::ok; }
 };
 
 /// Sampson's distance [normalised image units] of the match (x_a, x_b), both (x, y, 1), from the
 /// epipolar geometry of (aRb, direction). \p J 1x5 by (phi, tau), or nullptr.
-double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b,
-                       const Eigen::Matrix3d &aRb, const Eigen::Vector3d &direction,
-                       Eigen::Matrix<double, 1, 5> *J = nullptr);
+double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
+                       const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J = nullptr);
 
 /// The motion between the frames of \p matches. Never throws on data; see the status.
-RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches,
-                                          const PinholeCamera &camera,
-                                          const RelativePosePrior &prior = {},
-                                          const RelativePoseOptions &options = {});
+RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
+                                          const RelativePosePrior &prior = {}, const RelativePoseOptions &options = {});
 } // namespace bole

@@ -16,7 +16,7 @@ namespace
 {
 constexpr double kDegree = M_PI / 180;
 constexpr double kPriorSigma = 20 * kDegree;
-constexpr double kChance = 0.2;               ///< share of edges at random that agree with the best direction
+constexpr double kChance = 0.2; ///< share of edges at random that agree with the best direction
 
 struct Edge
 {
@@ -32,8 +32,8 @@ struct Edge
 
 /// One straight edge a patch, where there is one: its centre and gradient direction from the
 /// moments of the gradients.
-std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
-                            const Eigen::Vector3d &up, const VerticalOptions &options)
+std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, const Eigen::Vector3d &up,
+                            const VerticalOptions &options)
 {
   cv::Mat gx, gy;
   cv::Sobel(grey, gx, CV_32F, 1, 0, 3, 1.0 / 8 / 255);
@@ -55,8 +55,7 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
       }
       const double energy = xx + yy;
       const double coherence = std::hypot(xx - yy, 2 * xy) / std::max(1e-12, energy);
-      if (energy < options.cell_px * options.cell_px * options.min_gradient * options.min_gradient *
-                       0.5 ||
+      if (energy < options.cell_px * options.cell_px * options.min_gradient * options.min_gradient * 0.5 ||
           coherence < options.min_coherence) {
         continue;
       }
@@ -65,8 +64,8 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
       const Eigen::Vector2d along(-std::sin(angle), std::cos(angle));
       // The edge must point to the expected zenith to within the tilt.
       const Eigen::Vector3d ray = camera.ray(centre);
-      const Eigen::Vector2d zenith = Eigen::Vector2d(camera.fx * (up.x() - ray.x() * up.z()),
-                                                     camera.fy * (up.y() - ray.y() * up.z()));
+      const Eigen::Vector2d zenith =
+          Eigen::Vector2d(camera.fx * (up.x() - ray.x() * up.z()), camera.fy * (up.y() - ray.y() * up.z()));
       if (std::abs(along.dot(zenith)) < std::cos(options.max_tilt_deg * kDegree) * zenith.norm()) {
         continue;
       }
@@ -81,26 +80,21 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera,
 void VerticalOptions::validate() const
 {
   using motion::require;
-  require(max_tilt_deg >= 1 && max_tilt_deg <= 60, "vertical.max_tilt_deg", max_tilt_deg,
-          "in 1 .. 60");
+  require(max_tilt_deg >= 1 && max_tilt_deg <= 60, "vertical.max_tilt_deg", max_tilt_deg, "in 1 .. 60");
   require(min_gradient > 0, "vertical.min_gradient", min_gradient, "above 0");
   require(cell_px >= 4 && cell_px <= 64, "vertical.cell_px", cell_px, "in 4 .. 64");
-  require(min_coherence >= 0 && min_coherence <= 1, "vertical.min_coherence", min_coherence,
-          "in 0 .. 1");
+  require(min_coherence >= 0 && min_coherence <= 1, "vertical.min_coherence", min_coherence, "in 0 .. 1");
   require(sigma_deg > 0, "vertical.sigma_deg", sigma_deg, "above 0");
   require(min_edges >= 3, "vertical.min_edges", min_edges, "3 or more");
   require(inflation >= 1, "vertical.inflation", inflation, "1 or more");
 }
 
-VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image,
-                                      const PinholeCamera &camera,
-                                      const std::optional<Eigen::Vector3d> &expected_up,
-                                      const VerticalOptions &options)
+VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                                      const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
 {
   options.validate();
   VerticalEstimate estimate;
-  const Eigen::Vector3d expected =
-      expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
+  const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
   estimate.up = expected;
   estimate.covariance = kPriorSigma * kPriorSigma * Eigen::Matrix2d::Identity();
   const cv::Mat grey(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,

@@ -16,8 +16,8 @@
 ///
 /// Cost: about 0.4 ms at 320x240.
 
-#include <bole/camera.h>
 #include "geometry/direction.h"
+#include <bole/camera.h>
 
 #include <optional>
 #include <visp3/core/vpImage.h>
@@ -30,9 +30,9 @@ struct VerticalOptions
   double min_gradient = 0.03; ///< per pixel, grey 0 .. 1, > 0
   int cell_px = 12;           ///< side of the patches that vote, 4 .. 64
   double min_coherence = 0.6; ///< of the gradients of a patch, 0 .. 1: 1 is one straight edge
-  double sigma_deg = 1.5; ///< of the direction of a patch's edge (trunks lean, bark is rough), > 0
-  int min_edges = 12;     ///< patches, >= 3
-  double inflation = 4;   ///< of the covariance, >= 1: patches of one trunk share its lean
+  double sigma_deg = 1.5;     ///< of the direction of a patch's edge (trunks lean, bark is rough), > 0
+  int min_edges = 12;         ///< patches, >= 3
+  double inflation = 4;       ///< of the covariance, >= 1: patches of one trunk share its lean
 
   /// Throws vpException: "vertical.name = value, must be ...".
   void validate() const;
@@ -54,10 +54,9 @@ struct VerticalEstimate
 
 /// \param expected_up where up was last, or nullopt: the image is then taken to be upright within
 /// max_tilt_deg and the pitch near zero (prior of 20 degrees).
-VerticalEstimate
-gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                     const std::optional<Eigen::Vector3d> &expected_up = std::nullopt,
-                     const VerticalOptions &options = {});
+VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                                      const std::optional<Eigen::Vector3d> &expected_up = std::nullopt,
+                                      const VerticalOptions &options = {});
 
 /// Up in the frame w of a path, from many frames: directions \p up seen with \p covariance in the
 /// camera at \p wRc are averaged (robustly) as the flight goes on.

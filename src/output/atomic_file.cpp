@@ -17,8 +17,7 @@ namespace
 {
 [[noreturn]] void failWith(const std::string &path, const char *what)
 {
-  throw vpException(vpException::ioError,
-                    fmt::format("{}: {}: {}", path, what, std::strerror(errno)));
+  throw vpException(vpException::ioError, fmt::format("{}: {}: {}", path, what, std::strerror(errno)));
 }
 
 fs::path folderOf(const std::string &path)
@@ -41,13 +40,11 @@ bool flushToDisk(const std::string &path, int flags)
 AtomicFile::AtomicFile(std::string path) : m_path(std::move(path))
 {
   const fs::path target(m_path);
-  m_temporary = (folderOf(m_path) /
-                 fmt::format(".{}.partial{}", target.stem().string(), target.extension().string()))
-                    .string();
+  m_temporary =
+      (folderOf(m_path) / fmt::format(".{}.partial{}", target.stem().string(), target.extension().string())).string();
   if (fs::is_directory(target))
     throw vpException(vpException::ioError, fmt::format("{}: is a folder, must be a file", m_path));
-  const int descriptor =
-      ::open(m_temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  const int descriptor = ::open(m_temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0)
     failWith(m_path, "cannot be written");
   ::close(descriptor);

@@ -75,17 +75,18 @@ std::string ellipse(const Sheet &sheet, const TrunkRecord &trunk)
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(trunk.covariance_xy);
   const Eigen::Vector2d axes = 2 * eigen.eigenvalues().cwiseMax(0).cwiseSqrt() * kPixelsPerMetre;
   const Eigen::Vector2d major = eigen.eigenvectors().col(1);
-  return fmt::format("<ellipse cx=\"0\" cy=\"0\" rx=\"{:.1f}\" ry=\"{:.1f}\" transform=\"translate({:.1f} {:.1f}) "
-                     "rotate({:.1f})\" fill=\"#c0392b\" fill-opacity=\".15\" stroke=\"#c0392b\" stroke-opacity=\".6\"/>\n",
-                     axes(1), axes(0), sheet.x(trunk.xy.x()), sheet.y(trunk.xy.y()),
-                     -std::atan2(major.y(), major.x()) * 180 / M_PI);
+  return fmt::format(
+      "<ellipse cx=\"0\" cy=\"0\" rx=\"{:.1f}\" ry=\"{:.1f}\" transform=\"translate({:.1f} {:.1f}) "
+      "rotate({:.1f})\" fill=\"#c0392b\" fill-opacity=\".15\" stroke=\"#c0392b\" stroke-opacity=\".6\"/>\n",
+      axes(1), axes(0), sheet.x(trunk.xy.x()), sheet.y(trunk.xy.y()), -std::atan2(major.y(), major.x()) * 180 / M_PI);
 }
 
 std::string trunk(const Sheet &sheet, const TrunkRecord &record)
 {
   const double x = sheet.x(record.xy.x()), y = sheet.y(record.xy.y()), r = record.radius * kPixelsPerMetre;
   if (record.status == TrunkStatus::candidate)
-    return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#e0a800\"/>\n", x, y, r);
+    return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#e0a800\"/>\n", x, y,
+                       r);
   if (record.status != TrunkStatus::confirmed)
     return {};
   return ellipse(sheet, record) +
@@ -104,7 +105,8 @@ std::string escaped(const std::string &text)
 
 std::string legend(const MapPicture &picture)
 {
-  std::string text = fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", escaped(picture.title));
+  std::string text =
+      fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", escaped(picture.title));
   double y = 40;
   if (!picture.caption.empty()) {
     text += fmt::format("<text x=\"10\" y=\"{:.0f}\" fill=\"#222\">{}</text>\n", y, picture.caption);

@@ -16,8 +16,8 @@ namespace bole
 struct MapPicture
 {
   std::string title;
-  std::string caption;                 ///< under the title: where the metre and up come from
-  std::vector<TrunkRecord> trunks;     ///< confirmed: filled circle to scale with its 2-sigma ellipse; candidates: outline
+  std::string caption;             ///< under the title: where the metre and up come from
+  std::vector<TrunkRecord> trunks; ///< confirmed: filled circle to scale with its 2-sigma ellipse; candidates: outline
   Trajectory smoothed, online, odometry, truth;
   std::vector<TruthTrunk> truth_trunks; ///< within the frame of the picture
 };

@@ -53,7 +53,8 @@ std::vector<cv::Point2f> borderPoints(const OverlayTrunk &trunk, Border border, 
   return points;
 }
 
-void drawLine(cv::Mat &canvas, const std::vector<cv::Point2f> &points, const cv::Scalar &colour, int width, bool is_dashed)
+void drawLine(cv::Mat &canvas, const std::vector<cv::Point2f> &points, const cv::Scalar &colour, int width,
+              bool is_dashed)
 {
   constexpr int kShift = 4;
   const auto fixed = [](const cv::Point2f &p) {
@@ -149,7 +150,8 @@ cv::Mat coloured(const vpImage<float> &field, const cv::Size &size)
       const float p = large.at<float>(v, u);
       cv::Vec3f c(0, 0, 0);
       if (std::isfinite(p))
-        c = p < 0.5f ? low + (middle - low) * (2 * std::max(0.f, p)) : middle + (high - middle) * (2 * std::min(1.f, p) - 1);
+        c = p < 0.5f ? low + (middle - low) * (2 * std::max(0.f, p))
+                     : middle + (high - middle) * (2 * std::min(1.f, p) - 1);
       colours.at<cv::Vec4b>(v, u) = {cv::saturate_cast<unsigned char>(c[0]), cv::saturate_cast<unsigned char>(c[1]),
                                      cv::saturate_cast<unsigned char>(c[2]), 255};
     }

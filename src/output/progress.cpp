@@ -8,8 +8,11 @@
 namespace bole
 {
 Progress::Progress(std::size_t frames, std::FILE *stream, double seconds_between_lines)
-  : m_frames(frames), m_stream(stream), m_is_terminal(isatty(fileno(stream)) == 1), m_start(Clock::now()),
-    m_last_print(m_start)
+    : m_frames(frames),
+      m_stream(stream),
+      m_is_terminal(isatty(fileno(stream)) == 1),
+      m_start(Clock::now()),
+      m_last_print(m_start)
 {
   m_interval_s = m_is_terminal ? 0.1 : seconds_between_lines;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "output/summary_json.h"
 #include "geometry/median.h"
 #include "output/atomic_file.h"
-#include "output/summary_json.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,17 +22,14 @@ namespace
 {
 using Json = nlohmann::ordered_json;
 
-Json median(std::vector<double> values)
-{
-  return values.empty() ? Json() : Json(medianOf(std::move(values)));
-}
+Json median(std::vector<double> values) { return values.empty() ? Json() : Json(medianOf(std::move(values))); }
 
 Json trunksJson(const std::vector<TrunkRecord> &trunks)
 {
   Json json;
   for (const auto status : {TrunkStatus::confirmed, TrunkStatus::candidate, TrunkStatus::lost, TrunkStatus::merged})
-    json[toString(status)] = std::count_if(trunks.begin(), trunks.end(),
-                                           [&](const TrunkRecord &trunk) { return trunk.status == status; });
+    json[toString(status)] =
+        std::count_if(trunks.begin(), trunks.end(), [&](const TrunkRecord &trunk) { return trunk.status == status; });
   std::vector<double> radius, sigma, sigma_radius, observations;
   for (const TrunkRecord &trunk : trunks) {
     if (trunk.status != TrunkStatus::confirmed)

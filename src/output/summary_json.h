@@ -3,9 +3,9 @@
 /// \file
 /// What a run was made of and what came out, for people and scripts.
 
+#include "output/timing_csv.h"
 #include <bole/frame.h>
 #include <bole/trunk_record.h>
-#include "output/timing_csv.h"
 #include <bole/world_reference.h>
 
 #include <map>
@@ -16,13 +16,13 @@ namespace bole
 {
 struct RunSummary
 {
-  std::string version;                   ///< of bole
+  std::string version; ///< of bole
   std::string input, preset, camera_file, odometry_file;
-  std::string note;                      ///< FrameSource::note()
+  std::string note; ///< FrameSource::note()
   PinholeCamera camera;
   bool has_odometry = false, has_gyro = false;
-  bool is_complete = true;               ///< false: the run was stopped, this is what was known by then
-  WorldReference reference;              ///< where the metre and up come from
+  bool is_complete = true;  ///< false: the run was stopped, this is what was known by then
+  WorldReference reference; ///< where the metre and up come from
   std::map<FrameStatus, std::size_t> frames;
   std::vector<TrunkRecord> trunks;
   TimingTable timing;

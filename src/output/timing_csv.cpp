@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/atomic_file.h"
 #include "output/timing_csv.h"
+#include "output/atomic_file.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/atomic_file.h"
 #include "output/trajectory_writer.h"
+#include "output/atomic_file.h"
 
 #include <Eigen/Geometry>
 
@@ -20,10 +20,8 @@ void writeTrajectory(const std::string &path, const Trajectory &trajectory)
     const Eigen::Vector3d &t = pose.wMb.t;
     const auto stamp = std::lldiv(pose.stamp_ns, 1'000'000'000);
     const char *sign = pose.stamp_ns < 0 ? "-" : "";
-    fmt::format_to(std::back_inserter(text),
-                   "{}{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", sign,
-                   std::llabs(stamp.quot), std::llabs(stamp.rem), t.x(), t.y(), t.z(), q.x(), q.y(),
-                   q.z(), q.w());
+    fmt::format_to(std::back_inserter(text), "{}{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", sign,
+                   std::llabs(stamp.quot), std::llabs(stamp.rem), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   writeAtomically(path, text);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/atomic_file.h"
 #include "output/video_writer.h"
+#include "output/atomic_file.h"
 
 #include <array>
 #include <fmt/format.h>

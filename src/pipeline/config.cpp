@@ -65,10 +65,7 @@ struct Print
   std::string operator()(const double *value) const { return fmt::format("{}", *value); }
   std::string operator()(const int *value) const { return fmt::format("{}", *value); }
   std::string operator()(const bool *value) const { return *value ? "true" : "false"; }
-  std::string operator()(const std::vector<int> *value) const
-  {
-    return fmt::format("[{}]", fmt::join(*value, ", "));
-  }
+  std::string operator()(const std::vector<int> *value) const { return fmt::format("[{}]", fmt::join(*value, ", ")); }
   std::string operator()(const EnergyForm *value) const
   {
     return *value == EnergyForm::paper ? "paper" : "absolute_mean";
@@ -76,10 +73,7 @@ struct Print
   std::string operator()(const LossKind *value) const { return toString(*value); }
 };
 
-std::string where(const std::string &path, const YAML::Mark &mark)
-{
-  return fmt::format("{}:{}", path, mark.line + 1);
-}
+std::string where(const std::string &path, const YAML::Mark &mark) { return fmt::format("{}:{}", path, mark.line + 1); }
 
 void addFlow(std::vector<OptionEntry> &entries, FlowOptions &o)
 {
@@ -304,7 +298,8 @@ void readStage(const std::string &path, const std::string &stage, const YAML::No
   std::vector<std::string> seen;
   for (const auto &pair : map) {
     const std::string name = stage + "." + pair.first.as<std::string>();
-    const auto entry = std::find_if(entries.begin(), entries.end(), [&](const OptionEntry &e) { return e.name == name; });
+    const auto entry =
+        std::find_if(entries.begin(), entries.end(), [&](const OptionEntry &e) { return e.name == name; });
     if (entry == entries.end())
       fail(fmt::format("{}: {} is no option", where(path, pair.first.Mark()), name));
     if (std::find(seen.begin(), seen.end(), name) != seen.end())

@@ -45,8 +45,7 @@ PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sig
 }
 } // namespace
 
-MotionModel::MotionModel(const MotionModelOptions &options, const GyroOptions &gyro)
-  : m_options(options), m_gyro(gyro)
+MotionModel::MotionModel(const MotionModelOptions &options, const GyroOptions &gyro) : m_options(options), m_gyro(gyro)
 {
   m_options.validate();
   m_gyro.validate();

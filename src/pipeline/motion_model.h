@@ -11,9 +11,9 @@
 ///
 /// Frames: a the body at the frame before, b the body now, w world.
 
-#include <bole/frame.h>
 #include "motion/gyro.h"
 #include "smoothing/factors.h"
+#include <bole/frame.h>
 
 #include <optional>
 
@@ -21,16 +21,16 @@ namespace bole
 {
 struct MotionModelOptions
 {
-  double step_sigma = 0.012;           ///< horizontal noise of a step of the pose filter [m], 1e-4 to 1
-  double step_scale_sigma = 0.03;      ///< error of a step in proportion to its length, 0 to 1
-  double scale_sigma = 0.03;           ///< of the one scale by which all steps of the filter are off, 0 to 1
-  double step_sigma_vertical = 0.03;   ///< [m], 1e-4 to 1
-  double height_sigma = 0.02;          ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
-  double tilt_sigma = 0.005;           ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
-  double turn_sigma = 0.006;           ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
-  double gyro_turn_sigma = 0.0008;     ///< least noise of the gyro's rotation between frames [rad], 1e-6 to 1
-  double free_step_sigma = 0.15;       ///< of a step that nothing measured (constant velocity) [m], 1e-3 to 10
-  double free_turn_sigma = 0.02;       ///< of a turn that nothing measured [rad], 1e-4 to 1
+  double step_sigma = 0.012;         ///< horizontal noise of a step of the pose filter [m], 1e-4 to 1
+  double step_scale_sigma = 0.03;    ///< error of a step in proportion to its length, 0 to 1
+  double scale_sigma = 0.03;         ///< of the one scale by which all steps of the filter are off, 0 to 1
+  double step_sigma_vertical = 0.03; ///< [m], 1e-4 to 1
+  double height_sigma = 0.02;      ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
+  double tilt_sigma = 0.005;       ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
+  double turn_sigma = 0.006;       ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
+  double gyro_turn_sigma = 0.0008; ///< least noise of the gyro's rotation between frames [rad], 1e-6 to 1
+  double free_step_sigma = 0.15;   ///< of a step that nothing measured (constant velocity) [m], 1e-3 to 10
+  double free_turn_sigma = 0.02;   ///< of a turn that nothing measured [rad], 1e-4 to 1
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };

@@ -3,7 +3,6 @@
 
 #include "geometry/require_range.h"
 
-
 namespace bole
 {
 void FlowOptions::validate() const

@@ -31,9 +31,14 @@ SmootherOptions withCamera(SmootherOptions options, const Pose &bMc)
 } // namespace
 
 Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineOptions &options)
-  : m_camera(camera), m_bMc(bMc), m_options(options), m_motion(options.motion, options.points.gyro),
-    m_points(camera, bMc, options.points), m_saliency(camera, options.saliency),
-    m_smoother(withCamera(options.smoothing, bMc)), m_map(options.map)
+    : m_camera(camera),
+      m_bMc(bMc),
+      m_options(options),
+      m_motion(options.motion, options.points.gyro),
+      m_points(camera, bMc, options.points),
+      m_saliency(camera, options.saliency),
+      m_smoother(withCamera(options.smoothing, bMc)),
+      m_map(options.map)
 {
   m_options.validate();
 }
@@ -128,7 +133,8 @@ void Pipeline::addPose(const Frame &frame, const GyroBias &bias, FrameResult &re
 
 std::size_t Pipeline::poseOf(std::size_t frame_index) const
 {
-  return static_cast<std::size_t>(std::lower_bound(m_indices.begin(), m_indices.end(), frame_index) - m_indices.begin());
+  return static_cast<std::size_t>(std::lower_bound(m_indices.begin(), m_indices.end(), frame_index) -
+                                  m_indices.begin());
 }
 
 void Pipeline::addRelativePoses(const std::vector<RelativeMotion> &motions)
@@ -192,8 +198,8 @@ void Pipeline::reviewMap(double time_s)
     forgetRemoved(id);
 }
 
-/// Covariances are asked for where something was seen lately: that of a trunk left behind hardly changes, and costs a walk
-/// back to where it stood.
+/// Covariances are asked for where something was seen lately: that of a trunk left behind hardly changes, and costs a
+/// walk back to where it stood.
 void Pipeline::refreshMap(double seen_since_s)
 {
   for (const std::size_t i : m_map.active()) {

@@ -77,7 +77,7 @@ void Pipeline::rescale(double factor)
   if (graph.poses.size() != m_smoother.poseCount())
     return; // a fixed lag has closed poses: they keep their scale
   graph = scaled(graph, factor);
-  m_sights.clear(); // in the old metre
+  m_sights.clear();             // in the old metre
   std::vector<MapTrunk *> kept; // in the order of the graph: that of their ids
   for (std::size_t id = 0; id < m_smoother.trunkCount(); ++id)
     for (MapTrunk &trunk : m_map.trunks())

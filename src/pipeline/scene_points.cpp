@@ -17,12 +17,12 @@ constexpr double kMissed = 2;       ///< largest distance of the rays from one a
 constexpr double kMiddle_px = 2;    ///< largest error in the frame half-way
 constexpr double kPlaced = 15;      ///< inverse distance over its sigma from which a point has a place
 
-constexpr double kInside = 0.7;      ///< of the half width of a trunk: what is surely inside it
-constexpr double kBorder_px = 4;     ///< and the least distance from its borders, where corners slide along the bark
-constexpr double kNotInside = 0.3;   ///< of its bark, at the least [m]
-constexpr double kKnown = 0.25;      ///< largest sigma of a point's inverse distance, of the trunk's
-constexpr double kRangeSigma = 0.1;  ///< of the trunk's range, relative
-constexpr double kBehind = 2.5;      ///< sigmas behind the bark, or before
+constexpr double kInside = 0.7;     ///< of the half width of a trunk: what is surely inside it
+constexpr double kBorder_px = 4;    ///< and the least distance from its borders, where corners slide along the bark
+constexpr double kNotInside = 0.3;  ///< of its bark, at the least [m]
+constexpr double kKnown = 0.25;     ///< largest sigma of a point's inverse distance, of the trunk's
+constexpr double kRangeSigma = 0.1; ///< of the trunk's range, relative
+constexpr double kBehind = 2.5;     ///< sigmas behind the bark, or before
 } // namespace
 
 /// The point now.t + ray / w lies on the ray seen before where a x (ray + w base) = 0: least squares in w.
@@ -87,9 +87,11 @@ void Pipeline::lookThroughTrunks()
       if (slope < stem.low || slope > stem.high || sight.sigma > kKnown * bark * level)
         continue;
       const Eigen::Vector2d w = trunk.trunk.axisAt(wMc.t.z() + slope * range).head<2>() - wMc.t.head<2>();
-      if (std::abs(std::remainder(std::atan2(sight.ray.y(), sight.ray.x()) - std::atan2(w.y(), w.x()), 2 * M_PI)) > inside)
+      if (std::abs(std::remainder(std::atan2(sight.ray.y(), sight.ray.x()) - std::atan2(w.y(), w.x()), 2 * M_PI)) >
+          inside)
         continue;
-      const double beyond = (bark - sight.inverse_distance / level) / std::hypot(sight.sigma / level, kRangeSigma * bark);
+      const double beyond =
+          (bark - sight.inverse_distance / level) / std::hypot(sight.sigma / level, kRangeSigma * bark);
       if (beyond > kBehind)
         ++trunk.points_behind;
       else if (beyond > -kBehind) // else before it: leaves, another trunk

@@ -188,7 +188,9 @@ void Pipeline::keepView(const Frame &frame, Gradient gradient)
   }
   m_views.push_back(std::move(view));
   const auto lag = static_cast<std::size_t>(m_options.smoothing.fixed_lag);
-  const auto is_closed = [&] { return lag > 0 && m_views.front().pose + lag <= pose + 1; }; // nothing more is told of it
+  const auto is_closed = [&] {
+    return lag > 0 && m_views.front().pose + lag <= pose + 1;
+  }; // nothing more is told of it
   while (static_cast<int>(m_views.size()) > m_options.detection.window || is_closed())
     m_views.pop_front();
 }
@@ -204,8 +206,8 @@ std::vector<InhibitedRange> Pipeline::inhibited(bool by_candidates) const
     const MapTrunk &trunk = m_map.trunks()[i];
     const Eigen::Vector2d w = trunk.trunk.xy - wMc.t.head<2>();
     const double r = trunk.trunk.radius(), d2 = w.squaredNorm();
-    const bool inhibits = trunk.status == TrunkStatus::confirmed ||
-                          (by_candidates && trunk.status == TrunkStatus::candidate);
+    const bool inhibits =
+        trunk.status == TrunkStatus::confirmed || (by_candidates && trunk.status == TrunkStatus::candidate);
     if (!inhibits || w.dot(forward) < 0.3 || d2 < 1.1 * r * r)
       continue;
     const double q = w.dot(left) / w.dot(forward), half = r / std::sqrt(d2 - r * r);
@@ -248,8 +250,7 @@ void Pipeline::detectSingle(FrameResult &result)
     lines.threshold = lines.turning_threshold;
     lines.either_polarity = false; // without parallax a bright gap between trunks looks like one
   }
-  result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(true),
-                             profile, lines);
+  result.lines = detectLines(m_views.back().gradient, p_background, m_camera, wMc.R, inhibited(true), profile, lines);
   for (const LineDetection &line : result.lines)
     adopt(line);
 }
@@ -286,11 +287,12 @@ void Pipeline::adopt(const Detection &detection)
     if (!relative.isFinite() || relative.cRt(2, 0) <= 0)
       continue;
     Matrix4d covariance = Matrix4d::Zero();
-    covariance.diagonal() << 1e-4, 1e-4, std::pow(1.0 / m_camera.fx, 2), std::pow(1.0 / m_camera.fx / relative.ratio(), 2);
+    covariance.diagonal() << 1e-4, 1e-4, std::pow(1.0 / m_camera.fx, 2),
+        std::pow(1.0 / m_camera.fx / relative.ratio(), 2);
     TrackingPrediction prediction = predict(trunk, relative, covariance, wMc);
     const TrackingResult tracked = trackTrunk(view.gradient, m_camera, prediction, m_options.tracking);
-    if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) &&
-        tracked.left_used && tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
+    if (tracked.status == TrackingStatus::tracked && insideGate(prediction, tracked) && tracked.left_used &&
+        tracked.right_used && observe(trunk, view.pose, prediction, tracked, view.time_s))
       seen.emplace_back(view.pose, tracked);
   }
   if (seen.empty())

@@ -59,7 +59,7 @@ PosePrior tiltPrior(const Pose &wMb, const Vector3d &bup, double sigma)
 } // namespace
 
 VisualOdometry::VisualOdometry(const PinholeCamera &camera, const Pose &bMc, const VisualOdometryOptions &options)
-  : m_camera(camera), m_bMc(bMc), m_options(options), m_points(camera, withFocal(options.focal_known))
+    : m_camera(camera), m_bMc(bMc), m_options(options), m_points(camera, withFocal(options.focal_known))
 {
   m_options.validate();
 }
@@ -117,7 +117,8 @@ void VisualOdometry::chooseUnit()
   const std::vector<PointDepth> depths = m_points.depths();
   const GroundHeight ground = up() ? heightOverGround(depths, m_camera, *up()) : GroundHeight();
   if (ground.known) {
-    m_metres_per_unit = (m_options.camera_height > 0 ? m_options.camera_height : m_options.start_height) / ground.height;
+    m_metres_per_unit =
+        (m_options.camera_height > 0 ? m_options.camera_height : m_options.start_height) / ground.height;
   }
   else {
     std::vector<double> inverse;

@@ -13,7 +13,7 @@ namespace bole
 struct PyramidLevel
 {
   PinholeCamera camera;
-  vpImage<float> image;              ///< 1 = full scale
+  vpImage<float> image;                  ///< 1 = full scale
   vpImage<float> gradient_x, gradient_y; ///< central differences [1/px of this level]
 };
 

@@ -23,8 +23,11 @@ std::size_t index(int i, int j, int width, int count)
 } // namespace
 
 InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int level, const SaliencyOptions &options)
-  : m_camera(camera), m_options(options), m_count(options.inverse_depths),
-    m_rows((camera.height + kRowStep - 1) / kRowStep), m_window_rows(options.window_height_px / kRowStep | 1)
+    : m_camera(camera),
+      m_options(options),
+      m_count(options.inverse_depths),
+      m_rows((camera.height + kRowStep - 1) / kRowStep),
+      m_window_rows(options.window_height_px / kRowStep | 1)
 {
   const double sigma = options.sigma_residual * std::max(std::ldexp(1.0, -level), 0.25);
   m_intensity_variance = 2 * sigma * sigma;
@@ -56,9 +59,15 @@ class StepPositions
 {
 public:
   StepPositions(const PinholeCamera &camera, const Pose &oMc, const std::vector<float> &rho)
-    : m_warp(camera, oMc), m_rho(rho), m_max_x(static_cast<float>(camera.width) - 1.001f),
-      m_max_y(static_cast<float>(camera.height) - 1.001f), x(rho.size()), y(rho.size()), inverse_z(rho.size())
-  {}
+      : m_warp(camera, oMc),
+        m_rho(rho),
+        m_max_x(static_cast<float>(camera.width) - 1.001f),
+        m_max_y(static_cast<float>(camera.height) - 1.001f),
+        x(rho.size()),
+        y(rho.size()),
+        inverse_z(rho.size())
+  {
+  }
 
   void at(int u, int v)
   {
@@ -188,8 +197,7 @@ void InverseDepthEvidence::averageOverWindow()
     runningMean(&m_residuals[static_cast<std::size_t>(i) * row], &m_scratch[static_cast<std::size_t>(i) * row], width,
                 pixel, m_count, m_options.window_width_px, sum.data());
   // down the image, a whole row at a time
-  runningMean(m_scratch.data(), m_residuals.data(), height, row, static_cast<int>(row), m_window_rows,
-              sum.data());
+  runningMean(m_scratch.data(), m_residuals.data(), height, row, static_cast<int>(row), m_window_rows, sum.data());
 }
 
 void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose &oMc, const MotionNoise &noise)
@@ -205,8 +213,7 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   for (int i = 0; i < height; ++i)
     runningMean(&g2[static_cast<std::size_t>(i * width)], &mean[static_cast<std::size_t>(i * width)], width, 1, 1,
                 m_options.window_width_px, sum.data());
-  runningMean(mean.data(), g2.data(), height, static_cast<std::size_t>(width), width, m_window_rows,
-              sum.data());
+  runningMean(mean.data(), g2.data(), height, static_cast<std::size_t>(width), width, m_window_rows, sum.data());
 
   const double f = 0.5 * (m_camera.fx + m_camera.fy);
   const double parallax = medianParallax(m_camera, oMc, 1.0); // [px m]

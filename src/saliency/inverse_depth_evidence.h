@@ -14,9 +14,9 @@
 ///
 /// Not in the paper: it asks whether a pixel *moves* with the background; this asks whether it is *near*.
 
-#include <bole/pose.h>
 #include "saliency/image_pyramid.h"
 #include "saliency/saliency_options.h"
+#include <bole/pose.h>
 
 #include <vector>
 
@@ -25,11 +25,12 @@ namespace bole
 /// Uncertainty of the motion between two frames, as standard deviations.
 struct MotionNoise
 {
-  double rotation = 1e-3;   ///< [rad]
+  double rotation = 1e-3;    ///< [rad]
   double translation = 0.01; ///< an axis [m]
 };
 
-/// One value a pixel of the working level, but only each kRowStep-th row: trunks are upright, and windows taller than wide.
+/// One value a pixel of the working level, but only each kRowStep-th row: trunks are upright, and windows taller than
+/// wide.
 struct InverseDepthPosterior
 {
   vpImage<float> log_odds_near; ///< log p(nearer than near_range) - log p(farther)

@@ -10,9 +10,9 @@ namespace bole
 {
 namespace
 {
-constexpr int kPixelStep = 3;         // every third pixel of every third row is enough
-constexpr float kFlat = 0.004f;       // [1/px]; below, a pixel of motion changes less than a grey level
-constexpr float kSteep = 0.04f;       // [1/px]; above, intensity noise is small against a pixel of motion
+constexpr int kPixelStep = 3;   // every third pixel of every third row is enough
+constexpr float kFlat = 0.004f; // [1/px]; below, a pixel of motion changes less than a grey level
+constexpr float kSteep = 0.04f; // [1/px]; above, intensity noise is small against a pixel of motion
 constexpr std::size_t kLeastCount = 1000;
 
 /// Standard deviation of what has these magnitudes, or \p otherwise.
@@ -27,7 +27,7 @@ double deviation(std::vector<float> magnitudes, double otherwise)
 } // namespace
 
 SaliencyNoiseLearner::SaliencyNoiseLearner(const PinholeCamera &camera, const SaliencyOptions &start)
-  : m_camera(camera), m_start(start)
+    : m_camera(camera), m_start(start)
 {
   start.validate();
 }
@@ -62,8 +62,8 @@ SaliencyOptions SaliencyNoiseLearner::learnt() const
   SaliencyOptions options = m_start;
   options.sigma_intensity = std::clamp(deviation(m_intensity, m_start.sigma_intensity), 0.002, 0.5);
   options.sigma_background_px = std::clamp(deviation(m_background, m_start.sigma_background_px), 0.05, 10.);
-  options.sigma_foreground_px = std::clamp(deviation(m_foreground, m_start.sigma_foreground_px),
-                                           1.5 * options.sigma_background_px, 100.);
+  options.sigma_foreground_px =
+      std::clamp(deviation(m_foreground, m_start.sigma_foreground_px), 1.5 * options.sigma_background_px, 100.);
   if (count() >= kLeastCount)
     options.background_prior =
         std::clamp(static_cast<double>(m_background.size()) / static_cast<double>(count()), 0.05, 0.95);

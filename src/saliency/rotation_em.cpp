@@ -13,7 +13,7 @@ namespace bole
 {
 namespace
 {
-constexpr double kConvergedStep = 1e-4; // [rad], 0.02 px at f = 200 px
+constexpr double kConvergedStep = 1e-4;   // [rad], 0.02 px at f = 200 px
 constexpr float kTextureGradient = 0.01f; // [1/px]; below, intensity noise hides a pixel of motion
 
 /// Gauss-Newton sums of one M-step.
@@ -67,8 +67,9 @@ class LevelPass
 public:
   LevelPass(const PyramidLevel &previous, const PyramidLevel &current, const SaliencyOptions &options, int level,
             bool wide)
-    : m_previous(previous), m_current(current), m_options(options), m_noise(levelNoise(options, level, wide))
-  {}
+      : m_previous(previous), m_current(current), m_options(options), m_noise(levelNoise(options, level, wide))
+  {
+  }
 
   /// One E-step at \p pRc and the sums of the M-step; \p log_ratio is filled where given.
   NormalEquations operator()(const Eigen::Matrix3d &pRc, vpImage<float> *log_ratio) const
@@ -136,10 +137,7 @@ private:
   LevelNoise m_noise;
 };
 
-Eigen::Matrix3d inverseOf(const Eigen::Matrix3d &A)
-{
-  return A.ldlt().solve(Eigen::Matrix3d::Identity());
-}
+Eigen::Matrix3d inverseOf(const Eigen::Matrix3d &A) { return A.ldlt().solve(Eigen::Matrix3d::Identity()); }
 } // namespace
 
 RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &current,
@@ -151,8 +149,7 @@ RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &cu
   const bool wide = !prior;
   // A blank image leaves this: any rotation up to half a turn a second or so.
   const Eigen::Matrix3d vague = Eigen::Matrix3d::Identity() / (0.3 * 0.3);
-  const Eigen::Matrix3d prior_information =
-      prior && options.use_rotation_prior ? inverseOf(prior->covariance) : vague;
+  const Eigen::Matrix3d prior_information = prior && options.use_rotation_prior ? inverseOf(prior->covariance) : vague;
   const int finest = std::min(options.finest_level, current.levels() - 1);
   const int coarsest = prior ? std::min(finest + 1, current.levels() - 1) : current.levels() - 1;
   Eigen::Matrix3d information = prior_information;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
 #include "saliency/saliency.h"
+#include "geometry/so3.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace bole
 {
 namespace
 {
-constexpr double kLeastTexture = 0.002; // share of textured pixels that a rotation needs
+constexpr double kLeastTexture = 0.002;  // share of textured pixels that a rotation needs
 constexpr double kMaxTurnOffGyro = 0.05; // [rad]; further than any gyro errs within a frame
 
 const SaliencyOptions &validated(const SaliencyOptions &options)
@@ -93,10 +93,7 @@ vpImage<float> windowMean(const vpImage<float> &image, int window)
   return result;
 }
 
-double meanDeviation(const Eigen::Matrix3d &covariance)
-{
-  return std::sqrt(std::max(covariance.trace(), 0.0) / 3);
-}
+double meanDeviation(const Eigen::Matrix3d &covariance) { return std::sqrt(std::max(covariance.trace(), 0.0) / 3); }
 } // namespace
 
 const char *toString(SaliencyStatus status)
@@ -119,9 +116,11 @@ const char *toString(SaliencyStatus status)
 }
 
 SaliencyEstimator::SaliencyEstimator(const PinholeCamera &camera, const SaliencyOptions &options)
-  : m_camera(camera), m_options(validated(options)),
-    m_evidence(workingCamera(camera, workingLevel(camera, options)), workingLevel(camera, options), options)
-{}
+    : m_camera(camera),
+      m_options(validated(options)),
+      m_evidence(workingCamera(camera, workingLevel(camera, options)), workingLevel(camera, options), options)
+{
+}
 
 void SaliencyEstimator::reset()
 {

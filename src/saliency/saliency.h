@@ -31,34 +31,35 @@ namespace bole
 /// Translation of the camera between two frames, in metres, as odometry or point features know it.
 struct TranslationPrior
 {
-  Eigen::Vector3d pt = Eigen::Vector3d::Zero(); ///< current camera in the previous one [m]
+  Eigen::Vector3d pt = Eigen::Vector3d::Zero();                    ///< current camera in the previous one [m]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity() * 1e-4; ///< [m^2]
 };
 
-enum class SaliencyStatus {
-  first_frame,    ///< nothing to compare with: all unknown
-  with_gyro,      ///< rotation from gyro and images
-  without_gyro,   ///< rotation from images alone, with robust weights: may be pulled by near things
-  no_texture,     ///< rotation is the prior's (or none); labels say unknown
-  stale,          ///< the same image again: labels of the frame before, motion kept for the next frame
-  not_converged   ///< the images did not agree on a rotation: the prior's is returned
+enum class SaliencyStatus
+{
+  first_frame,  ///< nothing to compare with: all unknown
+  with_gyro,    ///< rotation from gyro and images
+  without_gyro, ///< rotation from images alone, with robust weights: may be pulled by near things
+  no_texture,   ///< rotation is the prior's (or none); labels say unknown
+  stale,        ///< the same image again: labels of the frame before, motion kept for the next frame
+  not_converged ///< the images did not agree on a rotation: the prior's is returned
 };
 const char *toString(SaliencyStatus status);
 
 struct Saliency
 {
   SaliencyStatus status = SaliencyStatus::first_frame;
-  vpImage<float> p_background;    ///< lambda = 1 means background
-  vpImage<float> confidence;      ///< |change of the log odds| by the images; small = unknown
-  vpImage<float> inverse_depth;   ///< [1/m], empty without translation
-  Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity(); ///< refined rotation from the image before
+  vpImage<float> p_background;                              ///< lambda = 1 means background
+  vpImage<float> confidence;                                ///< |change of the log odds| by the images; small = unknown
+  vpImage<float> inverse_depth;                             ///< [1/m], empty without translation
+  Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity();        ///< refined rotation from the image before
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< right perturbation of pRc [rad^2]
-  bool asks_for_range = false;    ///< labels mean "nearer than near_range"; else "moves unlike the background"
-  double parallax_px = 0;         ///< of the pair of frames used, at near_range
-  int frames_apart = 0;           ///< of the pair of frames used
+  bool asks_for_range = false; ///< labels mean "nearer than near_range"; else "moves unlike the background"
+  double parallax_px = 0;      ///< of the pair of frames used, at near_range
+  int frames_apart = 0;        ///< of the pair of frames used
   int iterations = 0;
-  double unknown_share = 1;       ///< of the pixels
-  float unknown_below = 0;        ///< confidence under which a pixel is unknown
+  double unknown_share = 1; ///< of the pixels
+  float unknown_below = 0;  ///< confidence under which a pixel is unknown
 
   bool isKnown(unsigned row, unsigned column) const { return confidence[row][column] >= unknown_below; }
 };
@@ -92,11 +93,11 @@ private:
   PinholeCamera m_camera;
   SaliencyOptions m_options;
   InverseDepthEvidence m_evidence;
-  std::deque<View> m_views;               ///< newest first
+  std::deque<View> m_views; ///< newest first
   vpImage<unsigned char> m_last_image;
   Saliency m_last;
   Eigen::Matrix3d m_last_turn = Eigen::Matrix3d::Identity();
-  std::optional<RotationPrior> m_gyro;    ///< since the last image used
+  std::optional<RotationPrior> m_gyro; ///< since the last image used
   std::optional<TranslationPrior> m_translation;
   bool m_has_pending_motion = false;
 };

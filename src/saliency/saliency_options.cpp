@@ -13,8 +13,7 @@ namespace
 void require(bool holds, const char *name, double value, const std::string &rule)
 {
   if (!holds) // also for NaN
-    throw vpException(vpException::badValue,
-                      fmt::format("saliency.{} = {}, must be {}", name, value, rule).c_str());
+    throw vpException(vpException::badValue, fmt::format("saliency.{} = {}, must be {}", name, value, rule).c_str());
 }
 
 void requireWithin(const char *name, double value, double low, double high)
@@ -66,7 +65,8 @@ void SaliencyOptions::validate() const
   requireInside("min_range", min_range, 0.05, near_range);
   requireWithin("inverse_depths", inverse_depths, 4, 64);
   for (const auto &[name, value] :
-       {std::pair("label_window_px", label_window_px), std::pair("window_width_px", window_width_px), std::pair("window_height_px", window_height_px)})
+       {std::pair("label_window_px", label_window_px), std::pair("window_width_px", window_width_px),
+        std::pair("window_height_px", window_height_px)})
     require(value >= 1 && value <= 31 && value % 2 == 1, name, value, "odd and within [1, 31]");
   requireWithin("min_parallax_px", min_parallax_px, 0.1, 50);
   requireWithin("max_frames_apart", max_frames_apart, 1, 20);

@@ -8,38 +8,44 @@ namespace bole
 struct SaliencyOptions
 {
   // --- the model of Eq. 12 and 13
-  double sigma_intensity = 0.02;   ///< noise of a pixel, 1 = full scale; (0, 1]. Rendered and real video: 1-3 %
-  double sigma_background_px = 2;  ///< flow of the background about V w [px, full resolution]; (0, 20]. What counts as parallax
+  double sigma_intensity = 0.02; ///< noise of a pixel, 1 = full scale; (0, 1]. Rendered and real video: 1-3 %
+  double sigma_background_px =
+      2; ///< flow of the background about V w [px, full resolution]; (0, 20]. What counts as parallax
   double sigma_foreground_px = 10; ///< the same for the foreground [px]; (sigma_background_px, 200]
   int label_window_px = 7;         ///< log ratios are averaged over this square [px at the working level]; odd, [1, 31]
   double background_prior = 0.7;   ///< p(lambda = 1) before looking; (0, 1). Most of a forest is far
   bool foreground_mean_zero = false; ///< Eq. 13 as printed: the flow of the foreground has mean 0 instead of V w
-  bool linear_flow = false;        ///< Eq. 13 as printed: flow V w; otherwise the exact warp of the rotation
+  bool linear_flow = false;          ///< Eq. 13 as printed: flow V w; otherwise the exact warp of the rotation
 
   // --- EM of Eq. 16 and 17
-  int iterations = 5;              ///< EM iterations a level; [1, 50]
-  int levels = 4;                  ///< levels of the pyramid, each half the size of the one before; [1, 8]
-  int finest_level = 1;            ///< 0 works at full resolution, 1 at half; [0, levels - 1]. Half is 4 times as fast
-  bool use_rotation_prior = true;  ///< p(w) of Eq. 17; off: the gyro is only the start of the iterations
-  double sigma_rotation_pull = 0.004; ///< how far near things pull the rotation [rad]; [0, 1]. 0.1 to 0.3 degrees in forests
-  double sample_correlation = 30;  ///< pixels that count as one independent measurement; [1, 1e4]. Neighbours share their errors
+  int iterations = 5;             ///< EM iterations a level; [1, 50]
+  int levels = 4;                 ///< levels of the pyramid, each half the size of the one before; [1, 8]
+  int finest_level = 1;           ///< 0 works at full resolution, 1 at half; [0, levels - 1]. Half is 4 times as fast
+  bool use_rotation_prior = true; ///< p(w) of Eq. 17; off: the gyro is only the start of the iterations
+  double sigma_rotation_pull =
+      0.004; ///< how far near things pull the rotation [rad]; [0, 1]. 0.1 to 0.3 degrees in forests
+  double sample_correlation =
+      30; ///< pixels that count as one independent measurement; [1, 1e4]. Neighbours share their errors
 
   // --- labels that ask about inverse depth, where the translation is given
-  bool use_translation = true;     ///< off: labels by EM alone even where odometry gives the translation
-  double sigma_residual = 0.05;    ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
-  double translation_noise_scale = 0.5; ///< of the prior's deviation in the sweep; [0, 10]. Its error moves all depths alike
-  double near_range = 6;           ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
-  double min_range = 2;            ///< nearest range of the sweep [m]; (0.05, near_range)
-  int inverse_depths = 16;         ///< steps of the sweep from infinity to min_range; [4, 64]
-  int window_width_px = 3;         ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
-  int window_height_px = 9;        ///< trunks are upright: taller than wide; odd, [1, 31]
-  double min_parallax_px = 3;      ///< a pair of frames suffices when a point at near_range moves so much [px]; [0.1, 50]
-  int max_frames_apart = 5;        ///< oldest frame that is tried; [1, 20]
-  double evidence_decay = 0.8;     ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
-  double near_prior = 0.3;         ///< p(nearer than near_range) before looking; (0, 1)
-  bool relative_evidence = true;   ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
-  double evidence_scale = 1;       ///< weight of a window's residuals as log-likelihood; (0, 100]. 1 = the noise model is right
-  double unknown_below = 0.7;      ///< |change of the log odds| under which a pixel is unknown; [0, 20]
+  bool use_translation = true;  ///< off: labels by EM alone even where odometry gives the translation
+  double sigma_residual = 0.05; ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
+  double translation_noise_scale =
+      0.5;                     ///< of the prior's deviation in the sweep; [0, 10]. Its error moves all depths alike
+  double near_range = 6;       ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
+  double min_range = 2;        ///< nearest range of the sweep [m]; (0.05, near_range)
+  int inverse_depths = 16;     ///< steps of the sweep from infinity to min_range; [4, 64]
+  int window_width_px = 3;     ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
+  int window_height_px = 9;    ///< trunks are upright: taller than wide; odd, [1, 31]
+  double min_parallax_px = 3;  ///< a pair of frames suffices when a point at near_range moves so much [px]; [0.1, 50]
+  int max_frames_apart = 5;    ///< oldest frame that is tried; [1, 20]
+  double evidence_decay = 0.8; ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
+  double near_prior = 0.3;     ///< p(nearer than near_range) before looking; (0, 1)
+  bool relative_evidence =
+      true; ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
+  double evidence_scale =
+      1; ///< weight of a window's residuals as log-likelihood; (0, 100]. 1 = the noise model is right
+  double unknown_below = 0.7; ///< |change of the log odds| under which a pixel is unknown; [0, 20]
 
   /// Eq. 10 to 17 as printed, with the constants of the original form: isotropic Sigma_b and Sigma_f, consecutive
   /// frames, full resolution, no prior on the rotation beyond its start, no translation.

@@ -18,10 +18,8 @@ using Eigen::Vector3d;
 /// bole::RelativeTrunk::cRt.
 Eigen::Matrix3d frameOf(double bearing, double inclination, double tip)
 {
-  const Vector3d a(std::cos(tip) * std::sin(inclination), -std::cos(tip) * std::cos(inclination),
-                   std::sin(tip));
-  const Vector3d forward =
-      (Vector3d::UnitZ() - a.z() * a).normalized(); // optical axis across the trunk
+  const Vector3d a(std::cos(tip) * std::sin(inclination), -std::cos(tip) * std::cos(inclination), std::sin(tip));
+  const Vector3d forward = (Vector3d::UnitZ() - a.z() * a).normalized(); // optical axis across the trunk
   const Vector3d left = a.cross(forward);
   const Vector3d m = std::cos(bearing) * forward - std::sin(bearing) * left;
   Eigen::Matrix3d cRt;
@@ -30,21 +28,19 @@ Eigen::Matrix3d frameOf(double bearing, double inclination, double tip)
 }
 
 template <class Pixel>
-void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameters &cam,
-                    const vpImage<Pixel> &I, const vpColor &color, unsigned int thickness)
+void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameters &cam, const vpImage<Pixel> &I,
+                    const vpColor &color, unsigned int thickness)
 {
   if (relative.log_ratio >= 0) {
     return;
   }
   for (bole::Border border : {bole::Border::left, bole::Border::right}) {
-    const Vector3d low = relative.borderDirection(border, -0.5),
-                   high = relative.borderDirection(border, 1.0);
+    const Vector3d low = relative.borderDirection(border, -0.5), high = relative.borderDirection(border, 1.0);
     if (low.z() <= 0.05 || high.z() <= 0.05) {
       continue;
     }
     const auto pixel = [&cam](const Vector3d &d) {
-      return vpImagePoint(cam.get_py() * d.y() / d.z() + cam.get_v0(),
-                          cam.get_px() * d.x() / d.z() + cam.get_u0());
+      return vpImagePoint(cam.get_py() * d.y() / d.z() + cam.get_v0(), cam.get_px() * d.x() / d.z() + cam.get_u0());
     };
     vpDisplay::displayLine(I, pixel(low), pixel(high), color, thickness);
   }
@@ -54,8 +50,7 @@ void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameter
 /// sin(theta) = rho.
 Vector3d planeOf(const vpFeatureLine &line)
 {
-  return Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho())
-      .normalized();
+  return Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho()).normalized();
 }
 } // namespace
 
@@ -87,8 +82,7 @@ void vpFeatureTrunk::buildFrom(const bole::RelativeTrunk &relative, double radiu
 {
   if (!relative.isFinite() || !(radius > 0)) {
     throw vpException(vpException::badValue,
-                      fmt::format("r/d = {}, radius = {}, must be below 1 and above 0",
-                                  relative.ratio(), radius));
+                      fmt::format("r/d = {}, radius = {}, must be below 1 and above 0", relative.ratio(), radius));
   }
   m_radius = radius;
   set(relative);
@@ -99,8 +93,7 @@ void vpFeatureTrunk::buildFrom(const bole::Trunk &trunk, const bole::Pose &wMc)
   buildFrom(bole::relativeTrunk(wMc, bole::Pose(), trunk), trunk.radius());
 }
 
-void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine &other_border,
-                               double radius)
+void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine &other_border, double radius)
 {
   Vector3d one = planeOf(border), other = planeOf(other_border);
   Vector3d axis = one.cross(other); // in both planes
@@ -114,8 +107,7 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
   to_one = to_one.z() < 0 ? Vector3d(-to_one) : to_one;
   to_other = to_other.z() < 0 ? Vector3d(-to_other) : to_other;
   const Vector3d m = (to_one + to_other).normalized();
-  const double ratio =
-      0.5 * (to_one - to_other).norm(); // sine of half the angle between the borders
+  const double ratio = 0.5 * (to_one - to_other).norm(); // sine of half the angle between the borders
   if (!(ratio < 1) || !m.allFinite()) {
     throw vpException(vpException::badValue, fmt::format("r/d = {}, must be below 1", ratio));
   }
@@ -125,8 +117,7 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
   buildFrom(relative, radius);
 }
 
-void vpFeatureTrunk::buildFrom(double bearing, double inclination, double tip, double log_ratio,
-                               double radius)
+void vpFeatureTrunk::buildFrom(double bearing, double inclination, double tip, double log_ratio, double radius)
 {
   bole::RelativeTrunk relative;
   relative.cRt = frameOf(bearing, inclination, tip);
@@ -149,15 +140,13 @@ bole::RelativeTrunk vpFeatureTrunk::relativeTrunk() const
 vpMatrix vpFeatureTrunk::interaction(unsigned int select)
 {
   if (!flags[0]) {
-    throw vpException(vpException::notInitialized,
-                      "vpFeatureTrunk: buildFrom() must come before interaction()");
+    throw vpException(vpException::notInitialized, "vpFeatureTrunk: buildFrom() must come before interaction()");
   }
   const Eigen::Matrix3d cRt = frameOf(s[0], s[1], s[2]);
   const Vector3d m = cRt.col(0), n = cRt.col(1), a = cRt.col(2);
   const double across = m.z() * m.z() + n.z() * n.z(), flat = a.x() * a.x() + a.y() * a.y();
   Eigen::Matrix<double, 4, 6> L = Eigen::Matrix<double, 4, 6>::Zero();
-  L.row(0) << n.transpose() / distance(),
-      (a - a.z() / across * (m.z() * m + n.z() * n)).transpose();
+  L.row(0) << n.transpose() / distance(), (a - a.z() / across * (m.z() * m + n.z() * n)).transpose();
   // a' = [a]x w: rows of the skew matrix of a.
   const Vector3d ax(0, -a.z(), a.y()), ay(a.z(), 0, -a.x()), az(-a.y(), a.x(), 0);
   L.block<1, 3>(1, 3) = ((a.x() * ay - a.y() * ax) / flat).transpose();
@@ -203,14 +192,14 @@ void vpFeatureTrunk::print(unsigned int select) const
 
 vpFeatureTrunk *vpFeatureTrunk::duplicate() const { return new vpFeatureTrunk; }
 
-void vpFeatureTrunk::display(const vpCameraParameters &cam, const vpImage<unsigned char> &I,
-                             const vpColor &color, unsigned int thickness) const
+void vpFeatureTrunk::display(const vpCameraParameters &cam, const vpImage<unsigned char> &I, const vpColor &color,
+                             unsigned int thickness) const
 {
   displayBorders(relativeTrunk(), cam, I, color, thickness);
 }
 
-void vpFeatureTrunk::display(const vpCameraParameters &cam, const vpImage<vpRGBa> &I,
-                             const vpColor &color, unsigned int thickness) const
+void vpFeatureTrunk::display(const vpCameraParameters &cam, const vpImage<vpRGBa> &I, const vpColor &color,
+                             unsigned int thickness) const
 {
   displayBorders(relativeTrunk(), cam, I, color, thickness);
 }

@@ -27,8 +27,8 @@ void Smoother::State::checkPose(std::size_t pose) const
 void Smoother::State::checkTrunk(std::size_t trunk) const
 {
   if (trunk >= trunks.size() || trunks[trunk].removed)
-    throw vpException(vpException::badValue, "trunk = %zu, must be one of the %zu and not removed",
-                      trunk, trunks.size());
+    throw vpException(vpException::badValue, "trunk = %zu, must be one of the %zu and not removed", trunk,
+                      trunks.size());
 }
 
 /// From the estimate to the point; new points are shifted as those of their neighbours.
@@ -59,8 +59,8 @@ std::size_t Smoother::State::newPose(const Pose &point)
 
 std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prior)
 {
-  if (!point.minus(Trunk()).allFinite() || !prior.mean.minus(Trunk()).allFinite() ||
-      !prior.sigma.allFinite() || !(prior.sigma.array() > 0).all())
+  if (!point.minus(Trunk()).allFinite() || !prior.mean.minus(Trunk()).allFinite() || !prior.sigma.allFinite() ||
+      !(prior.sigma.array() > 0).all())
     throw vpException(vpException::badValue, "trunk, must be finite with sigmas above 0");
   TrunkState trunk;
   trunk.point = shifted(point, shiftOfPoint(static_cast<int>(poses.size()) - 1));
@@ -171,8 +171,7 @@ void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFac
   ++seen.observations;
   ++live_observations;
   observations.push_back({summary, root});
-  newFactor(FactorKind::observation, static_cast<int>(observations.size()) - 1,
-            poses[pose].variable, seen.variable);
+  newFactor(FactorKind::observation, static_cast<int>(observations.size()) - 1, poses[pose].variable, seen.variable);
 }
 
 void Smoother::State::removeTrunk(int trunk)

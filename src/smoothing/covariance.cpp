@@ -10,8 +10,7 @@ namespace bole
 {
 template <int Columns>
 Eigen::Matrix<double, Columns, Columns>
-Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X,
-                             int count)
+Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X, int count)
 {
   using Rows = Eigen::Map<Eigen::Matrix<double, 6, Columns>>;
   position.resize(variables.size(), -1);
@@ -21,8 +20,7 @@ Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6,
       position[v] = 0;
       path.push_back(v);
     }
-  std::sort(path.begin(), path.end(),
-            [this](int l, int r) { return variables[l].order < variables[r].order; });
+  std::sort(path.begin(), path.end(), [this](int l, int r) { return variables[l].order < variables[r].order; });
   path_rows.resize(std::max(path_rows.size(), path.size()));
   for (std::size_t slot = 0; slot < path.size(); ++slot) {
     position[path[slot]] = static_cast<int>(slot);
@@ -77,8 +75,7 @@ Matrix6d Smoother::State::poseCovariance(int pose)
   if (!isOpen(state.variable))
     return state.closed_covariance;
   if (!variables[state.variable].eliminated)
-    throw vpException(vpException::notInitialized, "pose = %d, must be taken in by update() first",
-                      pose);
+    throw vpException(vpException::notInitialized, "pose = %d, must be taken in by update() first", pose);
   const Matrix6d X = Matrix6d::Identity();
   return inverseForm<6>(&state.variable, &X, 1);
 }
@@ -97,8 +94,7 @@ Matrix4d Smoother::State::relativeCovariance(int trunk)
            J_trunk * trunkCovariance(trunk) * J_trunk.transpose();
   }
   if (!variables[newest.variable].eliminated)
-    throw vpException(vpException::notInitialized,
-                      "newest pose, must be taken in by update() first");
+    throw vpException(vpException::notInitialized, "newest pose, must be taken in by update() first");
   const int ids[2] = {newest.variable, seen.variable};
   Eigen::Matrix<double, 6, 4> X[2];
   X[0] = J_pose.transpose();

@@ -11,8 +11,7 @@ namespace
 using Map = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
 /// Adds [J_a J_b]^T [J_a J_b r] to the lower triangle of the front.
-template <int Rows, int A, int B>
-void addBinary(const double *linear, double *front, int ld, int at_a, int at_b)
+template <int Rows, int A, int B> void addBinary(const double *linear, double *front, int ld, int at_a, int at_b)
 {
   const Eigen::Map<const Eigen::Matrix<double, Rows, A>> J_a(linear);
   const Eigen::Map<const Eigen::Matrix<double, Rows, B>> J_b(linear + Rows * A);
@@ -204,8 +203,7 @@ void Smoother::State::eliminate(int id)
   if (damping > 0)
     for (int i = 0; i < v.dim; ++i)
       front[i * ld + i] += damping * damping_scale[id](i);
-  held_directions +=
-      v.is_pose ? factorFront<6>(front.data(), ld) : factorFront<5>(front.data(), ld);
+  held_directions += v.is_pose ? factorFront<6>(front.data(), ld) : factorFront<5>(front.data(), ld);
 
   // keep the columns of L, y, and the contribution
   const int rows = ld - 1;

@@ -21,12 +21,10 @@ Graph Smoother::State::graph() const
     if (trunks[j].removed || !isOpen(trunks[j].variable))
       continue;
     place[trunks[j].variable] = graph.trunks.size();
-    graph.trunks.push_back(
-        {static_cast<std::int64_t>(poses.size() + j), estimate(trunks[j]), trunks[j].prior});
+    graph.trunks.push_back({static_cast<std::int64_t>(poses.size() + j), estimate(trunks[j]), trunks[j].prior});
   }
   if (oldest_open_pose > 0) // what the closed poses leave behind, reduced to the pose after them
-    graph.pose_priors.push_back(
-        {0, {graph.poses.front().wMb, poses[oldest_open_pose - 1].closed_covariance}});
+    graph.pose_priors.push_back({0, {graph.poses.front().wMb, poses[oldest_open_pose - 1].closed_covariance}});
   for (const Factor &factor : factors) {
     if (!factor.alive)
       continue;
@@ -56,20 +54,17 @@ Graph Smoother::State::graph() const
 
 std::size_t Smoother::State::memoryBytes() const
 {
-  std::size_t bytes =
-      store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
-      poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
-      observations.size() * sizeof(ObservationData) + odometry.size() * sizeof(OdometryData) +
-      relative_poses.size() * sizeof(RelativePoseData) +
-      pose_priors.size() * sizeof(PosePriorData) + heights.size() * sizeof(Height);
+  std::size_t bytes = store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
+                      poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
+                      observations.size() * sizeof(ObservationData) + odometry.size() * sizeof(OdometryData) +
+                      relative_poses.size() * sizeof(RelativePoseData) + pose_priors.size() * sizeof(PosePriorData) +
+                      heights.size() * sizeof(Height);
   for (const Variable &v : variables)
-    bytes += (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) +
-             (v.factors.capacity() + v.children.capacity() + v.separator.capacity() +
-              v.assembled.capacity()) *
-                 sizeof(int);
+    bytes +=
+        (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) +
+        (v.factors.capacity() + v.children.capacity() + v.separator.capacity() + v.assembled.capacity()) * sizeof(int);
   for (const MarginalData &data : marginals)
-    bytes += sizeof(MarginalData) +
-             static_cast<std::size_t>(data.H.size() + 2 * data.g.size()) * sizeof(double);
+    bytes += sizeof(MarginalData) + static_cast<std::size_t>(data.H.size() + 2 * data.g.size()) * sizeof(double);
   return bytes;
 }
 } // namespace bole

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
 #include "smoothing/factors.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -13,20 +13,18 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 template <int N>
-Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N, N> &covariance,
-                                                  const char *name)
+Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N, N> &covariance, const char *name)
 {
   using Square = Eigen::Matrix<double, N, N>;
   const Eigen::LLT<Square> factor(covariance);
-  const bool usable = covariance.allFinite() && factor.info() == Eigen::Success &&
-                      (covariance - covariance.transpose()).cwiseAbs().maxCoeff() <=
-                          1e-6 * covariance.cwiseAbs().maxCoeff();
+  const bool usable =
+      covariance.allFinite() && factor.info() == Eigen::Success &&
+      (covariance - covariance.transpose()).cwiseAbs().maxCoeff() <= 1e-6 * covariance.cwiseAbs().maxCoeff();
   Square S = Square::Identity();
   if (usable)
     factor.matrixL().solveInPlace(S);
   if (!usable || !S.allFinite())
-    throw vpException(vpException::badValue, "%s, must be finite, symmetric and positive definite",
-                      name);
+    throw vpException(vpException::badValue, "%s, must be finite, symmetric and positive definite", name);
   return S;
 }
 template Matrix6d squareRootInformation<6>(const Matrix6d &, const char *);
@@ -44,8 +42,8 @@ Vector6d residual(const PosePrior &prior, const Matrix6d &S, const Pose &wMb, Ma
   return S * xi;
 }
 
-Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, const Pose &wMb,
-                  Matrix6d *J_a, Matrix6d *J_b)
+Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, const Pose &wMb, Matrix6d *J_a,
+                  Matrix6d *J_b)
 {
   const Pose aMb = wMa.inverse() * wMb;
   const Vector6d xi = aMb.minus(odometry.aMb);
@@ -68,8 +66,8 @@ Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, 
   return S * xi;
 }
 
-Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc,
-                  const Pose &wMa, const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b)
+Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc, const Pose &wMa,
+                  const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b)
 {
   const Matrix3d cRb = bMc.R.transpose();
   const Matrix3d bRa = wMb.R.transpose() * wMa.R;
@@ -93,8 +91,7 @@ Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S,
     if (sine > 1e-6) { // d(angle / sine): in_plane and cosine move with u
       const Eigen::Vector2d along = in_plane / sine;
       const double by_sine = cosine / sine - angle / (sine * sine);
-      J_u += in_plane *
-             (by_sine * along.transpose() * basis.transpose() - measurement.direction.transpose());
+      J_u += in_plane * (by_sine * along.transpose() * basis.transpose() - measurement.direction.transpose());
     }
     J_t = J_u * (Matrix3d::Identity() - u * u.transpose()) / length;
   }
@@ -132,8 +129,8 @@ Vector5d residual(const TrunkPrior &prior, const Trunk &trunk)
   return trunk.minus(prior.mean).cwiseQuotient(prior.sigma);
 }
 
-Vector4d residual(const SquareRootSummary &summary, const Pose &bMc, const Pose &wMb,
-                  const Trunk &trunk, Matrix46d *J_pose, Matrix45d *J_trunk)
+Vector4d residual(const SquareRootSummary &summary, const Pose &bMc, const Pose &wMb, const Trunk &trunk,
+                  Matrix46d *J_pose, Matrix45d *J_trunk)
 {
   const RelativeTrunk relative = relativeTrunk(wMb, bMc, trunk, J_pose, J_trunk);
   Matrix4d J;

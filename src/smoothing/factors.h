@@ -68,19 +68,18 @@ struct TrunkPrior
 /// Square roots S of information matrices, S^T S = covariance^-1. Throws vpException(badValue)
 /// naming \p name when \p covariance is not finite, symmetric and positive definite.
 template <int N>
-Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N, N> &covariance,
-                                                  const char *name);
+Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N, N> &covariance, const char *name);
 
 /// Residuals. \p S is the square root information; Jacobians may be null.
 Vector6d residual(const PosePrior &prior, const Matrix6d &S, const Pose &wMb, Matrix6d *J);
-Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, const Pose &wMb,
-                  Matrix6d *J_a, Matrix6d *J_b);
-Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc,
-                  const Pose &wMa, const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b);
+Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, const Pose &wMb, Matrix6d *J_a,
+                  Matrix6d *J_b);
+Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc, const Pose &wMa,
+                  const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b);
 double residual(const Height &height, const Pose &wMb, Matrix16d *J);
 Vector5d residual(const TrunkPrior &prior, const Trunk &trunk);
 /// Zero residual and Jacobians where the camera stands in the axis: such a view says nothing
 /// usable.
-Vector4d residual(const SquareRootSummary &summary, const Pose &bMc, const Pose &wMb,
-                  const Trunk &trunk, Matrix46d *J_pose, Matrix45d *J_trunk);
+Vector4d residual(const SquareRootSummary &summary, const Pose &bMc, const Pose &wMb, const Trunk &trunk,
+                  Matrix46d *J_pose, Matrix45d *J_trunk);
 } // namespace bole

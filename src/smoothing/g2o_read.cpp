@@ -81,8 +81,7 @@ private:
     errno = 0;
     const long long value = std::strtoll(text.c_str(), &end, 10);
     if (end != text.c_str() + text.size() || value < 0 || errno == ERANGE)
-      fail(fmt::format("{}: id = {}, must be a whole number of at least 0 and below 2^63",
-                       m_fields[0], text));
+      fail(fmt::format("{}: id = {}, must be a whole number of at least 0 and below 2^63", m_fields[0], text));
     return value;
   }
   template <int N> Eigen::Matrix<double, N, 1> vector()
@@ -96,8 +95,7 @@ private:
   {
     const Eigen::Vector4d q = vector<4>();
     if (!(std::abs(q.norm() - 1) < 1e-3))
-      fail(fmt::format("{}: quaternion of length {:.6g}, must have length 1", m_fields[0],
-                       q.norm()));
+      fail(fmt::format("{}: quaternion of length {:.6g}, must have length 1", m_fields[0], q.norm()));
     return Eigen::Quaterniond(q(3), q(0), q(1), q(2)).normalized().toRotationMatrix();
   }
   Pose pose()
@@ -113,8 +111,7 @@ private:
         m(r, c) = m(c, r) = number();
     return m;
   }
-  template <int N>
-  Eigen::Matrix<double, N, N> positiveDefinite(const Eigen::Matrix<double, N, N> &m)
+  template <int N> Eigen::Matrix<double, N, N> positiveDefinite(const Eigen::Matrix<double, N, N> &m)
   {
     try {
       squareRootInformation<N>(m, "matrix");
@@ -128,8 +125,7 @@ private:
   {
     Vector6d scale;
     scale << 1, 1, 1, 0.5, 0.5, 0.5;
-    const Matrix6d information =
-        scale.asDiagonal() * positiveDefinite<6>(upper<6>()) * scale.asDiagonal();
+    const Matrix6d information = scale.asDiagonal() * positiveDefinite<6>(upper<6>()) * scale.asDiagonal();
     const Matrix6d inverse = information.inverse();
     return positiveDefinite<6>(0.5 * (inverse + inverse.transpose()));
   }
@@ -216,9 +212,7 @@ private:
     edge.prior.mean = pose();
     edge.prior.covariance = covariance();
     m_graph.pose_priors.push_back(edge);
-    later([this, a, i = m_graph.pose_priors.size() - 1] {
-      m_graph.pose_priors[i].pose = find(m_pose_of, a, "pose");
-    });
+    later([this, a, i = m_graph.pose_priors.size() - 1] { m_graph.pose_priors[i].pose = find(m_pose_of, a, "pose"); });
   }
   void readSummary()
   {
@@ -268,9 +262,7 @@ private:
     if (!(edge.height.sigma > 0))
       fail("EDGE_HEIGHT: sigma, must be above 0");
     m_graph.heights.push_back(edge);
-    later([this, a, i = m_graph.heights.size() - 1] {
-      m_graph.heights[i].pose = find(m_pose_of, a, "pose");
-    });
+    later([this, a, i = m_graph.heights.size() - 1] { m_graph.heights[i].pose = find(m_pose_of, a, "pose"); });
   }
   void readLoss()
   {

@@ -51,8 +51,7 @@ void putInformation(std::ostream &out, const Matrix6d &covariance)
   Vector6d scale;
   scale << 1, 1, 1, 2, 2, 2;
   const Matrix6d information = covariance.inverse();
-  putUpper<6>(out, scale.asDiagonal() * (0.5 * (information + information.transpose())) *
-                       scale.asDiagonal());
+  putUpper<6>(out, scale.asDiagonal() * (0.5 * (information + information.transpose())) * scale.asDiagonal());
 }
 
 Vector5d numbers(const Trunk &trunk) { return trunk.minus(Trunk{{0, 0}, 0, {0, 0}}); }
@@ -62,10 +61,8 @@ void writeG2o(std::ostream &out, const Graph &graph)
 {
   out << "PARAMS_SE3OFFSET 0";
   put(out, graph.bMc);
-  out << fmt::format("\nLOSS summary {} {:.17g}\n", toString(graph.summary_loss.kind),
-                     graph.summary_loss.width);
-  out << fmt::format("LOSS direction {} {:.17g}\n", toString(graph.direction_loss.kind),
-                     graph.direction_loss.width);
+  out << fmt::format("\nLOSS summary {} {:.17g}\n", toString(graph.summary_loss.kind), graph.summary_loss.width);
+  out << fmt::format("LOSS direction {} {:.17g}\n", toString(graph.direction_loss.kind), graph.direction_loss.width);
   for (const Graph::PoseVertex &vertex : graph.poses) {
     out << "VERTEX_SE3:QUAT " << vertex.id;
     put(out, vertex.wMb);
@@ -99,8 +96,7 @@ void writeG2o(std::ostream &out, const Graph &graph)
     out << '\n';
   }
   for (const Graph::HeightEdge &edge : graph.heights)
-    out << fmt::format("EDGE_HEIGHT {} {:.17g} {:.17g}\n", pose(edge.pose), edge.height.z,
-                       edge.height.sigma);
+    out << fmt::format("EDGE_HEIGHT {} {:.17g} {:.17g}\n", pose(edge.pose), edge.height.z, edge.height.sigma);
   for (const Graph::ObservationEdge &edge : graph.observations) {
     out << "EDGE_TRUNK_SUMMARY " << pose(edge.pose) << ' ' << graph.trunks[edge.trunk].id;
     put(out, edge.summary.optimum.cRt);

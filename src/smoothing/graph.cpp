@@ -16,14 +16,11 @@ double cost(const Graph &graph)
   }
   for (const Graph::OdometryEdge &edge : graph.odometry) {
     const Matrix6d S = squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
-    sum += 0.5 *
-           residual(edge.odometry, S, pose(edge.a), pose(edge.b), nullptr, nullptr).squaredNorm();
+    sum += 0.5 * residual(edge.odometry, S, pose(edge.a), pose(edge.b), nullptr, nullptr).squaredNorm();
   }
   for (const Graph::RelativePoseEdge &edge : graph.relative_poses) {
-    const Matrix5d S =
-        squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
-    const Vector5d r =
-        residual(edge.measurement, S, graph.bMc, pose(edge.a), pose(edge.b), nullptr, nullptr);
+    const Matrix5d S = squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
+    const Vector5d r = residual(edge.measurement, S, graph.bMc, pose(edge.a), pose(edge.b), nullptr, nullptr);
     sum += 0.5 * graph.direction_loss.rho(r.squaredNorm());
   }
   for (const Graph::HeightEdge &edge : graph.heights) {
@@ -34,10 +31,8 @@ double cost(const Graph &graph)
     SquareRootSummary root;
     const SummaryStatus status = squareRoot(edge.summary, root);
     if (status != SummaryStatus::ok && status != SummaryStatus::projected)
-      throw vpException(vpException::badValue, "summary = %s, must be positive semi-definite",
-                        toString(status));
-    const Vector4d r = residual(root, graph.bMc, pose(edge.pose), graph.trunks[edge.trunk].trunk,
-                                nullptr, nullptr);
+      throw vpException(vpException::badValue, "summary = %s, must be positive semi-definite", toString(status));
+    const Vector4d r = residual(root, graph.bMc, pose(edge.pose), graph.trunks[edge.trunk].trunk, nullptr, nullptr);
     sum += 0.5 * graph.summary_loss.rho(r.squaredNorm());
   }
   for (const Graph::TrunkVertex &vertex : graph.trunks)
@@ -121,8 +116,7 @@ void validate(const Graph &graph)
     const Graph::RelativePoseEdge &edge = graph.relative_poses[i];
     if (edge.a >= n || edge.b >= n || edge.a == edge.b)
       fail("relative pose", i, "must name two poses");
-    if (!edge.measurement.caRcb.allFinite() ||
-        !(std::abs(edge.measurement.direction.norm() - 1) < 1e-6))
+    if (!edge.measurement.caRcb.allFinite() || !(std::abs(edge.measurement.direction.norm() - 1) < 1e-6))
       fail("relative pose", i, "must be finite with a direction of length 1");
     squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
   }

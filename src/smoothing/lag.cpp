@@ -28,8 +28,7 @@ void Smoother::State::closeVariable(int id)
     if (factor.kind == FactorKind::observation)
       --live_observations;
     const std::vector<int> pair = {factor.a, factor.b};
-    for (const int other :
-         factor.kind == FactorKind::marginal ? marginals[factor.data].variables : pair)
+    for (const int other : factor.kind == FactorKind::marginal ? marginals[factor.data].variables : pair)
       if (other >= 0 && other != id) {
         std::vector<int> &list = variables[other].factors;
         list.erase(std::remove(list.begin(), list.end(), f), list.end());
@@ -70,8 +69,7 @@ void Smoother::State::closeVariable(int id)
     factors.push_back(factor);
     Variable &parent = variables[v.parent];
     parent.assembled.push_back(id_factor);
-    parent.children.erase(std::remove(parent.children.begin(), parent.children.end(), id),
-                          parent.children.end());
+    parent.children.erase(std::remove(parent.children.begin(), parent.children.end(), id), parent.children.end());
   }
   v.life = Life::closed;
   for (std::vector<int> *list : {&v.factors, &v.assembled, &v.separator})
@@ -93,8 +91,7 @@ void Smoother::State::closeBehindLag()
     for (std::size_t i = 0; i < open_trunks.size();) {
       const int id = open_trunks[i];
       const TrunkState &trunk = trunks[variables[id].number];
-      if (variables[id].life == Life::open &&
-          (trunk.last_pose >= oldest_open_pose || !isLeaf(id))) {
+      if (variables[id].life == Life::open && (trunk.last_pose >= oldest_open_pose || !isLeaf(id))) {
         ++i;
         continue;
       }

@@ -12,9 +12,8 @@ template <int Rows, int Columns> using Block = Eigen::Map<Eigen::Matrix<double, 
 
 /// Writes [J_a J_b -r] with the square root of the loss' weight; returns rho / 2.
 template <int Rows, int A, int B>
-double store2(const Loss &loss, const Eigen::Matrix<double, Rows, A> &J_a,
-              const Eigen::Matrix<double, Rows, B> &J_b, const Eigen::Matrix<double, Rows, 1> &r,
-              double *linear)
+double store2(const Loss &loss, const Eigen::Matrix<double, Rows, A> &J_a, const Eigen::Matrix<double, Rows, B> &J_b,
+              const Eigen::Matrix<double, Rows, 1> &r, double *linear)
 {
   const double s = r.squaredNorm();
   const double root = std::sqrt(loss.weight(s));
@@ -25,8 +24,7 @@ double store2(const Loss &loss, const Eigen::Matrix<double, Rows, A> &J_a,
 }
 
 template <int Rows, int A>
-double store1(const Eigen::Matrix<double, Rows, A> &J, const Eigen::Matrix<double, Rows, 1> &r,
-              double *linear)
+double store1(const Eigen::Matrix<double, Rows, A> &J, const Eigen::Matrix<double, Rows, 1> &r, double *linear)
 {
   for (int c = 0; c < A; ++c)
     for (int i = 0; i < Rows; ++i)
@@ -65,8 +63,7 @@ void Smoother::State::linearise(Factor &factor)
   case FactorKind::relative_pose: {
     Matrix56d J_a, J_b;
     const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r =
-        residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), &J_a, &J_b);
+    const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), &J_a, &J_b);
     factor.cost = store2<5, 6, 6>(options.direction_loss, J_a, J_b, r, factor.linear);
     break;
   }
@@ -115,13 +112,11 @@ double Smoother::State::costAtEstimate(const Factor &factor) const
   }
   case FactorKind::odometry: {
     const OdometryData &data = odometry[factor.data];
-    return 0.5 * residual(data.factor, data.S, pose(factor.a), pose(factor.b), nullptr, nullptr)
-                     .squaredNorm();
+    return 0.5 * residual(data.factor, data.S, pose(factor.a), pose(factor.b), nullptr, nullptr).squaredNorm();
   }
   case FactorKind::relative_pose: {
     const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b),
-                                nullptr, nullptr);
+    const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), nullptr, nullptr);
     return 0.5 * options.direction_loss.rho(r.squaredNorm());
   }
   case FactorKind::height: {

@@ -24,8 +24,7 @@ LossKind lossKindFromString(const std::string &name)
   for (const LossKind kind : {LossKind::quadratic, LossKind::huber, LossKind::cauchy})
     if (name == toString(kind))
       return kind;
-  throw vpException(vpException::badValue, "loss = %s, must be quadratic, huber or cauchy",
-                    name.c_str());
+  throw vpException(vpException::badValue, "loss = %s, must be quadratic, huber or cauchy", name.c_str());
 }
 
 double Loss::rho(double s) const

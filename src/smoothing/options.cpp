@@ -43,14 +43,11 @@ void SmootherOptions::validate() const
   positive("prior_lean_sigma", prior_lean_sigma);
   positive("prior_position_sigma", prior_position_sigma);
   if (!(propagation_threshold >= 0))
-    throw vpException(vpException::badValue, "propagation_threshold = %g, must be at least 0",
-                      propagation_threshold);
+    throw vpException(vpException::badValue, "propagation_threshold = %g, must be at least 0", propagation_threshold);
   if (max_iterations < 1)
-    throw vpException(vpException::badValue, "max_iterations = %d, must be at least 1",
-                      max_iterations);
+    throw vpException(vpException::badValue, "max_iterations = %d, must be at least 1", max_iterations);
   if (fixed_lag != 0 && fixed_lag < 2)
-    throw vpException(vpException::badValue, "fixed_lag = %d, must be 0 (off) or at least 2",
-                      fixed_lag);
+    throw vpException(vpException::badValue, "fixed_lag = %d, must be 0 (off) or at least 2", fixed_lag);
   if (!bMc.isFinite())
     throw vpException(vpException::badValue, "bMc, must be finite");
 }

@@ -9,9 +9,8 @@ namespace bole
 namespace
 {
 constexpr double kWeightShare = 0.2;
-constexpr double kLargestTurn = 0.045; ///< [rad] of a pose against its point, however common
-constexpr std::size_t kFactorsProbed =
-    6; ///< of a trunk, newest to oldest, for their linearisation error
+constexpr double kLargestTurn = 0.045;    ///< [rad] of a pose against its point, however common
+constexpr std::size_t kFactorsProbed = 6; ///< of a trunk, newest to oldest, for their linearisation error
 } // namespace
 
 /// Whitened residual that the linearisation predicts at the estimates.
@@ -66,9 +65,9 @@ double Smoother::State::linearisationError(const Factor &factor) const
   if (factor.stale)
     return 0;
   if (factor.kind == FactorKind::observation) {
-    const Vector4d r = residual(observations[factor.data].root, options.bMc,
-                                estimate(poses[variables[factor.a].number]),
-                                estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
+    const Vector4d r =
+        residual(observations[factor.data].root, options.bMc, estimate(poses[variables[factor.a].number]),
+                 estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
     return modelError<4>(options.summary_loss, factor.cost, r, linearPrediction(factor).head<4>());
   }
   if (factor.kind == FactorKind::odometry) {
@@ -79,11 +78,9 @@ double Smoother::State::linearisationError(const Factor &factor) const
   }
   if (factor.kind == FactorKind::relative_pose) {
     const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r =
-        residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
-                 estimate(poses[variables[factor.b].number]), nullptr, nullptr);
-    return modelError<5>(options.direction_loss, factor.cost, r,
-                         linearPrediction(factor).head<5>());
+    const Vector5d r = residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
+                                estimate(poses[variables[factor.b].number]), nullptr, nullptr);
+    return modelError<5>(options.direction_loss, factor.cost, r, linearPrediction(factor).head<5>());
   }
   return 0;
 }
@@ -92,11 +89,9 @@ double Smoother::State::linearisationError(const Factor &factor) const
 double Smoother::State::inThresholds(const Variable &variable, const Vector6d &step) const
 {
   const double moved_by = step.head(variable.is_pose ? 3 : 2).cwiseAbs().maxCoeff();
-  const double rest =
-      variable.is_pose
-          ? step.tail<3>().cwiseAbs().maxCoeff() / options.relinearise_rotation
-          : std::max(std::abs(step(2)) / options.relinearise_log_radius,
-                     step.segment<2>(3).cwiseAbs().maxCoeff() / options.relinearise_lean);
+  const double rest = variable.is_pose ? step.tail<3>().cwiseAbs().maxCoeff() / options.relinearise_rotation
+                                       : std::max(std::abs(step(2)) / options.relinearise_log_radius,
+                                                  step.segment<2>(3).cwiseAbs().maxCoeff() / options.relinearise_lean);
   return std::max(moved_by / options.relinearise_position, rest);
 }
 
@@ -115,8 +110,7 @@ Eigen::Vector3d Smoother::State::displacement(const Variable &variable) const
 Eigen::Vector3d Smoother::State::ownDisplacement(const Variable &variable) const
 {
   const Eigen::Vector3d own = displacement(variable);
-  return variable.parent < 0 ? own
-                             : Eigen::Vector3d(own - displacement(variables[variable.parent]));
+  return variable.parent < 0 ? own : Eigen::Vector3d(own - displacement(variables[variable.parent]));
 }
 
 /// What the estimate moved since the factors were last found good.
@@ -146,8 +140,8 @@ bool Smoother::State::movedTooFar(Variable &variable) const
     return true;
   bool all = true; // both ends as of now: else what looks bent is one end left behind
   const auto isWhole = [&](const Factor &factor) {
-    const bool whole = variables[factor.a].visited + 1 >= passes &&
-                       (factor.b < 0 || variables[factor.b].visited + 1 >= passes);
+    const bool whole =
+        variables[factor.a].visited + 1 >= passes && (factor.b < 0 || variables[factor.b].visited + 1 >= passes);
     all = all && whole;
     return whole;
   };

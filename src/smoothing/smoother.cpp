@@ -84,18 +84,14 @@ std::size_t Smoother::addTrunk(const Trunk &guess)
   TrunkPrior prior;
   prior.mean.xy = guess.xy;
   prior.mean.log_radius = std::log(o.prior_radius);
-  prior.sigma << o.prior_position_sigma, o.prior_position_sigma, o.prior_log_radius_sigma,
-      o.prior_lean_sigma, o.prior_lean_sigma;
+  prior.sigma << o.prior_position_sigma, o.prior_position_sigma, o.prior_log_radius_sigma, o.prior_lean_sigma,
+      o.prior_lean_sigma;
   return m_state->newTrunk(guess, prior);
 }
 
-std::size_t Smoother::addTrunk(const Trunk &guess, const TrunkPrior &prior)
-{
-  return m_state->newTrunk(guess, prior);
-}
+std::size_t Smoother::addTrunk(const Trunk &guess, const TrunkPrior &prior) { return m_state->newTrunk(guess, prior); }
 
-SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk,
-                                       const SummaryFactor &summary)
+SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary)
 {
   m_state->checkPose(pose);
   m_state->checkTrunk(trunk);
@@ -107,8 +103,7 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk,
   return status;
 }
 
-void Smoother::addRelativePose(std::size_t a, std::size_t b,
-                               const RelativePoseMeasurement &measurement)
+void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement)
 {
   m_state->checkPose(a);
   m_state->checkPose(b);
@@ -120,8 +115,8 @@ void Smoother::addRelativePose(std::size_t a, std::size_t b,
           "relative pose, must be finite with a direction of length 1");
   m_state->relative_poses.push_back(
       {measurement, squareRootInformation<5>(measurement.covariance, "relative pose covariance")});
-  m_state->newFactor(FactorKind::relative_pose,
-                     static_cast<int>(m_state->relative_poses.size()) - 1, variable_a, variable_b);
+  m_state->newFactor(FactorKind::relative_pose, static_cast<int>(m_state->relative_poses.size()) - 1, variable_a,
+                     variable_b);
 }
 
 void Smoother::addOdometry(std::size_t a, std::size_t b, const Odometry &odometry)
@@ -136,11 +131,10 @@ void Smoother::addHeight(std::size_t pose, double z, double sigma)
 {
   m_state->checkPose(pose);
   require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
-  require(std::isfinite(z) && std::isfinite(sigma) && sigma > 0,
-          "height, must be finite with a sigma above 0");
+  require(std::isfinite(z) && std::isfinite(sigma) && sigma > 0, "height, must be finite with a sigma above 0");
   m_state->heights.push_back({z, sigma});
-  m_state->newFactor(FactorKind::height, static_cast<int>(m_state->heights.size()) - 1,
-                     m_state->poses[pose].variable, -1);
+  m_state->newFactor(FactorKind::height, static_cast<int>(m_state->heights.size()) - 1, m_state->poses[pose].variable,
+                     -1);
 }
 
 void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)
@@ -148,8 +142,7 @@ void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)
   m_state->checkPose(pose);
   require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
   require(prior.mean.isFinite(), "pose prior, must be finite");
-  m_state->pose_priors.push_back(
-      {prior, squareRootInformation<6>(prior.covariance, "pose prior covariance")});
+  m_state->pose_priors.push_back({prior, squareRootInformation<6>(prior.covariance, "pose prior covariance")});
   m_state->newFactor(FactorKind::pose_prior, static_cast<int>(m_state->pose_priors.size()) - 1,
                      m_state->poses[pose].variable, -1);
 }

@@ -48,7 +48,7 @@ struct Variable
   Vector6d probed = Vector6d::Zero(); ///< the delta at which the linearisation was last found good
   Eigen::Vector3d probed_displacement = Eigen::Vector3d::Zero(); ///< against the parent, then
   int affected = 0;                                              ///< stamp
-  unsigned visited = 0; ///< the back-substitution that last came by
+  unsigned visited = 0;                                          ///< the back-substitution that last came by
 
   // node of the elimination tree
   bool eliminated = false;
@@ -57,9 +57,8 @@ struct Variable
   int separator_dim = 0;
   std::int64_t order = -1;
   std::vector<int> children, separator, assembled;
-  std::vector<double> columns; ///< (dim + separator_dim) x dim, column-major: L_vv over L_sv
-  std::vector<double>
-      contribution; ///< packed lower triangle on the separator, then its right-hand side
+  std::vector<double> columns;      ///< (dim + separator_dim) x dim, column-major: L_vv over L_sv
+  std::vector<double> contribution; ///< packed lower triangle on the separator, then its right-hand side
   std::array<double, 6> y{};
   double share = 0; ///< of the cost of the linearised graph
 };
@@ -78,13 +77,12 @@ struct Factor
 {
   FactorKind kind = FactorKind::pose_prior;
   bool alive = true;
-  bool stale = true;     ///< linearise before the next elimination
-  int data = 0;          ///< index among the data of its kind
-  int a = -1, b = -1;    ///< variables (marginal: see its data)
-  int assembled_at = -1; ///< variable whose front takes it in
-  double *linear =
-      nullptr;     ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual
-  double cost = 0; ///< rho / 2 at the point of linearisation
+  bool stale = true;        ///< linearise before the next elimination
+  int data = 0;             ///< index among the data of its kind
+  int a = -1, b = -1;       ///< variables (marginal: see its data)
+  int assembled_at = -1;    ///< variable whose front takes it in
+  double *linear = nullptr; ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual
+  double cost = 0;          ///< rho / 2 at the point of linearisation
 };
 
 /// Rows of the whitened residual (not of a marginal).
@@ -164,8 +162,7 @@ public:
   int newFactor(FactorKind kind, int data, int a, int b);
   void dropFactor(int factor);
   void addOdometryFactor(int a, int b, const Odometry &measured);
-  void addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
-                            const SquareRootSummary &root);
+  void addObservationFactor(int pose, int trunk, const SummaryFactor &summary, const SquareRootSummary &root);
   void removeTrunk(int trunk);
   void mergeTrunks(int keep, int gone);
   void checkPose(std::size_t pose) const;
@@ -231,8 +228,8 @@ public:
   // covariance.cpp
   /// y = L^-1 X with X zero but for the rows of the variables given; returns y^T y.
   template <int Columns>
-  Eigen::Matrix<double, Columns, Columns>
-  inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X, int count);
+  Eigen::Matrix<double, Columns, Columns> inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X,
+                                                      int count);
   Matrix5d trunkCovariance(int trunk);
   Matrix6d poseCovariance(int pose);
   Matrix4d relativeCovariance(int trunk);

@@ -10,15 +10,14 @@ namespace bole
 {
 namespace
 {
-constexpr int kRecentPoses = 64; ///< behind the newest, all of them keep their contribution
-constexpr int kContributionEvery =
-    8;                      ///< older poses that keep it; the rest is eliminated again if needed
-constexpr int kReach = 256; ///< variables below the eliminated ones that a pass visits
+constexpr int kRecentPoses = 64;                  ///< behind the newest, all of them keep their contribution
+constexpr int kContributionEvery = 8;             ///< older poses that keep it; the rest is eliminated again if needed
+constexpr int kReach = 256;                       ///< variables below the eliminated ones that a pass visits
 constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
 constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
-constexpr int kNearAge = 100; ///< poses behind the newest: points that reach no farther may always move
+constexpr int kNearAge = 100;          ///< poses behind the newest: points that reach no farther may always move
 constexpr unsigned kFartherEvery = 16; ///< passes until some may reach twice as far, and so on
-constexpr int kQuiet = 16;    ///< variables in a row that are near their solution: the rest is left
+constexpr int kQuiet = 16;             ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
 void Smoother::State::touch(int variable) { touched.push_back(variable); }
@@ -175,8 +174,7 @@ int Smoother::State::reach()
   if (options.propagation_threshold == 0)
     return std::numeric_limits<int>::max();
   int depth = kReach;
-  for (unsigned pass = passes; pass % kPassesBetween == 0 && depth < 1 << 28;
-       pass /= kPassesBetween)
+  for (unsigned pass = passes; pass % kPassesBetween == 0 && depth < 1 << 28; pass /= kPassesBetween)
     depth *= 2;
   return depth;
 }
@@ -263,8 +261,8 @@ int Smoother::State::reachBack(const Variable &variable) const
 /// what the points beyond the seam are shifted: positions fit together on both sides, and a common
 /// shift is exactly linear in all that is measured.
 ///
-/// Moving old points, or a trunk that was seen long ago, eliminates all since again: the farther back, the seldomer. What
-/// must wait is found once more by a later pass.
+/// Moving old points, or a trunk that was seen long ago, eliminates all since again: the farther back, the seldomer.
+/// What must wait is found once more by a later pass.
 void Smoother::State::moveLinearisation(UpdateResult &result)
 {
   const int age = movableAge();
@@ -283,8 +281,7 @@ void Smoother::State::moveLinearisation(UpdateResult &result)
     move(id);
     for (const int f : v.factors) // what is between two is not put right by moving one
       if (v.is_pose && factors[f].kind == FactorKind::observation &&
-          linearisationError(factors[f]) > options.linearisation_tolerance &&
-          mayMove(variables[factors[f].b]))
+          linearisationError(factors[f]) > options.linearisation_tolerance && mayMove(variables[factors[f].b]))
         move(factors[f].b);
   }
   moved.clear();

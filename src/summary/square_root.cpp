@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
 #include "summary/square_root.h"
+#include "geometry/so3.h"
 
 #include <Eigen/Eigenvalues>
 
@@ -34,10 +34,8 @@ Vector4d SquareRootSummary::residual(const RelativeTrunk &relative, Matrix4d *J)
 SummaryStatus squareRoot(const SummaryFactor &factor, SquareRootSummary &root)
 {
   const RelativeTrunk &x = factor.optimum;
-  if (!x.isFinite() || !factor.f.allFinite() || !factor.F.allFinite() ||
-      !std::isfinite(factor.energy) ||
-      !(x.cRt.transpose() * x.cRt).isApprox(Eigen::Matrix3d::Identity(), 1e-5) ||
-      x.cRt.determinant() < 0)
+  if (!x.isFinite() || !factor.f.allFinite() || !factor.F.allFinite() || !std::isfinite(factor.energy) ||
+      !(x.cRt.transpose() * x.cRt).isApprox(Eigen::Matrix3d::Identity(), 1e-5) || x.cRt.determinant() < 0)
     return SummaryStatus::not_finite;
   const Matrix4d F = 0.5 * (factor.F + factor.F.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix4d> eigen(F);

@@ -20,7 +20,7 @@ void EnergyOptions::validate() const
 
 TrunkEnergy::TrunkEnergy(const Gradient &gradient, const PinholeCamera &camera, const ElevationRange &range,
                          const BorderTarget &left, const BorderTarget &right, const EnergyOptions &options)
-  : m_gradient(gradient), m_camera(camera), m_range(range), m_left(left), m_right(right), m_options(options)
+    : m_gradient(gradient), m_camera(camera), m_range(range), m_left(left), m_right(right), m_options(options)
 {
 }
 
@@ -83,8 +83,8 @@ TrunkEnergy::Curvature TrunkEnergy::curvature(const RelativeTrunk &relative) con
     if (!(H.sum() > 0)) // along a sideways move of the whole border
       curvature.negative = true;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(H);
-    const Eigen::Matrix2d H_psd = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
-                                  eigen.eigenvectors().transpose();
+    const Eigen::Matrix2d H_psd =
+        eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
     const auto J = borderJacobian(m_camera, relative, border, line);
     curvature.F += J.transpose() * H_psd * J;
   }

@@ -20,7 +20,8 @@
 
 namespace bole
 {
-enum class EnergyForm {
+enum class EnergyForm
+{
   absolute_mean, ///< abs of the mean of the signed gradient, either polarity
   paper          ///< Eq. 3: negative part on the left border, positive part on the right, summed
 };
@@ -31,8 +32,8 @@ struct EnergyOptions
   /// Weight of one border, absolute_mean: 1/alpha is the variance [px^2] of a border's place at contrast. 0.01 to
   /// 100. Chosen so that the normalised estimation error squared of mapped trunks is near its degrees of freedom.
   double alpha = 0.5;
-  double paper_alpha = 1000;    ///< weight of Eq. 3 in the paper form, 1 to 1e6; the paper's value
-  double contrast_floor = 0.02; ///< contrast below which a border weighs less [full scale/px], 0.001 to 0.5
+  double paper_alpha = 1000;     ///< weight of Eq. 3 in the paper form, 1 to 1e6; the paper's value
+  double contrast_floor = 0.02;  ///< contrast below which a border weighs less [full scale/px], 0.001 to 0.5
   double hessian_step_px = 0.75; ///< of the central differences of the Hessian, 0.1 to 3
 
   void validate() const; ///< \throw vpException naming the option, its value and the range

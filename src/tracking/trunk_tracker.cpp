@@ -174,7 +174,7 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   const VisibleBorder right = look(camera, prediction, Border::right, options.rows_min);
   if (!left.visible && !right.visible)
     return finish(prediction.left_hidden || prediction.right_hidden ? TrackingStatus::occluded
-                                                                  : TrackingStatus::not_visible);
+                                                                    : TrackingStatus::not_visible);
 
   // where the borders may be, and which pair of maxima they are
   RelativeTrunk start = prediction.relative;

@@ -30,7 +30,8 @@ struct TrackingOptions
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
-enum class TrackingStatus {
+enum class TrackingStatus
+{
   tracked,
   not_visible,        ///< no border long enough in the image
   occluded,           ///< hidden by nearer trunks
@@ -60,7 +61,7 @@ struct TrackingResult
   Matrix4d F = Matrix4d::Zero(); ///< its Hessian, positive semi-definite
   double left_contrast = 0, right_contrast = 0; ///< signed; 0 where the border was not used
   bool left_used = false, right_used = false;
-  double evenness = 0;   ///< mean of evennessAlong() over the borders used, 0 to 1
+  double evenness = 0;  ///< mean of evennessAlong() over the borders used, 0 to 1
   double scan_cost = 0; ///< of the chosen pair
 };
 

@@ -31,8 +31,9 @@ const std::map<std::string, Stages> kAllowed = {
     {"detection", {"geometry", "gradient", "saliency"}},
     {"smoothing", {"geometry", "summary"}},
     {"output", {"geometry", "input", "map"}},
-    {"pipeline", {"geometry", "input", "gradient", "motion", "saliency", "detection", "tracking", "summary", "smoothing",
-                  "map", "output"}},
+    {"pipeline",
+     {"geometry", "input", "gradient", "motion", "saliency", "detection", "tracking", "summary", "smoothing", "map",
+      "output"}},
     {"tasks", {"geometry", "input", "map", "tracking", "servo", "pipeline"}},
     {"trials", {"geometry", "input", "map", "tracking", "servo", "output", "pipeline", "simulation", "tasks"}}};
 

@@ -3,9 +3,9 @@
 /// \file
 /// A made-up flight with known motion, and an emulator that flies it.
 
-#include <bole/ardrone_source.h>
-#include "lab/emulator/emulator.h"
 #include "geometry/so3.h"
+#include "lab/emulator/emulator.h"
+#include <bole/ardrone_source.h>
 
 #include <chrono>
 #include <cmath>
@@ -27,8 +27,7 @@ public:
 
   static Pose pose(double t)
   {
-    Pose wMb(expSo3(Eigen::Vector3d(0, 0, 0.2 * t)) *
-                 expSo3(Eigen::Vector3d(0.05 * std::sin(t), 0.03, 0)),
+    Pose wMb(expSo3(Eigen::Vector3d(0, 0, 0.2 * t)) * expSo3(Eigen::Vector3d(0.05 * std::sin(t), 0.03, 0)),
              {t, 0.3 * std::sin(t), 1.5 + 0.05 * t});
     return wMb;
   }
@@ -43,8 +42,7 @@ public:
     for (unsigned v = 0; v < m_height; ++v)
       for (unsigned u = 0; u < m_width; ++u)
         frame.image[v][u] = static_cast<unsigned char>(
-            128 +
-            80 * std::sin(0.13 * (u + 3.0 * static_cast<double>(m_index))) * std::cos(0.1 * v));
+            128 + 80 * std::sin(0.13 * (u + 3.0 * static_cast<double>(m_index))) * std::cos(0.1 * v));
     const double t = static_cast<double>(m_index) * 0.05;
     frame.wMb_odometry = pose(t);
     for (int i = 1; i <= 10 && m_index > 0; ++i) {
@@ -57,12 +55,7 @@ public:
   }
   PinholeCamera camera() const override
   {
-    return {120,
-            120,
-            (m_width - 1) / 2.0,
-            (m_height - 1) / 2.0,
-            static_cast<int>(m_width),
-            static_cast<int>(m_height)};
+    return {120, 120, (m_width - 1) / 2.0, (m_height - 1) / 2.0, static_cast<int>(m_width), static_cast<int>(m_height)};
   }
   Pose bMc() const override { return forwardCamera(); }
   std::string name() const override { return "made-up flight"; }
@@ -75,8 +68,7 @@ private:
 };
 
 inline std::unique_ptr<ArDroneEmulator> emulate(int generation, std::size_t frames,
-                                                const ArDroneEmulator::Options &options = {},
-                                                bool loop = false)
+                                                const ArDroneEmulator::Options &options = {}, bool loop = false)
 {
   MadeUpFlight flight(frames);
   SequenceFeedOptions feed;

@@ -17,9 +17,8 @@ TEST(AtCommand, WritesFloatsAsTheDeveloperGuideDoes)
 
 TEST(AtCommand, ReadsSeveralCommandsOfADatagram)
 {
-  const auto commands =
-      parseAtCommands("AT*PCMD=21625,1,0,0,0,0\rAT*REF=21626,290717696\rrubbish\rAT*CONFIG=3,"
-                      "\"general:navdata_demo\",\"FALSE\"\r");
+  const auto commands = parseAtCommands("AT*PCMD=21625,1,0,0,0,0\rAT*REF=21626,290717696\rrubbish\rAT*CONFIG=3,"
+                                        "\"general:navdata_demo\",\"FALSE\"\r");
   ASSERT_EQ(commands.size(), 3u);
   EXPECT_EQ(commands[0].name, "PCMD");
   EXPECT_EQ(commands[0].sequence, 21625);
@@ -34,8 +33,8 @@ TEST(ArDroneAddress, ReadsHostPortsAndOptions)
   const auto plain = ArDroneAddress::parse("ardrone://");
   EXPECT_EQ(plain.host, "192.168.1.1");
   EXPECT_EQ(plain.video_port, 5555);
-  const auto address = ArDroneAddress::parse(
-      "ardrone://127.0.0.1?offset=10000&at=7000&generation=1&camera=a/b.yaml&video_delay_ms=10");
+  const auto address =
+      ArDroneAddress::parse("ardrone://127.0.0.1?offset=10000&at=7000&generation=1&camera=a/b.yaml&video_delay_ms=10");
   EXPECT_EQ(address.host, "127.0.0.1");
   EXPECT_EQ(address.navdata_port, 15554);
   EXPECT_EQ(address.video_port, 15555);
@@ -51,9 +50,8 @@ TEST(ArDroneAddress, ReadsHostPortsAndOptions)
 TEST(ArDroneAddress, SaysWhatIsWrong)
 {
   for (const char *wrong :
-       {"ardrone://host:5555", "ardrone://h?video=70000", "ardrone://h?offset=x",
-        "ardrone://h?generation=3", "ardrone://h?color=red", "tcp://h",
-        "ardrone://h?video=60000&offset=59000"}) {
+       {"ardrone://host:5555", "ardrone://h?video=70000", "ardrone://h?offset=x", "ardrone://h?generation=3",
+        "ardrone://h?color=red", "tcp://h", "ardrone://h?video=60000&offset=59000"}) {
     try {
       ArDroneAddress::parse(wrong);
       ADD_FAILURE() << wrong;

@@ -9,10 +9,9 @@ using namespace bole;
 TEST(ArDroneCamera, TheFilesEqualThePublishedValuesInTheCode)
 {
   for (const int generation : {1, 2}) {
-    const auto file = readCamera(std::string(BOLE_SOURCE_DIR) + "/config/cameras/ardrone" +
-                                 std::to_string(generation) + ".yaml");
-    const auto code =
-        generation == 1 ? publishedArDroneCamera(1, 320, 240) : publishedArDroneCamera(2, 640, 360);
+    const auto file =
+        readCamera(std::string(BOLE_SOURCE_DIR) + "/config/cameras/ardrone" + std::to_string(generation) + ".yaml");
+    const auto code = generation == 1 ? publishedArDroneCamera(1, 320, 240) : publishedArDroneCamera(2, 640, 360);
     EXPECT_EQ(file.model.pinhole.fx, code.model.pinhole.fx);
     EXPECT_EQ(file.model.pinhole.fy, code.model.pinhole.fy);
     EXPECT_EQ(file.model.pinhole.cx, code.model.pinhole.cx);

@@ -21,8 +21,7 @@ TEST(ClockUnwrapper, KeepsNavdataTimeGoingForThreeHours)
   ClockUnwrapper clock(kNavdataTimePeriod_us);
   std::int64_t first = 0;
   for (std::int64_t time_us = 0; time_us < 3LL * 3600 * 1'000'000; time_us += 777'777) {
-    const std::int64_t seen =
-        clock.unwrap(navdataTimeMicroseconds(navdataTimeWord(2'000'000'000 + time_us)));
+    const std::int64_t seen = clock.unwrap(navdataTimeMicroseconds(navdataTimeWord(2'000'000'000 + time_us)));
     if (time_us == 0)
       first = seen;
     ASSERT_EQ(seen - first, time_us);
@@ -41,8 +40,7 @@ TEST(ClockFit, FindsTheOffsetUnderJitterAndDrift)
       const auto drone_ns = static_cast<std::int64_t>(1e9 * (host * (1 + drift) - 123));
       fit.add(drone_ns, static_cast<std::int64_t>(1e9 * (host + 0.002 + delay(random))));
       if (i > 2000)
-        largest = std::max(
-            largest, std::abs(static_cast<double>(fit.toHost(drone_ns)) * 1e-9 - host - 0.002));
+        largest = std::max(largest, std::abs(static_cast<double>(fit.toHost(drone_ns)) * 1e-9 - host - 0.002));
     }
     EXPECT_LT(largest, 0.002) << "drift " << drift;
   }
@@ -59,7 +57,7 @@ TEST(ClockFit, StartsAnewAfterAReboot)
 
 TEST(ClockFit, IsNotReadyBeforeAFastPacketMayHaveCome)
 {
-  ClockFit fit; // 0.3 s
+  ClockFit fit;                           // 0.3 s
   fit.add(0, 1'000'000'000 + 90'000'000); // the first packet was slow
   EXPECT_FALSE(fit.isReady());
   fit.add(100'000'000, 1'100'000'000 + 1'000'000);

@@ -27,8 +27,7 @@ TEST(FlightFolder, IsReadBackAsTheFlightThatWasWritten)
       frame.picture.y.assign(320 * 240, static_cast<std::uint8_t>(40 * i + 10));
       frame.body = BodyState{};
       frame.body->wMb = test::MadeUpFlight::pose(0.1 * i);
-      frame.gyro = {{frame.stamp_ns - 50'000'000, {0.1, 0.2, 0.3}},
-                    {frame.stamp_ns, {0.4, 0.5, 0.6}}};
+      frame.gyro = {{frame.stamp_ns - 50'000'000, {0.1, 0.2, 0.3}}, {frame.stamp_ns, {0.4, 0.5, 0.6}}};
       writer.write(frame);
       sent.push_back(frame);
     }

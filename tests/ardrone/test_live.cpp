@@ -56,9 +56,8 @@ void expectRisingStamps(const std::vector<Frame> &frames)
 class Live : public testing::TestWithParam<int>
 {
 };
-INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2), [](const auto &generation) {
-  return "ArDrone" + std::to_string(generation.param);
-});
+INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2),
+                         [](const auto &generation) { return "ArDrone" + std::to_string(generation.param); });
 
 TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
 {
@@ -79,8 +78,7 @@ TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
       first_seen = frames[i].wMb_odometry;
       first_flown = flown;
     }
-    const Vector6d error =
-        (first_seen->inverse() * *frames[i].wMb_odometry).minus(first_flown->inverse() * flown);
+    const Vector6d error = (first_seen->inverse() * *frames[i].wMb_odometry).minus(first_flown->inverse() * flown);
     EXPECT_LT(error.head<3>().norm(), largest_error_m);
     EXPECT_LT(error.tail<3>().norm(), 0.1);
     EXPECT_NEAR(frames[i].wMb_odometry->t.z(), flown.t.z(),
@@ -109,8 +107,7 @@ TEST_P(Live, ASlowConsumerGetsTheNewestFrameAndTheOthersAreCounted)
   DroneLink link(emulator->address());
   LiveFrame frame;
   ASSERT_TRUE(emulator->wait(test::kPatience_s));
-  ASSERT_TRUE(eventually(
-      [&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
+  ASSERT_TRUE(eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
   ASSERT_TRUE(eventually([&] {
     const auto a = link.counters().video.frames;
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
@@ -140,9 +137,8 @@ TEST_P(Live, ComesBackByItselfAfterAReboot)
   // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was
   // flown.
   // The last ones may be too fresh for navdata on a slow machine: the newest that has some.
-  const auto last = std::find_if(frames.rbegin(), frames.rend(), [](const Frame &f) {
-    return f.status == FrameStatus::ok && f.wMb_odometry;
-  });
+  const auto last = std::find_if(frames.rbegin(), frames.rend(),
+                                 [](const Frame &f) { return f.status == FrameStatus::ok && f.wMb_odometry; });
   ASSERT_NE(last, frames.rend());
   EXPECT_GT(last->stamp_ns - frames.front().stamp_ns,
             1'000'000'000); // the reboot was in the first 1.5 s, of the host's or the drone's clock
@@ -155,8 +151,7 @@ TEST_P(Live, SeesAgainSoonAfterTheDroneIsBack)
   ArDroneEmulator::Options options;
   options.reboot_at_s = 1;
   options.reboot_for_s = 1; // longer than a link may be silent
-  const auto emulator =
-      emulate(GetParam(), 20 * static_cast<std::size_t>(test::kPatience_s), options);
+  const auto emulator = emulate(GetParam(), 20 * static_cast<std::size_t>(test::kPatience_s), options);
   DroneLink link(emulator->address());
   LiveFrame frame;
   std::int64_t back_ns = -1, seen_ns = -1;
@@ -171,8 +166,7 @@ TEST_P(Live, SeesAgainSoonAfterTheDroneIsBack)
   };
   ASSERT_TRUE(eventually(sees));
   RecordProperty("reconnected_after_ms", static_cast<int>((seen_ns - back_ns) / 1'000'000));
-  EXPECT_LT(seen_ns - back_ns, 10'000'000'000)
-      << "a second is meant; ten are for a machine that stumbles";
+  EXPECT_LT(seen_ns - back_ns, 10'000'000'000) << "a second is meant; ten are for a machine that stumbles";
 }
 
 TEST_P(Live, ClocksThatWrapAreNotNoticed)
@@ -245,8 +239,7 @@ TEST_P(Live, AFrozenCameraIsStale)
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].status == FrameStatus::missing)
       continue;
-    const bool frozen =
-        numbers[i] > 25 && numbers[i] <= 50; // the body must have moved on a little first
+    const bool frozen = numbers[i] > 25 && numbers[i] <= 50; // the body must have moved on a little first
     if (frozen) {
       EXPECT_NE(frames[i].status, FrameStatus::ok) << "frame " << numbers[i];
     }
@@ -270,8 +263,7 @@ TEST_P(Live, AStallOfTheVideoKeepsTheMotion)
       continue;
     // about 1.05 m/s (forward and swaying) is flown over the time that the stamps say has passed
     const double seconds = static_cast<double>(frame.stamp_ns - before.stamp_ns) * 1e-9;
-    EXPECT_NEAR((frame.wMb_odometry->t - before.wMb_odometry->t).norm(), 1.05 * seconds,
-                0.1 + 0.1 * seconds);
+    EXPECT_NEAR((frame.wMb_odometry->t - before.wMb_odometry->t).norm(), 1.05 * seconds, 0.1 + 0.1 * seconds);
     EXPECT_FALSE(frame.gyro.empty());
     EXPECT_TRUE(frame.odometry_covariance);
     ++missing;

@@ -97,8 +97,7 @@ TEST(Navdata, RefusesAPacketWithAnyByteChanged)
     for (const int change : {1, 0x40}) {
       auto bytes = good;
       bytes[at] = static_cast<std::uint8_t>(bytes[at] + change);
-      EXPECT_NE(parseNavdata(bytes.data(), bytes.size(), navdata), NavdataError::none)
-          << "byte " << at;
+      EXPECT_NE(parseNavdata(bytes.data(), bytes.size(), navdata), NavdataError::none) << "byte " << at;
     }
   for (std::size_t size = 0; size < good.size(); ++size)
     EXPECT_NE(parseNavdata(good.data(), size, navdata), NavdataError::none) << "cut at " << size;

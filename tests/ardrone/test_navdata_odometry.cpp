@@ -15,8 +15,8 @@ namespace
 constexpr float kQuarter_mdeg = 90'000;
 
 /// A packet with the drone's own axes and units: angles [mdeg], velocity [mm/s], rates [deg/s].
-Navdata packet(Eigen::Vector3f roll_pitch_yaw_mdeg, Eigen::Vector3f velocity_mm_s,
-               int altitude_mm = 1000, Eigen::Vector3f rate_deg_s = {0, 0, 0})
+Navdata packet(Eigen::Vector3f roll_pitch_yaw_mdeg, Eigen::Vector3f velocity_mm_s, int altitude_mm = 1000,
+               Eigen::Vector3f rate_deg_s = {0, 0, 0})
 {
   Navdata navdata;
   navdata.demo = Navdata::Demo{3u << 16, 80, roll_pitch_yaw_mdeg, altitude_mm, velocity_mm_s};
@@ -41,11 +41,8 @@ TEST(NavdataOdometry, TurningTheDroneAboutEachAxisTurnsTheBodyTheRightWay)
 
 TEST(NavdataOdometry, AttitudeComesBackFromItsAngles)
 {
-  for (const Eigen::Vector3d &angles :
-       {Eigen::Vector3d(0.1, -0.4, 2.9), Eigen::Vector3d(-1.2, 0.7, -3.0)})
-    EXPECT_LT(
-        (attitudeToDrone(attitudeFromDrone(angles.x(), angles.y(), angles.z())) - angles).norm(),
-        1e-12);
+  for (const Eigen::Vector3d &angles : {Eigen::Vector3d(0.1, -0.4, 2.9), Eigen::Vector3d(-1.2, 0.7, -3.0)})
+    EXPECT_LT((attitudeToDrone(attitudeFromDrone(angles.x(), angles.y(), angles.z())) - angles).norm(), 1e-12);
 }
 
 TEST(NavdataOdometry, GyroAndAttitudeAgreeAboutEachAxis)
@@ -61,8 +58,7 @@ TEST(NavdataOdometry, GyroAndAttitudeAgreeAboutEachAxis)
     Eigen::Matrix3d turned = odometry.at(0)->wMb.R;
     for (const GyroSample &sample : odometry.gyro(0, seconds(0.5)))
       turned = turned * expSo3(sample.rate * 0.005);
-    EXPECT_LT(logSo3(turned.transpose() * odometry.newest()->wMb.R).norm(), 1e-5)
-        << "axis " << axis;
+    EXPECT_LT(logSo3(turned.transpose() * odometry.newest()->wMb.R).norm(), 1e-5) << "axis " << axis;
     EXPECT_NEAR(logSo3(odometry.newest()->wMb.R).norm(), 5 * M_PI / 180, 1e-5);
   }
 }
@@ -102,8 +98,8 @@ TEST(NavdataOdometry, HeightFollowsTheSonarButNotAStepInTheGround)
   NavdataOdometry odometry;
   for (int i = 0; i <= 400; ++i) { // climbs at 0.5 m/s; a bush of 0.4 m passes below
     const bool bush = i >= 100 && i < 200;
-    odometry.add(seconds(i * 0.005), packet({0, 0, 0}, {500, 0, -500},
-                                            1000 + static_cast<int>(i * 2.5) - (bush ? 400 : 0)));
+    odometry.add(seconds(i * 0.005),
+                 packet({0, 0, 0}, {500, 0, -500}, 1000 + static_cast<int>(i * 2.5) - (bush ? 400 : 0)));
   }
   for (const double t : {0.25, 0.75, 1.5, 2.0}) {
     const auto state = odometry.at(seconds(t));
@@ -157,8 +153,7 @@ TEST(NavdataOdometry, ReadsTheSignsOfARealFlight)
 {
   // AR.Drone 1, a step of the forward command: nose down (negative pitch) makes the drone fly
   // forward.
-  const std::string folder =
-      std::string(BOLE_SHARED_DATA_DIR) + "/ardrone/ardrone1_telemetry/8sStepHalfMagNH1/";
+  const std::string folder = std::string(BOLE_SHARED_DATA_DIR) + "/ardrone/ardrone1_telemetry/8sStepHalfMagNH1/";
   std::FILE *pitch_file = std::fopen((folder + "theta_dump.dat").c_str(), "r");
   std::FILE *speed_file = std::fopen((folder + "vx_dump.dat").c_str(), "r");
   if (pitch_file == nullptr || speed_file == nullptr)
@@ -172,8 +167,8 @@ TEST(NavdataOdometry, ReadsTheSignsOfARealFlight)
       first = last = stamp;
     travelled += speed_mm_s * 1e-3 * (stamp - last);
     last = stamp;
-    odometry.add(seconds(stamp - first + 1), packet({0, static_cast<float>(pitch_mdeg), 0},
-                                                    {static_cast<float>(speed_mm_s), 0, 0}));
+    odometry.add(seconds(stamp - first + 1),
+                 packet({0, static_cast<float>(pitch_mdeg), 0}, {static_cast<float>(speed_mm_s), 0, 0}));
     lowest_nose = std::min(lowest_nose, (odometry.newest()->wMb.R * Eigen::Vector3d::UnitX()).z());
   }
   std::fclose(pitch_file);

@@ -11,8 +11,7 @@ using namespace bole;
 
 namespace
 {
-std::vector<std::uint8_t> envelope(std::uint32_t number, std::size_t payload,
-                                   std::uint16_t header_size = 64)
+std::vector<std::uint8_t> envelope(std::uint32_t number, std::size_t payload, std::uint16_t header_size = 64)
 {
   PaveHeader header;
   header.header_size = header_size;
@@ -28,8 +27,7 @@ std::vector<std::uint8_t> envelope(std::uint32_t number, std::size_t payload,
   return bytes;
 }
 
-std::vector<PaveFrame> parseAll(PaveParser &parser, const std::vector<std::uint8_t> &bytes,
-                                std::size_t piece)
+std::vector<PaveFrame> parseAll(PaveParser &parser, const std::vector<std::uint8_t> &bytes, std::size_t piece)
 {
   std::vector<PaveFrame> frames;
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
@@ -72,8 +70,7 @@ TEST(Pave, DecodesTheSeventeenFramesFromTheFirstKeyFrameOn)
     has_key = has_key || frame.header.frame_type == PaveFrameType::idr;
     if (!has_key)
       continue;
-    const auto result = decoder.decode(frame.payload, frame.header.display_width,
-                                       frame.header.display_height, picture);
+    const auto result = decoder.decode(frame.payload, frame.header.display_width, frame.header.display_height, picture);
     EXPECT_EQ(result, H264Decoder::Result::picture)
         << "frame " << frame.header.frame_number << ": " << decoder.message();
     whole += result == H264Decoder::Result::picture ? 1 : 0;

@@ -48,8 +48,7 @@ std::vector<std::size_t> writeTwenty(const std::string &folder)
   std::vector<std::size_t> ends;
   for (std::uint8_t i = 0; i < 20; ++i) {
     const std::vector<std::uint8_t> bytes(i * 7u, i);
-    writer.write(i % 2 == 0 ? LinkChannel::video : LinkChannel::navdata, 1000 + i, bytes.data(),
-                 bytes.size());
+    writer.write(i % 2 == 0 ? LinkChannel::video : LinkChannel::navdata, 1000 + i, bytes.data(), bytes.size());
     ends.push_back(writer.bytes());
   }
   EXPECT_EQ(writer.error(), "");
@@ -64,8 +63,7 @@ TEST(Recording, CutAtAnyByteItKeepsEveryPieceBeforeTheCut)
   auto bytes = bytesOf(folder.path + "/raw.bin");
   ASSERT_EQ(bytes.size(), ends.back());
   for (std::size_t cut = bytes.size() + 1; cut-- > 0;) {
-    RecordingReader reader(
-        std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(cut)));
+    RecordingReader reader(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(cut)));
     const auto whole = static_cast<std::size_t>(
         std::count_if(ends.begin(), ends.end(), [cut](std::size_t end) { return end <= cut; }));
     ASSERT_EQ(all(reader).size(), whole) << "cut at " << cut;
@@ -129,11 +127,11 @@ TEST(Recording, ARecordedFlightIsServedAgain)
       RecordingWriter writer(folder.path);
       const auto emulator = test::emulate(generation, 40);
       DroneLink link(emulator->address(), {},
-                     [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
-                         std::size_t size) { writer.write(channel, arrival_ns, data, size); });
+                     [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
+                       writer.write(channel, arrival_ns, data, size);
+                     });
       ASSERT_TRUE(emulator->wait(test::kPatience_s));
-      ASSERT_TRUE(test::eventually(
-          [&] { return link.counters().video.frames + link.counters().video.skipped >= 38; }));
+      ASSERT_TRUE(test::eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 38; }));
     }
     EXPECT_EQ(recordedGeneration(folder.path), generation);
     ArDroneEmulator replay(makeRecordingFeed(folder.path), {});

@@ -76,8 +76,7 @@ TEST(RobotArDrone, TakesOffMovesAndLands)
   v[1] = -0.35;
   v[4] = -0.435;
   robot.setVelocity(vpRobot::CAMERA_FRAME, v);
-  ASSERT_TRUE(
-      eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
+  ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
   const auto move = flying.last("PCMD");
   EXPECT_FLOAT_EQ(atFloatValue(move->arguments[2]), -0.5f);           // pitch, at its limit
   EXPECT_NEAR(atFloatValue(move->arguments[3]), 0.5, 1e-3);           // 0.35 of 0.7 m/s
@@ -98,8 +97,7 @@ TEST(RobotArDrone, LeftwardTiltsTheLeftSideDown)
   vpColVector v(6, 0.0);
   v[1] = 8;
   robot.setVelocity(vpRobot::REFERENCE_FRAME, v);
-  ASSERT_TRUE(
-      eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
+  ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
   EXPECT_FLOAT_EQ(atFloatValue(flying.last("PCMD")->arguments[1]), -0.5f);
 }
 
@@ -113,9 +111,8 @@ TEST(RobotArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
   robot.open(vpRobotArDrone::Permission::fly);
   robot.takeOff();
   robot.setVelocity(vpRobot::REFERENCE_FRAME, vpColVector(6, 0.1));
-  ASSERT_TRUE(eventually(
-      [&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "0"; })); // hovers
-  ASSERT_TRUE(eventually([&] { return flying.last("REF") && !flying.inAir(); }));        // lands
+  ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "0"; })); // hovers
+  ASSERT_TRUE(eventually([&] { return flying.last("REF") && !flying.inAir(); }));                           // lands
   const auto commands = flying.emulator->commands();
   EXPECT_TRUE(std::any_of(commands.begin(), commands.end(), [](const AtCommand &c) {
     return c.name == "REF" && (std::stol(c.arguments[0]) & 1 << 9) != 0;

@@ -35,8 +35,8 @@ vpImage<unsigned char> scene(unsigned width, unsigned height)
   vpImage<unsigned char> image(height, width);
   for (unsigned v = 0; v < height; ++v)
     for (unsigned u = 0; u < width; ++u)
-      image[v][u] = static_cast<unsigned char>(128 + 60 * std::sin(u * 0.15) * std::cos(v * 0.11) +
-                                               (u / 40 % 2 ? 50 : -50));
+      image[v][u] =
+          static_cast<unsigned char>(128 + 60 * std::sin(u * 0.15) * std::cos(v * 0.11) + (u / 40 % 2 ? 50 : -50));
   return image;
 }
 
@@ -47,10 +47,8 @@ double largestDifference(const YuvPicture &picture, const vpImage<unsigned char>
     largest = std::max(largest, std::abs(double(picture.y[i]) - image.bitmap[i]));
   return largest;
 }
-const std::string kPicture =
-    "0000000000000000100000 10 001 000 11111 00000000000000000000000000000101 ";
-const std::string kBlackMacroblock =
-    "0 10000000 0000000000 0000000000 0000000000 0000000000 0101010101 0101010101 ";
+const std::string kPicture = "0000000000000000100000 10 001 000 11111 00000000000000000000000000000101 ";
+const std::string kBlackMacroblock = "0 10000000 0000000000 0000000000 0000000000 0000000000 0101010101 0101010101 ";
 } // namespace
 
 TEST(Uvlc, ReadsTheWorkedExampleOfTheDeveloperGuide)
@@ -79,9 +77,8 @@ TEST(Uvlc, ReadsEveryRowOfTheCodeTables)
   };
   for (const Row &row :
        {Row{"1 10", 0, 1}, Row{"01 11", 1, -1}, Row{"0010 00100", 2, 2}, Row{"0011 00111", 3, -3},
-        Row{"000111 0001000", 7, 4}, Row{"00001000 000011111", 8, -15},
-        Row{"0000011111 00000111110", 31, 31}, Row{"000000111110 0000001000001", 62, -32},
-        Row{"1 000000011111110", 0, 127}}) {
+        Row{"000111 0001000", 7, 4}, Row{"00001000 000011111", 8, -15}, Row{"0000011111 00000111110", 31, 31},
+        Row{"000000111110 0000001000001", 62, -32}, Row{"1 000000011111110", 0, 127}}) {
     bool good = false;
     const auto levels = readBlock(std::string("0000000001 ") + row.bits + " 1 01", good);
     EXPECT_TRUE(good) << row.bits;
@@ -100,8 +97,7 @@ TEST(Uvlc, ReadsTheHeaderOfAPictureThatADroneSent)
 {
   // First bytes of a datagram published with the description of one decoder: VGA family, 320x240,
   // intra, quantiser 31, number 20590. The rest is cut off, so nothing else can be said.
-  const std::vector<std::uint8_t> bytes = {0x43, 0x82, 0x00, 0x00, 0x0d, 0x0a,
-                                           0x00, 0xe0, 0x0f, 0xe2, 0xf4, 0xcd};
+  const std::vector<std::uint8_t> bytes = {0x43, 0x82, 0x00, 0x00, 0x0d, 0x0a, 0x00, 0xe0, 0x0f, 0xe2, 0xf4, 0xcd};
   const UvlcResult result = decodeUvlc(bytes.data(), bytes.size());
   EXPECT_EQ(result.picture.width, 320);
   EXPECT_EQ(result.picture.height, 240);
@@ -145,8 +141,7 @@ TEST(Uvlc, DecodesAPictureWrittenByHand)
 
 TEST(Uvlc, DecodesWhatTheSeparateEncoderWrites)
 {
-  for (const auto &[width, height] :
-       {std::pair{320u, 240u}, std::pair{160u, 120u}, std::pair{176u, 144u}}) {
+  for (const auto &[width, height] : {std::pair{320u, 240u}, std::pair{160u, 120u}, std::pair{176u, 144u}}) {
     const auto image = scene(width, height);
     const auto bytes = encodeUvlc(image, 42);
     const UvlcResult result = decodeUvlc(bytes.data(), bytes.size());

@@ -88,8 +88,7 @@ TEST(VideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
   const auto good = encodedFlight(50);
   ASSERT_EQ(whole(good).size(), 50u);
   std::size_t longest = 0;
-  for (const Damage damage :
-       {Damage::lost, Damage::header, Damage::length, Damage::half, Damage::payload})
+  for (const Damage damage : {Damage::lost, Damage::header, Damage::length, Damage::half, Damage::payload})
     for (std::size_t hit = 0; hit < 2 * kKeyInterval; ++hit) {
       auto frames = good;
       frames[hit] = damaged(frames[hit], damage);
@@ -100,8 +99,7 @@ TEST(VideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
       std::size_t after = 0;
       for (const std::uint32_t number : numbers)
         after += number > key ? 1 : 0;
-      EXPECT_EQ(after, good.size() - key)
-          << "damage " << static_cast<int>(damage) << " in frame " << hit + 1;
+      EXPECT_EQ(after, good.size() - key) << "damage " << static_cast<int>(damage) << " in frame " << hit + 1;
       longest = std::max(longest, good.size() - numbers.size());
     }
   RecordProperty("most_frames_lost", static_cast<int>(longest));

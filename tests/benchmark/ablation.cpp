@@ -5,10 +5,10 @@
 
 #include "geometry/median.h"
 #include "input/asl_source.h"
-#include <bole/evaluation.h>
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/config.h>
+#include <bole/evaluation.h>
 #include <bole/pipeline.h>
 
 #include <cmath>
@@ -39,7 +39,8 @@ const std::vector<Step> kSteps = {
     {"detector: foreground not asked", {"detection.foreground_min=0"}},
     {"detector: agreement and inliers not asked", {"detection.agreement_min=0", "detection.inliers_min=0"}},
     {"detector: range not asked", {"detection.range_sigma_max=1", "detection.parallax_min=0"}},
-    {"odds not asked before confirmation", {"map.confirm_evidence=-20", "map.doubt_candidate=-50", "map.doubt_confirmed=-50"}},
+    {"odds not asked before confirmation",
+     {"map.confirm_evidence=-20", "map.doubt_candidate=-50", "map.doubt_confirmed=-50"}},
     {"saliency inside a trunk not asked", {"map.near_range=0"}},
     {"points behind a trunk not asked", {"map.through_range=0"}},
     {"merging off", {"map.merge_distance=0"}},
@@ -100,9 +101,10 @@ public:
   }
   void print(const char *name) const
   {
-    std::printf("| %s | %.2f (%.0f of %.0f) | %.2f | %.2f | %.2f / %.2f | %.1f | %.3f | %.3f |\n", name, m_found / m_expected,
-                m_found, m_expected, m_true / m_confirmed, m_duplicates / m_confirmed, medianOf(m_errors),
-                std::sqrt(m_squares / m_matches), medianOf(m_nees), std::sqrt(m_radius_squares / m_matches), medianOf(m_ate));
+    std::printf("| %s | %.2f (%.0f of %.0f) | %.2f | %.2f | %.2f / %.2f | %.1f | %.3f | %.3f |\n", name,
+                m_found / m_expected, m_found, m_expected, m_true / m_confirmed, m_duplicates / m_confirmed,
+                medianOf(m_errors), std::sqrt(m_squares / m_matches), medianOf(m_nees),
+                std::sqrt(m_radius_squares / m_matches), medianOf(m_ate));
   }
 
 private:
@@ -113,9 +115,10 @@ private:
 
 void printHeader(const std::string &title)
 {
-  std::printf("\n%s\n\n| step | recall | precision | duplicates | position, aligned: median / RMSE [m] | NEES/2 | radius "
-              "RMSE [m] | ATE [m] |\n|---|---|---|---|---|---|---|---|\n",
-              title.c_str());
+  std::printf(
+      "\n%s\n\n| step | recall | precision | duplicates | position, aligned: median / RMSE [m] | NEES/2 | radius "
+      "RMSE [m] | ATE [m] |\n|---|---|---|---|---|---|---|---|\n",
+      title.c_str());
 }
 
 void flyAll(const std::vector<std::string> &sequences)

@@ -5,8 +5,8 @@
 //
 //   benchmark_faults [loss]     about six minutes, or the rows that say so; BOLE_FAULT_SECONDS=8
 //   flies only the first 8 s
-#include <bole/ardrone_source.h>
 #include "lab/emulator/emulator.h"
+#include <bole/ardrone_source.h>
 #include <bole/open_source.h>
 
 #include <algorithm>
@@ -125,8 +125,8 @@ struct Outcome
   bool ended = false;
 };
 
-std::unique_ptr<ArDroneEmulator>
-startEmulator(int generation, const ArDroneEmulator::Options &options, std::size_t frames)
+std::unique_ptr<ArDroneEmulator> startEmulator(int generation, const ArDroneEmulator::Options &options,
+                                               std::size_t frames)
 {
   const auto sequence = openSource(kFlight);
   SequenceFeedOptions feed;
@@ -162,9 +162,8 @@ Outcome fly(int generation, const Fault &fault, std::size_t frames)
     since_last.clear();
     if (frame.status == FrameStatus::ok) {
       const YuvPicture &picture = source.liveFrame().picture;
-      outcome.good.push_back(
-          {gridOf(picture.y.data(), picture.width, picture.height), frame.arrival_ns,
-           static_cast<double>(nowNs() - frame.arrival_ns) * 1e-9, emulator->counters().flight_s});
+      outcome.good.push_back({gridOf(picture.y.data(), picture.width, picture.height), frame.arrival_ns,
+                              static_cast<double>(nowNs() - frame.arrival_ns) * 1e-9, emulator->counters().flight_s});
     }
   }
   outcome.link = source.counters();
@@ -182,8 +181,8 @@ int countStale(const Outcome &outcome, const std::vector<Grid> &flown, double ji
     const double behind_s = seen.flight_s - index / kRate_hz - kVideoDelay_s;
     if (index <= newest || behind_s > 1 / kRate_hz + jitter_s) {
       ++stale;
-      fmt::print(stderr, "picture {} after {} called ok, {:.3f} s behind; {:.3f} s old\n", index,
-                 newest, behind_s, seen.age_s);
+      fmt::print(stderr, "picture {} after {} called ok, {:.3f} s behind; {:.3f} s old\n", index, newest, behind_s,
+                 seen.age_s);
     }
     newest = std::max(newest, index);
   }
@@ -195,8 +194,7 @@ int countStale(const Outcome &outcome, const std::vector<Grid> &flown, double ji
 double recovery(const Outcome &outcome, const Fault &fault)
 {
   if (fault.over_s >= 0) {
-    const std::int64_t over_ns =
-        outcome.injected.started_ns + static_cast<std::int64_t>(fault.over_s * 1e9);
+    const std::int64_t over_ns = outcome.injected.started_ns + static_cast<std::int64_t>(fault.over_s * 1e9);
     for (const Seen &seen : outcome.good)
       if (seen.arrival_ns >= over_ns)
         return static_cast<double>(seen.arrival_ns - over_ns) * 1e-9;
@@ -208,18 +206,16 @@ double recovery(const Outcome &outcome, const Fault &fault)
   return static_cast<double>(longest_ns) * 1e-9;
 }
 
-std::string row(int generation, const Fault &fault, Outcome &outcome,
-                const std::vector<Grid> &flown)
+std::string row(int generation, const Fault &fault, Outcome &outcome, const std::vector<Grid> &flown)
 {
   const auto &in = outcome.injected;
   const auto of = [&](FrameStatus status) { return outcome.count[status]; };
-  return fmt::format(
-      "| {} | {} | {}, {} | {}, {}, {} | {}, {}, {}, {} | {} | {}, {} | {} | {} {:.2f} | {} |",
-      fault.name, generation, in.frames, in.navdata, in.lost, in.corrupted_frames,
-      in.corrupted_navdata, of(FrameStatus::ok), of(FrameStatus::corrupt), of(FrameStatus::stale),
-      of(FrameStatus::missing), outcome.link.dropped, outcome.link.navdata_refused,
-      outcome.link.navdata_late, countStale(outcome, flown, fault.options.jitter_s),
-      fault.over_s >= 0 ? "back" : "gap", recovery(outcome, fault), outcome.ended ? "yes" : "no");
+  return fmt::format("| {} | {} | {}, {} | {}, {}, {} | {}, {}, {}, {} | {} | {}, {} | {} | {} {:.2f} | {} |",
+                     fault.name, generation, in.frames, in.navdata, in.lost, in.corrupted_frames, in.corrupted_navdata,
+                     of(FrameStatus::ok), of(FrameStatus::corrupt), of(FrameStatus::stale), of(FrameStatus::missing),
+                     outcome.link.dropped, outcome.link.navdata_refused, outcome.link.navdata_late,
+                     countStale(outcome, flown, fault.options.jitter_s), fault.over_s >= 0 ? "back" : "gap",
+                     recovery(outcome, fault), outcome.ended ? "yes" : "no");
 }
 
 /// [s] from the drone's return to the first good frame, of \p times reboots. Thirty frames a
@@ -241,8 +237,7 @@ std::vector<double> reconnections(int generation, int times)
       const bool good = link.next(frame, 0.05) && frame.status == FrameStatus::ok;
       const auto counters = emulator->counters();
       const std::int64_t back_ns =
-          counters.started_ns +
-          static_cast<std::int64_t>((options.reboot_at_s / kSpeed + kReboot_s) * 1e9);
+          counters.started_ns + static_cast<std::int64_t>((options.reboot_at_s / kSpeed + kReboot_s) * 1e9);
       if (good && counters.reboots == 1 && frame.arrival_ns >= back_ns) {
         after_s.push_back(static_cast<double>(frame.arrival_ns - back_ns) * 1e-9);
         break;
@@ -258,8 +253,7 @@ int main(int argc, char **argv)
 {
   const std::string only = argc > 1 ? argv[1] : ""; // rows whose fault holds this
   const char *seconds = std::getenv("BOLE_FAULT_SECONDS");
-  const std::size_t frames =
-      seconds != nullptr ? static_cast<std::size_t>(kRate_hz * std::atof(seconds)) : 0;
+  const std::size_t frames = seconds != nullptr ? static_cast<std::size_t>(kRate_hz * std::atof(seconds)) : 0;
   const std::vector<Grid> flown = flownPictures();
   fmt::print("| fault | AR.Drone | sent: frames, navdata | lost, damaged frames, damaged navdata | "
              "ok, corrupt, stale, "
@@ -278,10 +272,9 @@ int main(int argc, char **argv)
   constexpr int kReboots = 12;
   for (const int generation : {2, 1}) {
     const auto after_s = reconnections(generation, kReboots);
-    fmt::print(
-        "AR.Drone {}: {} reboots, {} seen again; after {:.2f} s (median), {:.2f} s (longest)\n",
-        generation, kReboots, after_s.size(), after_s.empty() ? 0 : after_s[after_s.size() / 2],
-        after_s.empty() ? 0 : after_s.back());
+    fmt::print("AR.Drone {}: {} reboots, {} seen again; after {:.2f} s (median), {:.2f} s (longest)\n", generation,
+               kReboots, after_s.size(), after_s.empty() ? 0 : after_s[after_s.size() / 2],
+               after_s.empty() ? 0 : after_s.back());
   }
   return 0;
 }

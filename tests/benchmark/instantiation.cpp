@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// How long after its parallax suffices is a trunk instantiated, and confirmed? It suffices from the frame on in which the
-// trunk would count for recall if the flight ended there (VisibilityOptions: 8 frames in view, 3 degrees of bearing).
-// Usage: benchmark_instantiation SEQUENCE... (the rendered flights where none is given).
+// How long after its parallax suffices is a trunk instantiated, and confirmed? It suffices from the frame on in which
+// the trunk would count for recall if the flight ended there (VisibilityOptions: 8 frames in view, 3 degrees of
+// bearing). Usage: benchmark_instantiation SEQUENCE... (the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
+#include "evaluation/visibility.h"
 #include "geometry/median.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include "evaluation/visibility.h"
 #include <bole/pipeline.h>
 
 #include <algorithm>
@@ -104,8 +104,9 @@ struct Delays
 int main(int argc, char **argv)
 {
   try {
-    std::printf("| flight | trunks with parallax | instantiated: how many, median delay [frames], share within 5 frames | "
-                "confirmed: the same |\n|---|---|---|---|\n");
+    std::printf(
+        "| flight | trunks with parallax | instantiated: how many, median delay [frames], share within 5 frames | "
+        "confirmed: the same |\n|---|---|---|---|\n");
     Delays all;
     for (const std::string &sequence : bole::test::flightsOf(argc, argv)) {
       Delays delays;

@@ -2,8 +2,8 @@
 // Age of the frames of a live drone: an emulator flies there and back at twice real time, a
 // consumer works 15 ms on each frame. BOLE_LIVE_SECONDS (default 10) sets the length of the run, of
 // the host's clock.
-#include <bole/ardrone_source.h>
 #include "lab/emulator/emulator.h"
+#include <bole/ardrone_source.h>
 #include <bole/open_source.h>
 
 #include <algorithm>
@@ -42,8 +42,7 @@ void LiveFrameAge(benchmark::State &state)
     }
     if (ages_ms.size() < 20)
       return state.SkipWithError("too few frames");
-    const std::vector<double> last(ages_ms.end() - static_cast<std::ptrdiff_t>(ages_ms.size() / 10),
-                                   ages_ms.end());
+    const std::vector<double> last(ages_ms.end() - static_cast<std::ptrdiff_t>(ages_ms.size() / 10), ages_ms.end());
     const auto quantile = [](std::vector<double> values, double q) {
       std::sort(values.begin(), values.end());
       return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];

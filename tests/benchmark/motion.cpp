@@ -6,11 +6,11 @@
 ///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
 
 #include "input/asl_source.h"
-#include <bole/open_source.h>
 #include "motion/ground_plane.h"
 #include "motion/point_motion.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"
+#include <bole/open_source.h>
 
 #include <Eigen/Dense>
 #include <fmt/format.h>
@@ -72,8 +72,7 @@ Flight readFlight(const std::string &name)
 
 struct Errors
 {
-  std::vector<double> direction, direction_odometry, rotation, rotation_gyro, nees_rotation,
-      nees_direction;
+  std::vector<double> direction, direction_odometry, rotation, rotation_gyro, nees_rotation, nees_direction;
 };
 
 void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
@@ -89,9 +88,7 @@ void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
     const auto steps = motion.process(frame);
     time += threadTime() - before;
     for (const RelativeMotion &step : steps) {
-      const auto cameraAt = [&](std::size_t index) {
-        return *flight.frames[index].wMb_truth * flight.bMc;
-      };
+      const auto cameraAt = [&](std::size_t index) { return *flight.frames[index].wMb_truth * flight.bMc; };
       const Pose aMb = cameraAt(step.a_index).inverse() * cameraAt(step.b_index);
       Errors &e = errors[step.frames_back];
       const Eigen::Vector3d phi = logSo3(step.estimate.aRb.transpose() * aMb.R);
@@ -101,8 +98,8 @@ void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
         e.rotation_gyro.push_back(logSo3(cRc.transpose() * aMb.R).norm() * kDegrees);
       }
       if (step.odometry) {
-        e.direction_odometry.push_back(
-            directionMinus(aMb.t.normalized(), step.odometry->normalized()).norm() * kDegrees);
+        e.direction_odometry.push_back(directionMinus(aMb.t.normalized(), step.odometry->normalized()).norm() *
+                                       kDegrees);
       }
       if (step.estimate.hasDirection()) {
         e.rotation.push_back(phi.norm() * kDegrees);
@@ -117,12 +114,10 @@ void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
     fmt::print("{:13} {:4} {:4} {:2} | {:6.2f} -> {:5.2f} deg | {:.4f} -> {:.4f} deg | {:5.2f} "
                "({:4.2f}) {:6.2f} ({:4.2f}) | "
                "{:3}/{:3} | {:4.2f} ms\n",
-               flight.name, gyro ? "gyro" : "-", odometry ? "odo" : "-", back,
-               median(e.direction_odometry), median(e.direction), median(e.rotation_gyro),
-               median(e.rotation), mean(e.nees_rotation), median(e.nees_rotation),
-               mean(e.nees_direction), median(e.nees_direction), e.direction.size(),
-               flight.frames.size() - static_cast<std::size_t>(back),
-               time / double(flight.frames.size()));
+               flight.name, gyro ? "gyro" : "-", odometry ? "odo" : "-", back, median(e.direction_odometry),
+               median(e.direction), median(e.rotation_gyro), median(e.rotation), mean(e.nees_rotation),
+               median(e.nees_rotation), mean(e.nees_direction), median(e.nees_direction), e.direction.size(),
+               flight.frames.size() - static_cast<std::size_t>(back), time / double(flight.frames.size()));
   }
 }
 
@@ -162,8 +157,7 @@ void comparePaths(const Flight &flight)
     vertical_ms += t3 - t2;
     if (placed.status == PointOdometryStatus::ok && vertical.known()) {
       const Eigen::Vector3d up = placed.wMc.R.transpose() * vertical.up();
-      scale.add(heightOverGround(odometry.depths(), flight.camera, up), frame.wMb_truth->t.z(),
-                0.02);
+      scale.add(heightOverGround(odometry.depths(), flight.camera, up), frame.wMb_truth->t.z(), 0.02);
     }
   }
   const auto n = static_cast<Eigen::Index>(flight.frames.size());
@@ -182,8 +176,8 @@ void comparePaths(const Flight &flight)
   fmt::print("{:13} | {:.3f} m, {:.2f} % | {:.3f} m | {:.2f} deg | {:+.1f} % (sigma {:.1f} %) | "
              "{:.2f} + {:.2f} + {:.2f} ms\n",
              flight.name, by_points.ate, 100 * by_points.ate / length, by_filter.ate, tilt,
-             100 * (scale.metresPerUnit() / by_points.scale - 1), 100 * scale.relativeSigma(),
-             track_ms / double(n), place_ms / double(n), vertical_ms / double(n));
+             100 * (scale.metresPerUnit() / by_points.scale - 1), 100 * scale.relativeSigma(), track_ms / double(n),
+             place_ms / double(n), vertical_ms / double(n));
 }
 
 void plainVideo(const std::string &path)
@@ -205,16 +199,15 @@ void plainVideo(const std::string &path)
     ++statuses[toString(placed.status)];
     fmt::print("{:6.2f} s {:13} {:3} points, sigma {:.2f} px, at {:7.3f} {:7.3f} {:7.3f}, turned "
                "{:6.2f} deg\n",
-               1e-9 * double(frame.stamp_ns), toString(placed.status), placed.points,
-               placed.sigma_px, placed.wMc.t.x(), placed.wMc.t.y(), placed.wMc.t.z(),
-               logSo3(placed.wMc.R).norm() * kDegrees);
+               1e-9 * double(frame.stamp_ns), toString(placed.status), placed.points, placed.sigma_px, placed.wMc.t.x(),
+               placed.wMc.t.y(), placed.wMc.t.z(), logSo3(placed.wMc.R).norm() * kDegrees);
   }
   for (const auto &[status, count] : statuses) {
     fmt::print("{} {}\n", status, count);
   }
   if (vertical.known()) {
-    fmt::print("up in the first camera: {:.3f} {:.3f} {:.3f}\n", vertical.up().x(),
-               vertical.up().y(), vertical.up().z());
+    fmt::print("up in the first camera: {:.3f} {:.3f} {:.3f}\n", vertical.up().x(), vertical.up().y(),
+               vertical.up().z());
   }
 }
 } // namespace

@@ -4,10 +4,10 @@
 // after its confirmation on. Usage: benchmark_reidentification SEQUENCE... (the rendered flights where none is given).
 #include "support/rendered_flights.h"
 
-#include <bole/trunk.h>
 #include "input/asl_source.h"
 #include "input/truth.h"
 #include <bole/pipeline.h>
+#include <bole/trunk.h>
 
 #include <algorithm>
 #include <array>
@@ -164,9 +164,8 @@ Counts measure(const std::string &sequence)
       return other.status == TrunkStatus::confirmed && truthOf(other, truth) == real;
     };
     const auto any = [&](bool same) {
-      return std::any_of(flight.map.begin(), flight.map.end(), [&](const TrunkRecord &other) {
-        return (other.id == trunk.id) == same && stands(other);
-      });
+      return std::any_of(flight.map.begin(), flight.map.end(),
+                         [&](const TrunkRecord &other) { return (other.id == trunk.id) == same && stands(other); });
     };
     const bool is_back = viewsFrom(flight, curtain->end, trunk.id) >= kViewsBack && any(true);
     const bool is_other = any(false);
@@ -174,7 +173,9 @@ Counts measure(const std::string &sequence)
     counts.other_id += !is_back && is_other;
     std::printf("%s: trunk %d (truth %d) hidden in frames %zu to %zu: %s\n", sequence.c_str(), trunk.id, real->id,
                 curtain->first, curtain->end - 1,
-                is_back ? "back under its id" : is_other ? "back under another id" : "not back");
+                is_back    ? "back under its id"
+                : is_other ? "back under another id"
+                           : "not back");
     std::fflush(stdout);
   }
   return counts;

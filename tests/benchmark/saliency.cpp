@@ -15,7 +15,13 @@ namespace
 using namespace bole;
 
 const char *const kFlights[] = {"park-forward", "winter-weave", "pine-arc"};
-enum Mode { odometry_and_gyro, gyro_alone, images_alone, paper };
+enum Mode
+{
+  odometry_and_gyro,
+  gyro_alone,
+  images_alone,
+  paper
+};
 
 /// One whole pass over frames 0 to 110 an iteration; figures are of frames 10 to 110.
 void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOptions &options, const std::string &label)
@@ -71,28 +77,29 @@ void flySaliency(benchmark::State &state)
   const auto mode = static_cast<Mode>(state.range(1));
   fly(state, kFlights[state.range(0)], mode, mode == paper ? SaliencyOptions::paper() : SaliencyOptions(), modes[mode]);
 }
-BENCHMARK(flySaliency)->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone, paper}})
-    ->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK(flySaliency)
+    ->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone, paper}})
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(1);
 
 struct Step
 {
   const char *name;
   void (*undo)(SaliencyOptions &);
 };
-const Step kSteps[] = {
-    {"default", [](SaliencyOptions &) {}},
-    {"evidence of one pair of frames alone", [](SaliencyOptions &o) { o.evidence_decay = 0; }},
-    {"consecutive frames", [](SaliencyOptions &o) { o.max_frames_apart = 1; }},
-    {"plain likelihood", [](SaliencyOptions &o) { o.relative_evidence = false; }},
-    {"sweep from 0.5 m", [](SaliencyOptions &o) { o.min_range = 0.5; }},
-    {"residual noise 2 %", [](SaliencyOptions &o) { o.sigma_residual = 0.02; }},
-    {"windows of 9x9", [](SaliencyOptions &o) { o.window_width_px = 9; }},
-    {"the last four at once", [](SaliencyOptions &o) {
-       o.relative_evidence = false;
-       o.min_range = 0.5;
-       o.sigma_residual = 0.02;
-       o.window_width_px = 9;
-     }}};
+const Step kSteps[] = {{"default", [](SaliencyOptions &) {}},
+                       {"evidence of one pair of frames alone", [](SaliencyOptions &o) { o.evidence_decay = 0; }},
+                       {"consecutive frames", [](SaliencyOptions &o) { o.max_frames_apart = 1; }},
+                       {"plain likelihood", [](SaliencyOptions &o) { o.relative_evidence = false; }},
+                       {"sweep from 0.5 m", [](SaliencyOptions &o) { o.min_range = 0.5; }},
+                       {"residual noise 2 %", [](SaliencyOptions &o) { o.sigma_residual = 0.02; }},
+                       {"windows of 9x9", [](SaliencyOptions &o) { o.window_width_px = 9; }},
+                       {"the last four at once", [](SaliencyOptions &o) {
+                          o.relative_evidence = false;
+                          o.min_range = 0.5;
+                          o.sigma_residual = 0.02;
+                          o.window_width_px = 9;
+                        }}};
 
 void ablateSaliency(benchmark::State &state)
 {
@@ -101,8 +108,10 @@ void ablateSaliency(benchmark::State &state)
   step.undo(options);
   fly(state, kFlights[state.range(0)], odometry_and_gyro, options, step.name);
 }
-BENCHMARK(ablateSaliency)->ArgsProduct({{0, 1, 2}, benchmark::CreateDenseRange(0, std::size(kSteps) - 1, 1)})
-    ->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK(ablateSaliency)
+    ->ArgsProduct({{0, 1, 2}, benchmark::CreateDenseRange(0, std::size(kSteps) - 1, 1)})
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(1);
 } // namespace
 
 BENCHMARK_MAIN();

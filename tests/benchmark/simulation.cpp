@@ -15,17 +15,14 @@ void renderFrame(benchmark::State &state)
   forest.density = 1e-3 * static_cast<double>(state.range(1));
   bole::RendererOptions options;
   options.samples_per_pixel = static_cast<int>(state.range(0));
-  bole::ForestRenderer renderer(bole::Forest::plant(forest, path.waypoints(), path.gates()),
-                                options);
+  bole::ForestRenderer renderer(bole::Forest::plant(forest, path.waypoints(), path.gates()), options);
   bole::RenderedFrame frame;
   double t = 0;
   for (auto _ : state) {
-    renderer.render(path.bodyPose(t) * bole::forwardCamera(),
-                    path.bodyPose(t + 0.006) * bole::forwardCamera(), frame);
+    renderer.render(path.bodyPose(t) * bole::forwardCamera(), path.bodyPose(t + 0.006) * bole::forwardCamera(), frame);
     t = t > 10 ? 0 : t + 0.1;
   }
-  state.counters["frames/s"] =
-      benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["frames/s"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 BENCHMARK(renderFrame)
     ->ArgNames({"samples", "trunks_per_1000m2"})

@@ -141,8 +141,7 @@ std::pair<double, double> solveByCeres(const Graph &graph, double tolerance)
   for (const auto &v : graph.poses)
     poses.push_back(toBlock(v.wMb));
   for (const auto &v : graph.trunks)
-    trunks.push_back(
-        {v.trunk.xy.x(), v.trunk.xy.y(), v.trunk.log_radius, v.trunk.lean.x(), v.trunk.lean.y()});
+    trunks.push_back({v.trunk.xy.x(), v.trunk.xy.y(), v.trunk.log_radius, v.trunk.lean.x(), v.trunk.lean.y()});
   ceres::Problem problem;
   for (PoseBlock &block : poses)
     problem.AddParameterBlock(block.data(), 12, new PoseManifold);
@@ -212,7 +211,6 @@ int main(int argc, char **argv)
     fmt::print("{:5d} poses: optimum ours {:.9g}, Ceres {:.9g}, relative {:+.1e}; update median "
                "{:.3f} ms, Ceres re-solve from "
                "our estimate to 1e-6 {:.1f} ms: {:.0f} times\n",
-               poses, ours, optimum, (ours - optimum) / optimum, median, resolve_ms,
-               resolve_ms / median);
+               poses, ours, optimum, (ours - optimum) / optimum, median, resolve_ms, resolve_ms / median);
   }
 }

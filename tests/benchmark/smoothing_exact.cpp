@@ -24,10 +24,9 @@ int main(int argc, char **argv)
       bole::test::DenseReference dense(replay.smoother.graph());
       const double reference = dense.solve();
       replay.smoother.optimize();
-      fmt::print(
-          "{:4d} poses, {}: dense {:.9g}; optimize() {:+.1e}, update() alone {:+.1e} (relative)\n",
-          poses, loop ? "loop    " : "straight", reference, replay.smoother.cost() / reference - 1,
-          updates / reference - 1);
+      fmt::print("{:4d} poses, {}: dense {:.9g}; optimize() {:+.1e}, update() alone {:+.1e} (relative)\n", poses,
+                 loop ? "loop    " : "straight", reference, replay.smoother.cost() / reference - 1,
+                 updates / reference - 1);
       std::fflush(stdout);
     }
 }

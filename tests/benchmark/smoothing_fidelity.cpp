@@ -6,9 +6,9 @@
 // benchmark_smoothing_fidelity [sequence ...]
 #include "support/rendered_flights.h"
 
-#include <bole/open_source.h>
-#include "input/truth.h"
 #include "evaluation/trajectory_metrics.h"
+#include "input/truth.h"
+#include <bole/open_source.h>
 #include <bole/pipeline.h>
 
 #include <algorithm>
@@ -96,12 +96,10 @@ Flight fly(const std::string &sequence)
     flight.views.push_back(viewOf(flight, edge));
   for (const MapTrunk &trunk : pipeline.mapTrunks())
     if (!trunk.removed && trunk.status == TrunkStatus::confirmed)
-      flight.confirmed.push_back(
-          static_cast<std::int64_t>(flight.graph.poses.size() + trunk.smoother_id));
+      flight.confirmed.push_back(static_cast<std::int64_t>(flight.graph.poses.size() + trunk.smoother_id));
   for (const auto &pose : pipeline.smoothedTrajectory())
     flight.stamps.push_back({pose.stamp_ns, pose.wMb});
-  flight.truth = pairPoses(
-      flight.stamps, readAslTrajectory(sequence + "/mav0/state_groundtruth_estimate0/data.csv"));
+  flight.truth = pairPoses(flight.stamps, readAslTrajectory(sequence + "/mav0/state_groundtruth_estimate0/data.csv"));
   flight.trees = readTruthTrunks(sequence);
   return flight;
 }
@@ -158,8 +156,7 @@ Graph between(const Graph &from, const Graph &to, double share)
   for (std::size_t i = 0; i < graph.poses.size(); ++i)
     graph.poses[i].wMb = from.poses[i].wMb.plus(share * to.poses[i].wMb.minus(from.poses[i].wMb));
   for (std::size_t j = 0; j < graph.trunks.size(); ++j)
-    graph.trunks[j].trunk =
-        from.trunks[j].trunk.plus(share * to.trunks[j].trunk.minus(from.trunks[j].trunk));
+    graph.trunks[j].trunk = from.trunks[j].trunk.plus(share * to.trunks[j].trunk.minus(from.trunks[j].trunk));
   return graph;
 }
 
@@ -168,8 +165,7 @@ Graph optimumOfImages(const Flight &flight, Graph graph, int &iterations)
 {
   double before = imageCost(flight, graph);
   for (iterations = 0; iterations < 40; ++iterations) {
-    const Graph goal =
-        optimum(expanded(flight, graph, [&](std::size_t i) { return relativeAt(graph, i); }));
+    const Graph goal = optimum(expanded(flight, graph, [&](std::size_t i) { return relativeAt(graph, i); }));
     double share = 1;
     Graph moved = between(graph, goal, share);
     while (share > 1e-4 && !(imageCost(flight, moved) < before))
@@ -203,14 +199,13 @@ Errors errorsOf(const Flight &flight, const Graph &graph)
     errors.ate += (transform * pair.estimate.t - pair.truth.t).squaredNorm();
   errors.ate = std::sqrt(errors.ate / static_cast<double>(pairs.size()));
   for (const auto &vertex : graph.trunks) {
-    if (std::find(flight.confirmed.begin(), flight.confirmed.end(), vertex.id) ==
-        flight.confirmed.end())
+    if (std::find(flight.confirmed.begin(), flight.confirmed.end(), vertex.id) == flight.confirmed.end())
       continue;
     const Eigen::Vector2d xy = transform * Eigen::Vector2d(vertex.trunk.axisAt(1.3).head<2>());
-    const auto nearest = std::min_element(flight.trees.begin(), flight.trees.end(),
-                                          [&](const TruthTrunk &l, const TruthTrunk &r) {
-                                            return (l.xy - xy).norm() < (r.xy - xy).norm();
-                                          });
+    const auto nearest =
+        std::min_element(flight.trees.begin(), flight.trees.end(), [&](const TruthTrunk &l, const TruthTrunk &r) {
+          return (l.xy - xy).norm() < (r.xy - xy).norm();
+        });
     if (nearest == flight.trees.end() || (nearest->xy - xy).norm() > 1)
       continue;
     ++errors.matched;
@@ -258,9 +253,8 @@ void printCosts(const Flight &flight)
   const double jacobians = microseconds(n, [&](std::size_t i) {
     sink += residual(roots[i], flight.graph.bMc, pose(i), trunk(i), &J_pose, &J_trunk).norm();
   });
-  const double energy = microseconds(n, [&](std::size_t i) {
-    sink += energyOf(flight, flight.views[i]).evaluate(relativeAt(flight.graph, i));
-  });
+  const double energy = microseconds(
+      n, [&](std::size_t i) { sink += energyOf(flight, flight.views[i]).evaluate(relativeAt(flight.graph, i)); });
   const double hessian = microseconds(n, [&](std::size_t i) {
     Vector4d f;
     const RelativeTrunk relative = relativeAt(flight.graph, i);
@@ -268,14 +262,13 @@ void printCosts(const Flight &flight)
     sink += image.evaluate(relative, &f) + image.curvature(relative).F(0, 0);
   });
   vpImage<unsigned char> picture(240, 320, 100);
-  const double gradient = microseconds(20, [&](std::size_t) {
-    sink += computeGradient(picture, flight.options.gradient).signed_x[9][9];
-  });
+  const double gradient =
+      microseconds(20, [&](std::size_t) { sink += computeGradient(picture, flight.options.gradient).signed_x[9][9]; });
   fmt::print("  us a view: summary {:.2f}, with Jacobians {:.2f}; image with its gradient kept in "
              "memory {:.2f} ({:.1f} times), with gradient and Hessian {:.2f} ({:.1f} times); from "
              "pixels {:.0f} ({:.0f} times){}\n",
-             value, jacobians, energy, energy / value, hessian, hessian / jacobians,
-             gradient + energy, (gradient + energy) / value, std::isfinite(sink) ? "" : " ");
+             value, jacobians, energy, energy / value, hessian, hessian / jacobians, gradient + energy,
+             (gradient + energy) / value, std::isfinite(sink) ? "" : " ");
 }
 } // namespace
 
@@ -284,34 +277,27 @@ int main(int argc, char **argv)
   for (const std::string &sequence : bole::test::flightsOf(argc, argv)) {
     const Flight flight = fly(sequence);
     const Graph &summaries = flight.graph;
-    const Graph anew = optimum(expanded(flight, summaries, [&](std::size_t i) {
-      return summaries.observations[i].summary.optimum;
-    }));
+    const Graph anew =
+        optimum(expanded(flight, summaries, [&](std::size_t i) { return summaries.observations[i].summary.optimum; }));
     int iterations = 0;
     const Graph images = optimumOfImages(flight, summaries, iterations);
     const Errors reference = errorsOf(flight, images);
-    fmt::print(
-        "{}: {} poses, {} views, {} confirmed trunks near a tree; {} iterations on the images\n",
-        sequence, summaries.poses.size(), flight.views.size(), reference.matched, iterations);
-    for (const auto &[name, graph] :
-         {std::pair<const char *, const Graph *>{"images (Eq. 2)", &images},
-          {"summary factors", &summaries},
-          {"the same, no loss", &anew}}) {
+    fmt::print("{}: {} poses, {} views, {} confirmed trunks near a tree; {} iterations on the images\n", sequence,
+               summaries.poses.size(), flight.views.size(), reference.matched, iterations);
+    for (const auto &[name, graph] : {std::pair<const char *, const Graph *>{"images (Eq. 2)", &images},
+                                      {"summary factors", &summaries},
+                                      {"the same, no loss", &anew}}) {
       const Errors errors = errorsOf(flight, *graph);
       double apart = 0;
       for (std::size_t j = 0; j < graph->trunks.size(); ++j)
-        apart = std::max(
-            apart,
-            std::find(flight.confirmed.begin(), flight.confirmed.end(), graph->trunks[j].id) ==
-                    flight.confirmed.end()
-                ? 0
-                : (graph->trunks[j].trunk.axisAt(1.3) - images.trunks[j].trunk.axisAt(1.3)).norm());
-      fmt::print(
-          "  {:18s} map RMSE {:.4f} m ({:+.1f} %), radius RMSE {:.4f} m, ATE {:.4f} m ({:+.1f} "
-          "%), farthest trunk from the images' {:.3f} m, cost by the images {:.2f}\n",
-          name, errors.map_rmse, 100 * (errors.map_rmse / reference.map_rmse - 1),
-          errors.radius_rmse, errors.ate, 100 * (errors.ate / reference.ate - 1), apart,
-          imageCost(flight, *graph));
+        apart = std::max(apart, std::find(flight.confirmed.begin(), flight.confirmed.end(), graph->trunks[j].id) ==
+                                        flight.confirmed.end()
+                                    ? 0
+                                    : (graph->trunks[j].trunk.axisAt(1.3) - images.trunks[j].trunk.axisAt(1.3)).norm());
+      fmt::print("  {:18s} map RMSE {:.4f} m ({:+.1f} %), radius RMSE {:.4f} m, ATE {:.4f} m ({:+.1f} "
+                 "%), farthest trunk from the images' {:.3f} m, cost by the images {:.2f}\n",
+                 name, errors.map_rmse, 100 * (errors.map_rmse / reference.map_rmse - 1), errors.radius_rmse,
+                 errors.ate, 100 * (errors.ate / reference.ate - 1), apart, imageCost(flight, *graph));
     }
     printCosts(flight);
     std::fflush(stdout);

@@ -40,8 +40,7 @@ double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flig
   for (std::size_t i = 0; i < static_cast<std::size_t>(replay.next); i += 5)
     for (const auto &[j, summary] : flight.views[i]) {
       const int trunk = replay.trunk_id[j];
-      const bole::Vector4d apart =
-          relative(replay.smoother, i, trunk).minus(relative(again, i, trunk));
+      const bole::Vector4d apart = relative(replay.smoother, i, trunk).minus(relative(again, i, trunk));
       const double sigmas = std::sqrt(apart.dot(summary.F * apart));
       worst = std::max(worst, sigmas);
       squares += sigmas * sigmas;
@@ -75,17 +74,16 @@ int main(int argc, char **argv)
     limit += result.status != bole::UpdateStatus::ok;
     views += flight.views[i].size();
     const int n = i + 1;
-    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000 || n == 8000 ||
-        n == 16000 || n == o.poses)
+    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000 || n == 8000 || n == 16000 ||
+        n == o.poses)
       naive.emplace_back(n, compareWithBatch(replay, flight));
     if ((i + 1) % std::max(1, o.poses / 20) == 0) {
       const std::size_t window = std::min<std::size_t>(500, ms.size());
       const std::vector<double> last(ms.end() - static_cast<long>(window), ms.end());
       flat.emplace_back(i + 1, quantile(last, 0.5));
       tail.emplace_back(i + 1, quantile(last, 0.99));
-      fmt::print("{:6d} poses: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms, {:.1f} MB\n", i + 1,
-                 quantile(last, 0.5), quantile(last, 0.99), quantile(last, 1),
-                 static_cast<double>(replay.smoother.memoryBytes()) / 1e6);
+      fmt::print("{:6d} poses: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms, {:.1f} MB\n", i + 1, quantile(last, 0.5),
+                 quantile(last, 0.99), quantile(last, 1), static_cast<double>(replay.smoother.memoryBytes()) / 1e6);
       std::fflush(stdout);
     }
   }
@@ -93,20 +91,16 @@ int main(int argc, char **argv)
   fmt::print("{} poses, {} trunks, {:.1f} views a pose; a frame: {:.2f} relinearised, {:.1f} "
              "eliminated, {:.1f} solved; "
              "{} frames unsettled\n",
-             o.poses, flight.trunks.size(), static_cast<double>(views) / n,
-             static_cast<double>(relinearised) / n, static_cast<double>(eliminated) / n,
-             static_cast<double>(resolved) / n, limit);
-  fmt::print("all frames: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n", quantile(ms, 0.5),
-             quantile(ms, 0.99), quantile(ms, 1));
-  const auto windowMedian = [&](int from, int to) {
-    return quantile({ms.begin() + from, ms.begin() + to}, 0.5);
-  };
+             o.poses, flight.trunks.size(), static_cast<double>(views) / n, static_cast<double>(relinearised) / n,
+             static_cast<double>(eliminated) / n, static_cast<double>(resolved) / n, limit);
+  fmt::print("all frames: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n", quantile(ms, 0.5), quantile(ms, 0.99),
+             quantile(ms, 1));
+  const auto windowMedian = [&](int from, int to) { return quantile({ms.begin() + from, ms.begin() + to}, 0.5); };
   if (o.poses >= 2000)
     fmt::print("median about pose 500: {:.3f} ms; of the last 500: {:.3f} ms, ratio {:.2f}; p99 / "
                "median {:.1f}\n",
                windowMedian(400, 600), windowMedian(o.poses - 500, o.poses),
-               windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600),
-               quantile(ms, 0.99) / quantile(ms, 0.5));
+               windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600), quantile(ms, 0.99) / quantile(ms, 0.5));
   if (argc > 2 && *argv[2] != '\0') {
     bole::test::LineChart chart;
     chart.title = "Adding one frame: incremental update and full re-solve";
@@ -119,9 +113,8 @@ int main(int argc, char **argv)
     chart.y_max = 10000;
     chart.x_ticks = {100, 300, 1000, 3000, 10000, 20000};
     chart.y_ticks = {0.1, 1, 10, 100, 1000, 10000};
-    chart.lines = {{"full re-solve", "#c33", naive},
-                   {"update, p99 of 500", "#69c", tail},
-                   {"update, median", "#036", flat}};
+    chart.lines = {
+        {"full re-solve", "#c33", naive}, {"update, p99 of 500", "#69c", tail}, {"update, median", "#036", flat}};
     chart.write(argv[2]);
   }
 }

@@ -47,8 +47,7 @@ int main(int argc, char **argv)
     if (i == 0) {
       once = trunkFromRelative(wMb * options.bMc, view.optimum, options.prior_radius);
       smoother.addTrunk(once);
-      H = Vector5d(1 / 2500., 1 / 2500., std::pow(options.prior_log_radius_sigma, -2), 1e6, 1e6)
-              .asDiagonal();
+      H = Vector5d(1 / 2500., 1 / 2500., std::pow(options.prior_log_radius_sigma, -2), 1e6, 1e6).asDiagonal();
     }
     smoother.addObservation(i, 0, view);
     smoother.update();
@@ -71,9 +70,8 @@ int main(int argc, char **argv)
     by_once.emplace_back(b, once.xy.norm());
     exact.emplace_back(b, 8);
     if (i % 10 == 0)
-      fmt::print("{:4.1f} m    {:.3f}  {:.3f}  {:.3f} m, radius {:.3f}  {:.3f}  {:.3f} m\n", b,
-                 range, range_batch, once.xy.norm(), smoother.trunk(0).radius(),
-                 batch.graph().trunks[0].trunk.radius(), once.radius());
+      fmt::print("{:4.1f} m    {:.3f}  {:.3f}  {:.3f} m, radius {:.3f}  {:.3f}  {:.3f} m\n", b, range, range_batch,
+                 once.xy.norm(), smoother.trunk(0).radius(), batch.graph().trunks[0].trunk.radius(), once.radius());
   }
   if (argc > 1) {
     test::LineChart chart;

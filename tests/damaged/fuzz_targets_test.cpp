@@ -173,7 +173,8 @@ TEST(FuzzTargets, DamagedRecordingsAndCommands)
   std::ifstream file(folder + "/raw.bin", std::ios::binary);
   const Bytes recording{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   ASSERT_GT(recording.size(), 1000u);
-  const std::string text = "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
+  const std::string text =
+      "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
   expectSurvives("recording", fuzz_recording, {recording, Bytes(text.begin(), text.end())}, 10000);
 }
 

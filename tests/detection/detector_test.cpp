@@ -67,9 +67,10 @@ TEST(Detector, SaysHowWellItKnowsThePlace)
   ASSERT_EQ(few.size(), 1u);
   ASSERT_EQ(wide.size(), 1u);
   const auto alongSight = [](const Detection &d) { return std::sqrt(d.covariance(0, 0)); };
-  EXPECT_GT(alongSight(few[0]), 1.5 * alongSight(wide[0])); // less parallax, less certain
+  EXPECT_GT(alongSight(few[0]), 1.5 * alongSight(wide[0]));          // less parallax, less certain
   EXPECT_GT(alongSight(few[0]), std::sqrt(few[0].covariance(1, 1))); // range is known worse than bearing
-  EXPECT_LT((wide[0].trunk.xy - trunkOf(trunk).xy).norm(), 3 * std::sqrt(wide[0].covariance.topLeftCorner<2, 2>().trace()));
+  EXPECT_LT((wide[0].trunk.xy - trunkOf(trunk).xy).norm(),
+            3 * std::sqrt(wide[0].covariance.topLeftCorner<2, 2>().trace()));
 }
 
 TEST(Detector, FindsNothingWithoutParallax)

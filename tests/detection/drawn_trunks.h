@@ -69,7 +69,7 @@ struct DrawnFlight
   std::vector<Pose> poses;
 
   DrawnFlight(const std::vector<DrawnTrunk> &trunks, std::vector<Pose> path, const ProfileOptions &options = {})
-    : poses(std::move(path))
+      : poses(std::move(path))
   {
     for (const Pose &wMc : poses)
       profiles.push_back(

@@ -39,7 +39,8 @@ double distance_px(const LevelProfile &profile, double q, double *contrast = nul
 TEST(LevelProfile, PeaksStandAtTheBordersWhateverTheAttitude)
 {
   const std::vector<DrawnTrunk> trunks = {{4, 0.6, 0.2, 40}, {6, -1.5, 0.15, 90}};
-  for (const Pose &wMc : {lookingAhead(0, 0), lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2), lookingAhead(0, 0.2, -0.1, -0.12, 0.3)}) {
+  for (const Pose &wMc :
+       {lookingAhead(0, 0), lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2), lookingAhead(0, 0.2, -0.1, -0.12, 0.3)}) {
     const LevelProfile profile = profileOf(trunks, wMc);
     for (const DrawnTrunk &trunk : trunks)
       for (const bool is_left : {true, false}) {
@@ -91,8 +92,5 @@ TEST(LevelProfile, StrongestNearKeepsTheSign)
   EXPECT_FALSE(profile.covers(10));
 }
 
-TEST(LevelProfile, OfABlankImageHasNoPeaks)
-{
-  EXPECT_TRUE(profileOf({}, lookingAhead(0, 0)).peaks.empty());
-}
+TEST(LevelProfile, OfABlankImageHasNoPeaks) { EXPECT_TRUE(profileOf({}, lookingAhead(0, 0)).peaks.empty()); }
 } // namespace

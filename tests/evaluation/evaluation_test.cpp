@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "evaluation/assignment.h"
+#include "evaluation/trajectory_metrics.h"
+#include "evaluation/trunk_metrics.h"
+#include "evaluation/visibility.h"
 #include "geometry/so3.h"
 #include "input/asl_source.h"
-#include "evaluation/assignment.h"
-#include <bole/evaluation.h>
-#include "evaluation/trajectory_metrics.h"
 #include "output/trajectory_writer.h"
-#include "evaluation/trunk_metrics.h"
 #include "output/trunks_csv.h"
-#include "evaluation/visibility.h"
+#include <bole/evaluation.h>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
@@ -32,8 +32,7 @@ Trajectory curve(std::size_t poses)
   Trajectory trajectory;
   for (std::size_t i = 0; i < poses; ++i) {
     const double s = 0.1 * static_cast<double>(i);
-    trajectory.push_back(
-        {static_cast<std::int64_t>(i) * 100000000, poseAt(s, std::sin(s), 1.2, 0.3 * s)});
+    trajectory.push_back({static_cast<std::int64_t>(i) * 100000000, poseAt(s, std::sin(s), 1.2, 0.3 * s)});
   }
   return trajectory;
 }
@@ -208,8 +207,7 @@ TEST(TrajectoryMetrics, IgnoresPosesOutsideTheTruth)
 
 TEST(TrunkMetrics, CountsMatchesMissesDuplicatesAndFalsePositives)
 {
-  const std::vector<TruthTrunk> truth = {
-      tree(0, 5, 0), tree(1, 5, 3), tree(2, 8, -2), {10000, {40, 0}, 0, 0}};
+  const std::vector<TruthTrunk> truth = {tree(0, 5, 0), tree(1, 5, 3), tree(2, 8, -2), {10000, {40, 0}, 0, 0}};
   const std::vector<TrunkVisibility> seen = {expected(), expected(), expected(), {}};
   std::vector<TrunkRecord> map = {confirmed(7, 5.1, 0), confirmed(8, 5, 0.3), confirmed(9, 40, 0.2),
                                   confirmed(10, 20, 20), confirmed(11, 8, -2)};
@@ -235,11 +233,9 @@ TEST(TrunkMetrics, CountsMatchesMissesDuplicatesAndFalsePositives)
 
 TEST(TrunkMetrics, MeasuresPositionRadiusAndHonesty)
 {
-  const std::vector<TruthTrunk> truth = {tree(0, 5, 0, 0.2), tree(1, 5, 3, 0.3),
-                                         tree(2, 9, 9, 0.1)};
+  const std::vector<TruthTrunk> truth = {tree(0, 5, 0, 0.2), tree(1, 5, 3, 0.3), tree(2, 9, 9, 0.1)};
   const std::vector<TrunkVisibility> seen(3, expected());
-  const std::vector<TrunkRecord> map = {confirmed(0, 5.1, 0, 0.21, 0.01),
-                                        confirmed(1, 5, 3.2, 0.27, 0.01),
+  const std::vector<TrunkRecord> map = {confirmed(0, 5.1, 0, 0.21, 0.01), confirmed(1, 5, 3.2, 0.27, 0.01),
                                         confirmed(2, 9, 9.3, 0.1, 0.01)};
 
   const TrunkErrors errors = trunkMetrics(map, truth, seen, kIdentity).all;
@@ -297,8 +293,7 @@ TEST(TrunkMetrics, SurvivesAnEmptyMapAndAnEmptyTruth)
 
 namespace
 {
-const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(),
-                    Eigen::Vector3d::Zero());
+const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), Eigen::Vector3d::Zero());
 
 std::vector<Pose> walk(std::size_t frames)
 {
@@ -347,8 +342,7 @@ TEST(Visibility, AddsUpWhatSeveralNearerTrunksHide)
   const std::vector<Pose> still(1, poseAt(0, 0, 1.2, 0));
   const std::vector<TruthTrunk> half = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05)};
   EXPECT_EQ(trunkVisibility(half, still, kForward, PinholeCamera())[0].frames, 1u);
-  const std::vector<TruthTrunk> most = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05),
-                                        tree(2, 3.2, 0.02, 0.06)};
+  const std::vector<TruthTrunk> most = {tree(0, 6, 0, 0.3), tree(1, 3, 0.10, 0.05), tree(2, 3.2, 0.02, 0.06)};
   EXPECT_EQ(trunkVisibility(most, still, kForward, PinholeCamera())[0].frames, 0u);
 }
 
@@ -395,14 +389,12 @@ TEST_F(RunAgainst, AnotherRunStandsForTheTruth)
 {
   TrunkRecord candidate = confirmed(3, 9, 9);
   candidate.status = TrunkStatus::candidate;
-  const std::string one =
-      writeRun("one", 0, 0, {confirmed(1, 5, 1, 0.2), confirmed(2, 7, -2, 0.3), candidate});
-  const std::string other =
-      writeRun("other", 2, 0, {confirmed(7, 7.1, 1, 0.25), confirmed(8, 20, 4)});
+  const std::string one = writeRun("one", 0, 0, {confirmed(1, 5, 1, 0.2), confirmed(2, 7, -2, 0.3), candidate});
+  const std::string other = writeRun("other", 2, 0, {confirmed(7, 7.1, 1, 0.25), confirmed(8, 20, 4)});
   const Evaluation evaluation = evaluate(other, one);
   EXPECT_TRUE(evaluation.is_against_run);
   ASSERT_TRUE(evaluation.trunks);
-  EXPECT_DOUBLE_EQ(evaluation.trunks->recall, 0.5);    // of its two confirmed trunks
+  EXPECT_DOUBLE_EQ(evaluation.trunks->recall, 0.5); // of its two confirmed trunks
   EXPECT_DOUBLE_EQ(evaluation.trunks->precision, 0.5);
   EXPECT_NEAR(evaluation.trunks->all.median[2], 0.1, 1e-4); // after the shift by 2 m
   EXPECT_NEAR(evaluation.trunks->all.radius_rmse, 0.05, 1e-4);

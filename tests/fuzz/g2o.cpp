@@ -26,8 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size
   bole::writeG2o(text, graph);
   const bole::Graph back = bole::readG2o(text, "written");
   if (back.poses.size() != graph.poses.size() || back.trunks.size() != graph.trunks.size() ||
-      back.odometry.size() != graph.odometry.size() ||
-      back.observations.size() != graph.observations.size())
+      back.odometry.size() != graph.odometry.size() || back.observations.size() != graph.observations.size())
     std::abort();
   if (graph.poses.empty() || graph.poses.size() + graph.trunks.size() > 30)
     return 0;

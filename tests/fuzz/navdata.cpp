@@ -23,11 +23,9 @@ void use(const std::vector<std::uint8_t> &bytes)
     std::abort();
   static bole::NavdataOdometry odometry;
   static bole::ClockUnwrapper clock(bole::kNavdataTimePeriod_us);
-  if (!navdata.demo || navdata.demo->velocity_mm_s.norm() > 1e5f ||
-      navdata.demo->phi_theta_psi_mdeg.norm() > 1e9f)
+  if (!navdata.demo || navdata.demo->velocity_mm_s.norm() > 1e5f || navdata.demo->phi_theta_psi_mdeg.norm() > 1e9f)
     return;
-  odometry.add(clock.unwrap(bole::navdataTimeMicroseconds(navdata.time.value_or(0))) * 1000,
-               navdata);
+  odometry.add(clock.unwrap(bole::navdataTimeMicroseconds(navdata.time.value_or(0))) * 1000, navdata);
   if (const auto newest = odometry.newest(); newest && !newest->wMb.isFinite())
     std::abort();
 }

@@ -35,7 +35,9 @@ TEST(BodyVelocity, SlowsTheWholeTwistWhereOneComponentIsTooFast)
 
 TEST(BodyVelocity, RefusesWhatIsNoVelocity)
 {
-  const auto ask = [](vpRobot::vpControlFrameType frame, const vpColVector &v) { return bodyVelocity(frame, v, ahead(), 1, 1); };
+  const auto ask = [](vpRobot::vpControlFrameType frame, const vpColVector &v) {
+    return bodyVelocity(frame, v, ahead(), 1, 1);
+  };
   EXPECT_THROW(ask(vpRobot::REFERENCE_FRAME, twist({0, 0, 0, 0})), vpRobotException);
   EXPECT_THROW(ask(vpRobot::JOINT_STATE, vpColVector(6, 0.0)), vpRobotException);
   EXPECT_THROW(ask(vpRobot::CAMERA_FRAME, twist({0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0, 0})),

@@ -21,7 +21,8 @@ double planeDistance(double rho, double theta, const Vector3d &n)
 
 TEST(Cylinder, BordersAreTheLimbsOfVispForAnyDirectionOfTheAxis)
 {
-  for (const Vector3d &axis : {Vector3d(0, -1, 0), Vector3d(0.8, -0.5, 0.1), Vector3d(1, 0.2, -0.3), Vector3d(0.1, 0.9, 0.4)}) {
+  for (const Vector3d &axis :
+       {Vector3d(0, -1, 0), Vector3d(0.8, -0.5, 0.1), Vector3d(1, 0.2, -0.3), Vector3d(0.1, 0.9, 0.4)}) {
     Cylinder c; // in the camera frame
     c.foot = {0.4, 0.7, 3};
     c.top = c.foot + 1.7 * axis.normalized();
@@ -46,7 +47,8 @@ TEST(Cylinder, AlongATrunkItIsTheRelativeTrunkOfThatTrunk)
   trunk.xy = {4, -1};
   trunk.log_radius = std::log(0.18);
   trunk.lean = {0.05, -0.03};
-  const Pose wMc((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished() * expSo3({0.1, 0.2, -0.1}), {0.5, 0.3, 1.4});
+  const Pose wMc((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished() * expSo3({0.1, 0.2, -0.1}),
+                 {0.5, 0.3, 1.4});
   Cylinder c;
   c.foot = trunk.axisAt(0);
   c.top = trunk.axisAt(2.6);

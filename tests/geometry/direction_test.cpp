@@ -14,8 +14,7 @@ using bole::directionPlus;
 
 std::vector<Eigen::Vector3d> directions()
 {
-  std::vector<Eigen::Vector3d> all{{1, 0, 0},  {0, 1, 0}, {0, 0, 1},
-                                   {0, 0, -1}, {1, 1, 1}, {-3, 0.2, 1}};
+  std::vector<Eigen::Vector3d> all{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}, {1, 1, 1}, {-3, 0.2, 1}};
   for (auto &d : all) {
     d.normalize();
   }

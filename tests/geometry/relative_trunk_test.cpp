@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/so3.h"
 #include <bole/camera.h>
 #include <bole/trunk.h>
-#include "geometry/so3.h"
 
 #include <gtest/gtest.h>
 
@@ -14,10 +14,7 @@ using namespace bole;
 
 const Pose kBodyToCamera((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0.1, 0.02, -0.03});
 
-Pose tiltedBody()
-{
-  return Pose(expSo3({0.1, -0.2, 0.4}), {1.0, -0.5, 1.3});
-}
+Pose tiltedBody() { return Pose(expSo3({0.1, -0.2, 0.4}), {1.0, -0.5, 1.3}); }
 
 Trunk leaningTrunk()
 {

@@ -18,7 +18,12 @@ using Eigen::Vector3d;
 /// Rotation vectors from nothing to nearly half a turn.
 std::vector<Vector3d> rotationVectors()
 {
-  return {{0, 0, 0}, {1e-9, -2e-9, 1e-9}, {1e-4, 2e-4, -1e-4}, {0.1, -0.2, 0.4}, {1.5, -1.0, 0.7}, {0, 0, 3.1},
+  return {{0, 0, 0},
+          {1e-9, -2e-9, 1e-9},
+          {1e-4, 2e-4, -1e-4},
+          {0.1, -0.2, 0.4},
+          {1.5, -1.0, 0.7},
+          {0, 0, 3.1},
           Vector3d(1, 2, -1).normalized() * 3.1415};
 }
 
@@ -66,9 +71,9 @@ Matrix3d differencesOfExp(const Vector3d &phi, double h)
   Matrix3d J;
   for (int i = 0; i < 3; ++i) {
     const Vector3d step = h * Vector3d::Unit(i);
-    J.col(i) = (logSo3(expSo3(phi).transpose() * expSo3(phi + step)) -
-                logSo3(expSo3(phi).transpose() * expSo3(phi - step))) /
-               (2 * h);
+    J.col(i) =
+        (logSo3(expSo3(phi).transpose() * expSo3(phi + step)) - logSo3(expSo3(phi).transpose() * expSo3(phi - step))) /
+        (2 * h);
   }
   return J;
 }

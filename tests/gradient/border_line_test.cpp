@@ -68,9 +68,9 @@ TEST(BorderLine, StaysInsideTheImageLessItsMargin)
 
 TEST(BorderLine, HasNoRowsWhereThereIsNothingToSee)
 {
-  EXPECT_EQ(borderLine(kCamera, seen(0, -4, 0.4), Border::left, {}).rows(), 0);   // behind the camera
-  EXPECT_EQ(borderLine(kCamera, seen(0, 2, 4), Border::left, {}).rows(), 0);      // beside the image
-  EXPECT_EQ(borderLine(kCamera, seen(1.0), Border::left, {}).rows(), 0);          // not steep
+  EXPECT_EQ(borderLine(kCamera, seen(0, -4, 0.4), Border::left, {}).rows(), 0); // behind the camera
+  EXPECT_EQ(borderLine(kCamera, seen(0, 2, 4), Border::left, {}).rows(), 0);    // beside the image
+  EXPECT_EQ(borderLine(kCamera, seen(1.0), Border::left, {}).rows(), 0);        // not steep
 }
 
 TEST(BorderLine, MovesItsEndsByWhatItIsTold)
@@ -86,7 +86,8 @@ Eigen::Matrix<double, 2, 4> differences(const RelativeTrunk &trunk, Border borde
   const int ends[2] = {line.row_begin, line.row_end - 1};
   for (int i = 0; i < 4; ++i) {
     const Vector4d step = h * Vector4d::Unit(i);
-    const BorderLine plus = borderLine(kCamera, trunk.plus(step), border, {}), minus = borderLine(kCamera, trunk.plus(-step), border, {});
+    const BorderLine plus = borderLine(kCamera, trunk.plus(step), border, {}),
+                     minus = borderLine(kCamera, trunk.plus(-step), border, {});
     for (int k = 0; k < 2; ++k)
       J(k, i) = (plus.xAt(ends[k]) - minus.xAt(ends[k])) / (2 * h);
   }
@@ -123,7 +124,8 @@ TEST(MeanGradient, DerivativesAgreeWithCentralDifferences)
   const MeanGradient at = meanAlong(g, line);
   const double h = 1e-3;
   EXPECT_NEAR(at.by_top, (meanAlong(g, line.moved(h, 0)).mean - meanAlong(g, line.moved(-h, 0)).mean) / (2 * h), 1e-6);
-  EXPECT_NEAR(at.by_bottom, (meanAlong(g, line.moved(0, h)).mean - meanAlong(g, line.moved(0, -h)).mean) / (2 * h), 1e-6);
+  EXPECT_NEAR(at.by_bottom, (meanAlong(g, line.moved(0, h)).mean - meanAlong(g, line.moved(0, -h)).mean) / (2 * h),
+              1e-6);
   EXPECT_GT(std::abs(at.by_top), 1e-3);
 }
 

@@ -105,14 +105,11 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
     const char *file, *text, *message;
   };
   const Case cases[] = {
-      {"mav0/odom0/data.csv", "#h\n0,0,0,1,1,0,0,0\n100000000,nan,0,1,1,0,0,0\n",
-       "odom0/data.csv:3: x = \"nan\""},
-      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n0,0,0,1,1,0,0,0\n",
-       "odom0/data.csv:2: timestamp = 0 ns"},
+      {"mav0/odom0/data.csv", "#h\n0,0,0,1,1,0,0,0\n100000000,nan,0,1,1,0,0,0\n", "odom0/data.csv:3: x = \"nan\""},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n0,0,0,1,1,0,0,0\n", "odom0/data.csv:2: timestamp = 0 ns"},
       {"mav0/odom0/data.csv", "0,0,0,1,1,1,0,0\n", "odom0/data.csv:1: norm of the quaternion"},
       {"mav0/odom0/data.csv", "0,0,0,1\n", "odom0/data.csv:1: 4 columns, must be 8"},
-      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0,7\n100000000,0,0,1,1,0,0,0\n",
-       "odom0/data.csv:2: 8 columns, must be 9"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0,7\n100000000,0,0,1,1,0,0,0\n", "odom0/data.csv:2: 8 columns, must be 9"},
       {"mav0/odom0/data.csv", "", "odom0/data.csv: no pose"},
       {"mav0/odom0/data.csv", "900000000000,0,0,1,1,0,0,0\n", "never meet"},
       {"mav0/imu0/data.csv", "0,0,0,inf\n", "imu0/data.csv:1: w_z = \"inf\""},
@@ -130,21 +127,18 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
   for (const Case &c : cases) {
     FlightFolder flight(3);
     flight.write(c.file, c.text);
-    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message))
-        << c.text;
+    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message)) << c.text;
   }
 }
 
 TEST(AslSource, RefusesFoldersThatAreNoFlight)
 {
   const FlightFolder flight(1);
-  EXPECT_THAT(messageOf([&] { AslSource source(flight.path() + "/none"); }),
-              HasSubstr("no ASL folder"));
+  EXPECT_THAT(messageOf([&] { AslSource source(flight.path() + "/none"); }), HasSubstr("no ASL folder"));
   FlightFolder blind(2);
   blind.removeImage(0);
   blind.removeImage(1);
-  EXPECT_THAT(messageOf([&] { AslSource source(blind.path()); }),
-              HasSubstr("none of the 2 images"));
+  EXPECT_THAT(messageOf([&] { AslSource source(blind.path()); }), HasSubstr("none of the 2 images"));
 }
 
 TEST(AslSource, ReadsTheRenderedFlight)

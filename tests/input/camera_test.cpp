@@ -96,9 +96,9 @@ TEST_F(CameraFile, ReadsVispXmlWithItsDistortion)
 
 TEST_F(CameraFile, ReadsTheModelOfTheArDrone1)
 {
-  const MountedCamera camera = readCamera(
-      write("c.yaml", "resolution: [320, 240]\nintrinsics: [215.1, 215.8, 160.7, 123.3]\n"
-                      "distortion_model: fov\ndistortion_coefficients: [0.272]\n"));
+  const MountedCamera camera =
+      readCamera(write("c.yaml", "resolution: [320, 240]\nintrinsics: [215.1, 215.8, 160.7, 123.3]\n"
+                                 "distortion_model: fov\ndistortion_coefficients: [0.272]\n"));
   EXPECT_EQ(camera.model.distortion, Distortion::fov);
   EXPECT_DOUBLE_EQ(camera.model.coefficients[0], 0.272);
 }
@@ -112,8 +112,7 @@ TEST_F(CameraFile, NamesFileLineAndKeyOfAMistake)
       {good + "distortion_model: cubic\n", "c.yaml:3: distortion_model = cubic, must be none"},
       {good + "distortion_model: equidistant\ndistortion_coefficients: [1, 2]\n",
        "c.yaml:4: distortion_coefficients = [1, 2], must be 4 numbers"},
-      {good + "distortion_model: radtan\n",
-       "c.yaml: the key \"distortion_coefficients\" is missing"},
+      {good + "distortion_model: radtan\n", "c.yaml: the key \"distortion_coefficients\" is missing"},
       {good + "camera_model: omni\n", "c.yaml:3: camera_model = omni, must be pinhole"},
       {good + "T_BS: [1, 0, 0]\n", "c.yaml:3: T_BS = [1, 0, 0], must be 16 numbers"},
       {good + "T_BS: [2,0,0,0,0,2,0,0,0,0,2,0,0,0,0,1]\n", "must be a rigid motion"},
@@ -128,22 +127,16 @@ TEST_F(CameraFile, NamesFileLineAndKeyOfAMistake)
       {"- 1\n", "must be a map"},
       {"", "must be a map"}};
   for (const auto &[text, message] : cases)
-    EXPECT_THAT(messageOf([&, t = text] { readCamera(write("c.yaml", t)); }), HasSubstr(message))
-        << text;
-  EXPECT_THAT(messageOf([&] { readCamera("/none/c.yaml"); }),
-              HasSubstr("/none/c.yaml: no such file"));
+    EXPECT_THAT(messageOf([&, t = text] { readCamera(write("c.yaml", t)); }), HasSubstr(message)) << text;
+  EXPECT_THAT(messageOf([&] { readCamera("/none/c.yaml"); }), HasSubstr("/none/c.yaml: no such file"));
   EXPECT_THAT(messageOf([&] { readCamera(write("c.txt", "")); }), HasSubstr("must end in"));
-  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", "<root></root>")); }),
-              HasSubstr("0 ViSP cameras"));
+  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", "<root></root>")); }), HasSubstr("0 ViSP cameras"));
 }
 
 namespace
 {
 /// A smooth scene in normalised coordinates.
-double scene(const Eigen::Vector2d &xy)
-{
-  return 128 + 60 * std::sin(9 * xy.x()) + 50 * std::cos(11 * xy.y());
-}
+double scene(const Eigen::Vector2d &xy) { return 128 + 60 * std::sin(9 * xy.x()) + 50 * std::cos(11 * xy.y()); }
 
 /// Normalised point that the lens bends to the pixel (Newton on central differences).
 Eigen::Vector2d undistorted(const CameraModel &model, const Eigen::Vector2d &u_px)
@@ -158,12 +151,10 @@ Eigen::Vector2d undistorted(const CameraModel &model, const Eigen::Vector2d &u_p
 
 vpImage<unsigned char> drawn(const CameraModel &model)
 {
-  vpImage<unsigned char> image(static_cast<unsigned>(model.pinhole.height),
-                               static_cast<unsigned>(model.pinhole.width));
+  vpImage<unsigned char> image(static_cast<unsigned>(model.pinhole.height), static_cast<unsigned>(model.pinhole.width));
   for (int v = 0; v < model.pinhole.height; ++v)
     for (int u = 0; u < model.pinhole.width; ++u)
-      image[v][u] =
-          static_cast<unsigned char>(std::lround(scene(undistorted(model, Eigen::Vector2d(u, v)))));
+      image[v][u] = static_cast<unsigned char>(std::lround(scene(undistorted(model, Eigen::Vector2d(u, v)))));
   return image;
 }
 
@@ -172,8 +163,7 @@ double worstError(const vpImage<unsigned char> &image, const PinholeCamera &came
   double worst = 0;
   for (int v = 0; v < camera.height; ++v)
     for (int u = 0; u < camera.width; ++u)
-      worst = std::max(worst,
-                       std::abs(image[v][u] - scene(camera.ray(Eigen::Vector2d(u, v)).head<2>())));
+      worst = std::max(worst, std::abs(image[v][u] - scene(camera.ray(Eigen::Vector2d(u, v)).head<2>())));
   return worst;
 }
 } // namespace
@@ -182,9 +172,7 @@ TEST(Rectifier, TurnsAnImageOfTheLensIntoOneOfItsPinhole)
 {
   const CameraModel lenses[] = {
       {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}},
-      {{284.9, 284, 165.7, 68, 320, 180},
-       Distortion::radial_tangential,
-       {{-0.527, 0.274, 0.0211, -0.0064}}},
+      {{284.9, 284, 165.7, 68, 320, 180}, Distortion::radial_tangential, {{-0.527, 0.274, 0.0211, -0.0064}}},
       {{190, 190, 160, 120, 320, 240}, Distortion::equidistant, {{0.01, -0.02, 0.004, 0}}},
       {{300, 300, 150, 110, 320, 240}, Distortion::radial_tangential, {{0.2, 0, 0, 0}}},
   };
@@ -195,8 +183,7 @@ TEST(Rectifier, TurnsAnImageOfTheLensIntoOneOfItsPinhole)
     EXPECT_LT(worstError(image, rectifier.camera()), 2.5);
     EXPECT_FALSE(rectifier.isIdentity());
     const PinholeCamera &out = rectifier.camera();
-    for (const Eigen::Vector2d &corner :
-         {Eigen::Vector2d(0, 0), Eigen::Vector2d(out.width - 1, out.height - 1)})
+    for (const Eigen::Vector2d &corner : {Eigen::Vector2d(0, 0), Eigen::Vector2d(out.width - 1, out.height - 1)})
       EXPECT_TRUE(lens.pinhole.contains(lens.distort(out.ray(corner).head<2>())));
   }
 }
@@ -228,6 +215,5 @@ TEST(Rectifier, RefusesAnotherSize)
 {
   const Rectifier rectifier({{200, 200, 159.5, 119.5, 320, 240}, Distortion::none, {}});
   vpImage<unsigned char> image(100, 100);
-  EXPECT_THAT(messageOf([&] { rectifier.apply(image); }),
-              HasSubstr("image size = 100x100, must be 320x240"));
+  EXPECT_THAT(messageOf([&] { rectifier.apply(image); }), HasSubstr("image size = 100x100, must be 320x240"));
 }

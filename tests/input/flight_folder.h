@@ -26,8 +26,7 @@ public:
       throw std::runtime_error("cannot make a temporary folder");
     m_path = pattern;
     std::filesystem::create_directories(m_path + "/mav0/cam0/data");
-    std::string images = "#timestamp [ns],filename\n",
-                poses = "#timestamp [ns],x,y,z,qw,qx,qy,qz\n",
+    std::string images = "#timestamp [ns],filename\n", poses = "#timestamp [ns],x,y,z,qw,qx,qy,qz\n",
                 rates = "#timestamp [ns],x,y,z,ax,ay,az\n";
     for (std::size_t i = 0; i < frames; ++i) {
       images += fmt::format("{},{}\n", i * 100000000, imageName(i));
@@ -54,8 +53,7 @@ public:
   std::string imagePath(std::size_t i) const { return m_path + "/mav0/cam0/data/" + imageName(i); }
   static unsigned char pixel(std::size_t frame, int row, int column)
   {
-    return static_cast<unsigned char>(
-        (column * 31 + row * row * 17 + static_cast<int>(frame) * 57) % 251);
+    return static_cast<unsigned char>((column * 31 + row * row * 17 + static_cast<int>(frame) * 57) % 251);
   }
 
   void write(const std::string &file, const std::string &text) const
@@ -72,14 +70,10 @@ public:
     cv::imwrite(imagePath(i), image);
   }
   void removeImage(std::size_t i) const { std::filesystem::remove(imagePath(i)); }
-  void truncateImage(std::size_t i, std::size_t size) const
-  {
-    std::filesystem::resize_file(imagePath(i), size);
-  }
+  void truncateImage(std::size_t i, std::size_t size) const { std::filesystem::resize_file(imagePath(i), size); }
   void copyImage(std::size_t from, std::size_t to) const
   {
-    std::filesystem::copy_file(imagePath(from), imagePath(to),
-                               std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::copy_file(imagePath(from), imagePath(to), std::filesystem::copy_options::overwrite_existing);
   }
   void flipByte(std::size_t i, std::size_t at) const
   {

@@ -2,9 +2,9 @@
 // What is known of an image before a trunk is looked for: whether to believe it, and how far the camera turned.
 #include "support/drawn_trunks.h"
 
+#include "input/image_health.h"
 #include "mbt/border_profile.h"
 #include "mbt/border_vote.h"
-#include "input/image_health.h"
 #include "mbt/rotation_aligner.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,10 @@ namespace
 using namespace bole;
 using test::cameraAt;
 
-vpImage<unsigned char> wood(const Pose &cMo, unsigned seed) { return test::drawTrunks(PinholeCamera(), cMo, test::smallWood(), seed); }
+vpImage<unsigned char> wood(const Pose &cMo, unsigned seed)
+{
+  return test::drawTrunks(PinholeCamera(), cMo, test::smallWood(), seed);
+}
 
 TEST(ImageHealth, BelievesImagesOfAFlight)
 {
@@ -63,7 +66,10 @@ TEST(RotationAligner, DoesNotAlignWhatIsNotTheSameScene)
     for (unsigned u = 0; u < 320; ++u)
       other[v][u] = static_cast<unsigned char>(127 + 100 * std::sin(0.11 * u + 0.07 * v));
   const RotationAligner aligner;
-  EXPECT_FALSE(aligner.align(RotationAligner::reduce(wood(cameraAt({0, 0, 1.2}), 1)), RotationAligner::reduce(other), PinholeCamera()).ok);
+  EXPECT_FALSE(aligner
+                   .align(RotationAligner::reduce(wood(cameraAt({0, 0, 1.2}), 1)), RotationAligner::reduce(other),
+                          PinholeCamera())
+                   .ok);
 }
 
 TEST(BorderProfile, ThePeakOfADrawnBorderIsWhereTheModelHasIt)

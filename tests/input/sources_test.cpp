@@ -3,11 +3,11 @@
 #include "messages.h"
 
 #include "geometry/so3.h"
-#include <bole/open_source.h>
 #include "input/sequence_source.h"
 #include "input/trajectory.h"
 #include "input/truth.h"
 #include "input/video_source.h"
+#include <bole/open_source.h>
 
 #include <gmock/gmock.h>
 #include <opencv2/videoio.hpp>
@@ -25,8 +25,8 @@ cv::Mat picture(std::size_t index, int width = 96, int height = 64)
   cv::Mat image(height, width, CV_8UC3);
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
-      const auto value = static_cast<unsigned char>(
-          128 + 60 * std::sin(0.2 * u + 0.7 * static_cast<double>(index)) * std::cos(0.1 * v));
+      const auto value = static_cast<unsigned char>(128 + 60 * std::sin(0.2 * u + 0.7 * static_cast<double>(index)) *
+                                                              std::cos(0.1 * v));
       image.at<cv::Vec3b>(v, u) = {value, value, value};
     }
   return image;
@@ -42,13 +42,11 @@ protected:
   void writeImages(const std::string &pattern, const std::vector<int> &numbers) const
   {
     for (const int number : numbers)
-      cv::imwrite(path(cv::format(pattern.c_str(), number)),
-                  picture(static_cast<std::size_t>(number)));
+      cv::imwrite(path(cv::format(pattern.c_str(), number)), picture(static_cast<std::size_t>(number)));
   }
   void writeVideo(const std::string &name, std::size_t frames, double rate) const
   {
-    cv::VideoWriter writer(path(name), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), rate,
-                           cv::Size(96, 64));
+    cv::VideoWriter writer(path(name), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), rate, cv::Size(96, 64));
     ASSERT_TRUE(writer.isOpened());
     for (std::size_t i = 0; i < frames; ++i)
       writer.write(picture(i));
@@ -133,8 +131,7 @@ TEST_F(Sources, DamagedFramesOfAVideoAreReportedInTheirPlace)
   const auto frames = readAll(source);
   ASSERT_EQ(frames.size(), 12u);
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    EXPECT_EQ(frames[i].status, i == 5 ? FrameStatus::corrupt : FrameStatus::ok)
-        << i << frames[i].message;
+    EXPECT_EQ(frames[i].status, i == 5 ? FrameStatus::corrupt : FrameStatus::ok) << i << frames[i].message;
     EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 100000000);
   }
 }
@@ -183,14 +180,12 @@ TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
   writeVideo("v.avi", 10, 10);
   const auto size = std::filesystem::file_size(path("v.avi"));
   for (unsigned seed = 0; seed < 20; ++seed) {
-    std::filesystem::copy_file(path("v.avi"), path("w.avi"),
-                               std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::copy_file(path("v.avi"), path("w.avi"), std::filesystem::copy_options::overwrite_existing);
     {
       std::fstream file(path("w.avi"), std::ios::in | std::ios::out | std::ios::binary);
       std::srand(seed);
       for (int i = 0; i < 30; ++i) {
-        file.seekp(static_cast<std::streamoff>(6000 + static_cast<std::uintmax_t>(std::rand()) %
-                                                          (size - 6000)));
+        file.seekp(static_cast<std::streamoff>(6000 + static_cast<std::uintmax_t>(std::rand()) % (size - 6000)));
         file.put(static_cast<char>(std::rand()));
       }
     }
@@ -206,8 +201,7 @@ TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
 TEST_F(Sources, OdometryOfATumFileIsInterpolatedWithItsOffset)
 {
   writeVideo("v.avi", 5, 10);
-  m_flight.write("odometry.tum",
-                 "# t x y z q\n100.0 0 0 1 0 0 0 1\n100.2 2 0 1 0 0 0 1\n1.004e2 4 0 1 0 0 0 1\n");
+  m_flight.write("odometry.tum", "# t x y z q\n100.0 0 0 1 0 0 0 1\n100.2 2 0 1 0 0 0 1\n1.004e2 4 0 1 0 0 0 1\n");
   SourceOptions options;
   options.odometry_path = path("odometry.tum");
   options.odometry_offset_s = -100;
@@ -229,8 +223,7 @@ TEST_F(Sources, SaysWhatIsWrongInOneLine)
   m_flight.write("video.mp4", "this is no video");
   m_flight.write("camera.yaml", "resolution: [640, 480]\nintrinsics: [500, 500, 320, 240]\n");
   std::filesystem::create_directories(path("empty"));
-  const auto open = [&](const std::string &input, const std::string &odometry,
-                        const std::string &camera) {
+  const auto open = [&](const std::string &input, const std::string &odometry, const std::string &camera) {
     SourceOptions options;
     options.odometry_path = odometry.empty() ? odometry : path(odometry);
     options.camera_path = camera.empty() ? camera : path(camera);
@@ -244,8 +237,7 @@ TEST_F(Sources, SaysWhatIsWrongInOneLine)
   EXPECT_THAT(open("i%02d.png", "o.tum", ""), HasSubstr("o.tum:2: timestamp"));
   EXPECT_THAT(open("i%02d.png", "nan.tum", ""), HasSubstr("nan.tum:1: z = \"nan\""));
   EXPECT_THAT(open("i%02d.png", "late.tum", ""), HasSubstr("never meet"));
-  EXPECT_THAT(open("i%02d.png", "", "camera.yaml"),
-              HasSubstr("resolution = 640x480, must be 96x64"));
+  EXPECT_THAT(open("i%02d.png", "", "camera.yaml"), HasSubstr("resolution = 640x480, must be 96x64"));
 }
 
 TEST_F(Sources, SaysThatTheCameraIsAssumed)
@@ -291,6 +283,5 @@ TEST_F(Sources, TruthTrunksNearAndFar)
   EXPECT_NEAR(trunks[0].lean, M_PI / 20, 1e-12);
   EXPECT_EQ(trunks[1].radius, 0);
   m_flight.write("trees_far.csv", "id,x [m],y [m]\n3,40,5\n");
-  EXPECT_THAT(messageOf([&] { readTruthTrunks(m_flight.path()); }),
-              HasSubstr("trees_far.csv:2: id = 3"));
+  EXPECT_THAT(messageOf([&] { readTruthTrunks(m_flight.path()); }), HasSubstr("trees_far.csv:2: id = 3"));
 }

@@ -75,7 +75,8 @@ TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
   const Outcome built = bole::test::runShell(BOLE_CMAKE " --build " + build.string());
   ASSERT_EQ(built.status, 0) << built.text;
 
-  const Outcome ran = bole::test::runShell("cd " + (s_prefix / "share/bole").string() + " && " + (build / "outside").string());
+  const Outcome ran =
+      bole::test::runShell("cd " + (s_prefix / "share/bole").string() + " && " + (build / "outside").string());
   EXPECT_EQ(ran.status, 0) << ran.text;
 }
 
@@ -89,9 +90,9 @@ TEST_F(Install, NothingOfTheSourceOrBuildTreeIsNeeded)
 TEST_F(Install, TheCommandFindsItsPresetsAndItsFlight)
 {
   const fs::path share = s_prefix / "share/bole", folder = s_folder / "run";
-  const Outcome ran =
-      bole::test::runShell((s_prefix / "bin/bole").string() + " track " + (share / "data/park-forward").string() + " -o " +
-          folder.string() + " --config " + (share / "config/default.yaml").string() + " --no-video --frames 5");
+  const Outcome ran = bole::test::runShell(
+      (s_prefix / "bin/bole").string() + " track " + (share / "data/park-forward").string() + " -o " + folder.string() +
+      " --config " + (share / "config/default.yaml").string() + " --no-video --frames 5");
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_TRUE(fs::exists(folder / "trunks.csv"));
 }

@@ -174,7 +174,8 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
   EXPECT_LT(after([](MapTrunk &t) { t.misses += 5; }), odds);
   EXPECT_EQ(after([](MapTrunk &t) { t.points_behind = 3; }), odds); // a slipped track or two
   EXPECT_LT(after([](MapTrunk &t) { t.points_behind = 10; }), odds - 1);
-  EXPECT_GT(after([](MapTrunk &t) { t.points_behind = t.points_on = 10; }), after([](MapTrunk &t) { t.points_behind = 10; }) + 0.5);
+  EXPECT_GT(after([](MapTrunk &t) { t.points_behind = t.points_on = 10; }),
+            after([](MapTrunk &t) { t.points_behind = 10; }) + 0.5);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius += 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius -= 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.covariance *= 9; }), odds);
@@ -379,7 +380,8 @@ TEST_F(Life, AnyHistoryKeepsItsLaws)
       add(trunkAt(6 * uniform(random), 6 * uniform(random), 0.06 + 0.3 * uniform(random)));
     if (m_map.trunks().empty())
       continue;
-    MapTrunk &trunk = m_map.trunks()[static_cast<std::size_t>(uniform(random) * static_cast<double>(m_map.trunks().size()))];
+    MapTrunk &trunk =
+        m_map.trunks()[static_cast<std::size_t>(uniform(random) * static_cast<double>(m_map.trunks().size()))];
     if (!trunk.removed && uniform(random) < 0.7)
       see(trunk, 1 + static_cast<int>(4 * uniform(random)), 0.1, 2 * uniform(random));
     else if (!trunk.removed)
@@ -396,7 +398,8 @@ TEST_F(Life, AnyHistoryKeepsItsLaws)
       }
     }
     int counted = 0;
-    for (const TrunkStatus status : {TrunkStatus::candidate, TrunkStatus::confirmed, TrunkStatus::lost, TrunkStatus::merged})
+    for (const TrunkStatus status :
+         {TrunkStatus::candidate, TrunkStatus::confirmed, TrunkStatus::lost, TrunkStatus::merged})
       counted += m_map.count(status);
     ASSERT_EQ(counted, static_cast<int>(m_map.trunks().size()));
   }

@@ -76,7 +76,8 @@ TEST(CameraMotion, AgreesWithAKalmanFilterOnPositionAndVelocity)
     Eigen::Matrix<double, 6, 6> F = Eigen::Matrix<double, 6, 6>::Zero(), Q = F;
     F << Matrix3d::Identity(), n * across, Matrix3d::Zero(), across;
     const Matrix3d change = n * options.accel_sigma_m * options.accel_sigma_m * across;
-    Q << n * n * change + n * options.climb_sigma_m * options.climb_sigma_m * kUp * kUp.transpose(), n * change, n * change, change;
+    Q << n * n * change + n * options.climb_sigma_m * options.climb_sigma_m * kUp * kUp.transpose(), n * change,
+        n * change, change;
     x = F * x;
     P = F * P * F.transpose() + Q;
     const auto expected = motion.predict(n, Matrix3d::Identity(), 1e-9, kUp);

@@ -96,7 +96,9 @@ TEST_F(CaoReader, ACubeIsRefusedAtTheLineOfItsFaces)
   const fs::path path = kImages / "mbt" / "cube_and_cylinder.cao";
   if (!fs::exists(path))
     GTEST_SKIP() << path << " is absent: package visp-images-data";
-  EXPECT_THAT(messageOf(path.string()), HasSubstr("cube_and_cylinder.cao:19: faces from points = 6, must be 0: a model of trunks holds cylinders only"));
+  EXPECT_THAT(
+      messageOf(path.string()),
+      HasSubstr("cube_and_cylinder.cao:19: faces from points = 6, must be 0: a model of trunks holds cylinders only"));
 }
 
 TEST_F(CaoReader, SaysFileLineAndWhatMustBeThere)

@@ -37,11 +37,13 @@ double residualAt(const Pose &cMo, const Cylinder &trunk, Border side, const Eig
   return vpMbtDistanceTrunk::residual(cMo * trunk, side, m);
 }
 
-double differenceFrom(const Row &L, const Pose &cMo, const Cylinder &trunk, Border side, const Eigen::Vector3d &m, double h)
+double differenceFrom(const Row &L, const Pose &cMo, const Cylinder &trunk, Border side, const Eigen::Vector3d &m,
+                      double h)
 {
   Row numeric;
   for (int i = 0; i < 6; ++i)
-    numeric(i) = (residualAt(movedBy(cMo, i, h), trunk, side, m) - residualAt(movedBy(cMo, i, -h), trunk, side, m)) / (2 * h);
+    numeric(i) =
+        (residualAt(movedBy(cMo, i, h), trunk, side, m) - residualAt(movedBy(cMo, i, -h), trunk, side, m)) / (2 * h);
   return (numeric - L).norm();
 }
 
@@ -52,7 +54,8 @@ TEST(DistanceTrunk, InteractionMatrixAgreesWithCentralDifferencesAtTwoStepSizes)
       for (const Eigen::Vector3d &m : {Eigen::Vector3d(-0.1, 0.3, 1), Eigen::Vector3d(0.2, -0.4, 1)}) {
         Row L;
         vpMbtDistanceTrunk::residual(cMo * leaning(), side, m, &L);
-        const double wide = differenceFrom(L, cMo, leaning(), side, m, 2e-2), narrow = differenceFrom(L, cMo, leaning(), side, m, 1e-2);
+        const double wide = differenceFrom(L, cMo, leaning(), side, m, 2e-2),
+                     narrow = differenceFrom(L, cMo, leaning(), side, m, 1e-2);
         EXPECT_LT(narrow, 2e-3 * (1 + L.norm()));
         EXPECT_NEAR(wide / narrow, 4, 0.3);
       }
@@ -79,8 +82,10 @@ TEST(DistanceTrunk, BordersAreThoseOfVpCylinder)
   vpCylinder cylinder(a.x(), a.y(), a.z(), trunk.foot.x(), trunk.foot.y(), trunk.foot.z(), trunk.radius);
   cylinder.track(cMo.toVisp());
   // a point of each limb of ViSP (rho = x cos theta + y sin theta) lies on one of our borders
-  for (const auto &[rho, theta] : {std::pair(cylinder.getRho1(), cylinder.getTheta1()), std::pair(cylinder.getRho2(), cylinder.getTheta2())}) {
-    const Eigen::Vector3d m(rho * std::cos(theta) - 0.3 * std::sin(theta), rho * std::sin(theta) + 0.3 * std::cos(theta), 1);
+  for (const auto &[rho, theta] :
+       {std::pair(cylinder.getRho1(), cylinder.getTheta1()), std::pair(cylinder.getRho2(), cylinder.getTheta2())}) {
+    const Eigen::Vector3d m(rho * std::cos(theta) - 0.3 * std::sin(theta),
+                            rho * std::sin(theta) + 0.3 * std::cos(theta), 1);
     const double left = residualAt(cMo, trunk, Border::left, m), right = residualAt(cMo, trunk, Border::right, m);
     EXPECT_LT(std::min(std::abs(left), std::abs(right)), 1e-9);
     EXPECT_GT(std::max(std::abs(left), std::abs(right)), 1e-2);

@@ -70,14 +70,16 @@ TEST_F(MbTrunkTracker, TracksColourImagesAsItTracksGreyOnes)
     m_tracker->track(test::inColour(image(k)));
   }
   expectAt(pose(3));
-  EXPECT_LT(test::metresApart(found(), Pose::fromVisp(grey.getPose())), 0.02); // grey of a colour may differ by one level
+  EXPECT_LT(test::metresApart(found(), Pose::fromVisp(grey.getPose())),
+            0.02); // grey of a colour may differ by one level
 }
 
 TEST_F(MbTrunkTracker, StartsFromFourPoints)
 {
   std::vector<vpPoint> points;
   std::vector<vpImagePoint> places;
-  for (const Eigen::Vector3d &p : {Eigen::Vector3d(4, 1, 0.5), Eigen::Vector3d(5, -1, 0.4), Eigen::Vector3d(6, -0.5, 2.3), Eigen::Vector3d(4.5, 0.8, 2)}) {
+  for (const Eigen::Vector3d &p : {Eigen::Vector3d(4, 1, 0.5), Eigen::Vector3d(5, -1, 0.4),
+                                   Eigen::Vector3d(6, -0.5, 2.3), Eigen::Vector3d(4.5, 0.8, 2)}) {
     vpPoint point;
     point.setWorldCoordinates(p.x(), p.y(), p.z());
     const Eigen::Vector2d u = m_camera.project(pose(0) * p);
@@ -120,7 +122,8 @@ TEST_F(MbTrunkTracker, ErrorsWeightsAndCovarianceBelongToTheLastFrame)
   ASSERT_EQ(covariance.getRows(), 6u);
   EXPECT_LT(std::sqrt(covariance[0][0]), 0.1);
   const double climb = dynamic_cast<vpMbTrunkTracker &>(*m_tracker).getOptions().climb_sigma_m;
-  EXPECT_NEAR(std::sqrt(covariance[1][1]), std::hypot(0.01, climb), 1e-3); // the height is not seen: as it was and one frame more
+  EXPECT_NEAR(std::sqrt(covariance[1][1]), std::hypot(0.01, climb),
+              1e-3); // the height is not seen: as it was and one frame more
 }
 
 TEST_F(MbTrunkTracker, ProjectionErrorTellsARightPoseFromAWrongOne)
@@ -129,7 +132,8 @@ TEST_F(MbTrunkTracker, ProjectionErrorTellsARightPoseFromAWrongOne)
   m_tracker->initFromPose(image(0), pose(0).toVisp());
   m_tracker->track(image(1));
   const double right = m_tracker->getProjectionError();
-  const double off = m_tracker->computeCurrentProjectionError(image(1), cameraAt({0, 0.4, 1.2}).toVisp(), m_camera.toVisp());
+  const double off =
+      m_tracker->computeCurrentProjectionError(image(1), cameraAt({0, 0.4, 1.2}).toVisp(), m_camera.toVisp());
   EXPECT_LT(right, 25);
   EXPECT_GT(off, right + 10);
 }
@@ -146,8 +150,9 @@ TEST_F(MbTrunkTracker, DrawsTheBordersWhereViSPDrawsTheLimbsOfACylinder)
     for (const Cylinder &trunk : m_wood)
       for (const Border side : {Border::left, Border::right}) {
         const Cylinder c = pose(0) * trunk;
-        nearest = std::min(nearest, std::max(std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[2], line[1]}))),
-                                             std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[4], line[3]})))));
+        nearest = std::min(nearest,
+                           std::max(std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[2], line[1]}))),
+                                    std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[4], line[3]})))));
       }
     EXPECT_LT(nearest, 1e-6);
   }
@@ -199,9 +204,10 @@ TEST_F(MbTrunkTracker, ResetForgetsTheModelAndReInitModelLoadsAnother)
 TEST_F(MbTrunkTracker, ReadsTheSettingsOfViSPAndItsOwn)
 {
   const std::string xml = m_cao + ".xml";
-  std::ofstream(xml) << "<conf><ecm><mask><size>5</size></mask></ecm><camera><u0>160</u0><v0>120</v0><px>210</px><py>211</py></camera>"
-                        "<face><near_clipping>0.2</near_clipping><far_clipping>12</far_clipping></face>"
-                        "<trunk><scan_max_px>16</scan_max_px></trunk></conf>";
+  std::ofstream(xml)
+      << "<conf><ecm><mask><size>5</size></mask></ecm><camera><u0>160</u0><v0>120</v0><px>210</px><py>211</py></camera>"
+         "<face><near_clipping>0.2</near_clipping><far_clipping>12</far_clipping></face>"
+         "<trunk><scan_max_px>16</scan_max_px></trunk></conf>";
   m_tracker->loadConfigFile(xml, false);
   vpCameraParameters cam;
   m_tracker->getCameraParameters(cam);

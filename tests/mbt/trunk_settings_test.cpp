@@ -51,7 +51,8 @@ TEST_F(TrunkSettingsFile, ViSPsOwnSettingsAreRead)
 
 TEST_F(TrunkSettingsFile, TheSectionOfTrunksIsRead)
 {
-  const TrunkSettings settings = read("<conf>\n<!-- a comment --><trunk><pieces>6</pieces>\n<radius_sigma> 0.05 </radius_sigma></trunk></conf>");
+  const TrunkSettings settings =
+      read("<conf>\n<!-- a comment --><trunk><pieces>6</pieces>\n<radius_sigma> 0.05 </radius_sigma></trunk></conf>");
   EXPECT_EQ(settings.options.trunk.pieces, 6);
   EXPECT_EQ(settings.options.radius_sigma, 0.05);
   EXPECT_FALSE(settings.has_camera);
@@ -60,9 +61,12 @@ TEST_F(TrunkSettingsFile, TheSectionOfTrunksIsRead)
 TEST_F(TrunkSettingsFile, WhatDoesNotFitIsRefusedWithItsLine)
 {
   EXPECT_THAT(messageOf("<conf>\n<trunk>\n<piece>6</piece></trunk></conf>"), HasSubstr(":3: trunk/piece: no such key"));
-  EXPECT_THAT(messageOf("<conf>\n<trunk><pieces>60</pieces></trunk></conf>"), HasSubstr(":2: pieces = 60, must be 1 .. 16"));
-  EXPECT_THAT(messageOf("<conf><trunk>\n<min_support>much</min_support></trunk></conf>"), HasSubstr(":2: min_support = much, must be a number"));
-  EXPECT_THAT(messageOf("<conf><trunk><pieces>4</pieces><pieces>5</pieces></trunk></conf>"), HasSubstr("trunk/pieces: given twice"));
+  EXPECT_THAT(messageOf("<conf>\n<trunk><pieces>60</pieces></trunk></conf>"),
+              HasSubstr(":2: pieces = 60, must be 1 .. 16"));
+  EXPECT_THAT(messageOf("<conf><trunk>\n<min_support>much</min_support></trunk></conf>"),
+              HasSubstr(":2: min_support = much, must be a number"));
+  EXPECT_THAT(messageOf("<conf><trunk><pieces>4</pieces><pieces>5</pieces></trunk></conf>"),
+              HasSubstr("trunk/pieces: given twice"));
   EXPECT_THAT(messageOf("<conf><camera><u0>1</u0></camera></conf>"), HasSubstr("camera: must hold u0, v0, px and py"));
   EXPECT_THAT(messageOf("<conf><trunk></conf>"), HasSubstr("</conf> closes what is not open"));
   EXPECT_THAT(messageOf("<conf><trunk>"), HasSubstr("<trunk> is never closed"));
@@ -85,10 +89,14 @@ TEST_F(TrunkSettingsFile, TheFilesInModelsAreReadAndTrunksXmlHoldsTheDefaults)
   }
   EXPECT_GE(models_read, 4);
   vpMbTrunkTracker::Options changed, defaults; // the file sets everything that was changed back to its default
-  changed.trunk.pieces = 9, changed.trunk.samples = 99, changed.trunk.min_length_px = 99, changed.trunk.min_width_px = 9;
+  changed.trunk.pieces = 9, changed.trunk.samples = 99, changed.trunk.min_length_px = 99,
+  changed.trunk.min_width_px = 9;
   changed.trunk.min_contrast = 9, changed.border_sigma_px = 9, changed.lean_sigma_rad = 0.4, changed.radius_sigma = 0.9;
-  changed.scan_min_px = 9, changed.scan_max_px = 99, changed.refine_px = 9, changed.refinements = 4, changed.step_sigma_m = 9, changed.climb_sigma_m = 9;
-  changed.turn_sigma_rad = 0.9, changed.accel_sigma_m = 0.1, changed.min_support = 0.9, changed.min_agreement = 0.9, changed.max_jump = 9, changed.max_sigma_m = 9, changed.max_sigma_rad = 0.9, changed.unobserved_m = 9, changed.lever_m = 9;
+  changed.scan_min_px = 9, changed.scan_max_px = 99, changed.refine_px = 9, changed.refinements = 4,
+  changed.step_sigma_m = 9, changed.climb_sigma_m = 9;
+  changed.turn_sigma_rad = 0.9, changed.accel_sigma_m = 0.1, changed.min_support = 0.9, changed.min_agreement = 0.9,
+  changed.max_jump = 9, changed.max_sigma_m = 9, changed.max_sigma_rad = 0.9, changed.unobserved_m = 9,
+  changed.lever_m = 9;
   changed.health.detect_frozen = false;
   const auto o = readTrunkSettings((models / "trunks.xml").string(), changed).options;
   EXPECT_EQ(o.trunk.pieces, defaults.trunk.pieces);

@@ -25,8 +25,7 @@ Pose truth(int k) { return test::cameraAt({0.03 * k, 0.01 * k, 1.2}, 0.003 * k, 
 vpImage<unsigned char> grabbed(int k) { return test::drawTrunks(PinholeCamera(), truth(k), kWood, unsigned(k) + 1); }
 
 /// The tutorial; nothing in it but the name of the class depends on the tracker.
-template <class Tracker>
-vpHomogeneousMatrix runTutorial(const std::string &objectname)
+template <class Tracker> vpHomogeneousMatrix runTutorial(const std::string &objectname)
 {
   vpImage<unsigned char> I;
   vpCameraParameters cam;
@@ -61,12 +60,15 @@ protected:
   ViSPTutorial()
   {
     writeCao(m_name + ".cao", kWood);
-    std::ofstream(m_name + ".xml")
-        << "<?xml version=\"1.0\"?>\n<conf><ecm><mask><size>5</size><nb_mask>180</nb_mask></mask><range><tracking>8</tracking></range>"
-           "<contrast><edge_threshold>5000</edge_threshold><mu1>0.5</mu1><mu2>0.5</mu2></contrast><sample><step>4</step></sample></ecm>"
-           "<camera><u0>159.5</u0><v0>119.5</v0><px>200</px><py>200</py></camera>"
-           "<face><angle_appear>85</angle_appear><angle_disappear>89</angle_disappear><near_clipping>0.1</near_clipping>"
-           "<far_clipping>15</far_clipping><fov_clipping>1</fov_clipping></face></conf>\n";
+    std::ofstream(m_name + ".xml") << "<?xml "
+                                      "version=\"1.0\"?>\n<conf><ecm><mask><size>5</size><nb_mask>180</nb_mask></"
+                                      "mask><range><tracking>8</tracking></range>"
+                                      "<contrast><edge_threshold>5000</edge_threshold><mu1>0.5</mu1><mu2>0.5</mu2></"
+                                      "contrast><sample><step>4</step></sample></ecm>"
+                                      "<camera><u0>159.5</u0><v0>119.5</v0><px>200</px><py>200</py></camera>"
+                                      "<face><angle_appear>85</angle_appear><angle_disappear>89</"
+                                      "angle_disappear><near_clipping>0.1</near_clipping>"
+                                      "<far_clipping>15</far_clipping><fov_clipping>1</fov_clipping></face></conf>\n";
     m_visp_says = std::cout.rdbuf(nullptr);
   }
   ~ViSPTutorial() override

@@ -11,15 +11,13 @@ namespace
 {
 using namespace bole;
 
-std::vector<GyroSample> samplesOf(const Eigen::Vector3d &rate, double noise, std::int64_t end_ns,
-                                  unsigned seed = 3)
+std::vector<GyroSample> samplesOf(const Eigen::Vector3d &rate, double noise, std::int64_t end_ns, unsigned seed = 3)
 {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, noise);
   std::vector<GyroSample> samples;
   for (std::int64_t stamp = 0; stamp <= end_ns; stamp += 5000000) {
-    samples.push_back(
-        {stamp, rate + Eigen::Vector3d(normal(random), normal(random), normal(random))});
+    samples.push_back({stamp, rate + Eigen::Vector3d(normal(random), normal(random), normal(random))});
   }
   return samples;
 }
@@ -35,8 +33,7 @@ TEST(Gyro, AConstantRateIntegratesToItsExponential)
 TEST(Gyro, AdjoiningIntervalsMultiply)
 {
   const auto samples = samplesOf({0.3, -0.5, 1.0}, 0.1, 300000000);
-  const auto first = integrateGyro(samples, 0, 105000000),
-             second = integrateGyro(samples, 105000000, 290000000);
+  const auto first = integrateGyro(samples, 0, 105000000), second = integrateGyro(samples, 105000000, 290000000);
   const auto both = integrateGyro(samples, 0, 290000000), joined = first.then(second);
   EXPECT_LT(logSo3(joined.R.transpose() * both.R).norm(), 1e-9);
   EXPECT_NEAR(joined.duration, both.duration, 1e-12);
@@ -69,8 +66,7 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
 {
   const GyroOptions options;
   const Eigen::Vector3d rate(0.1, -0.2, 0.4), truth(0.009, -0.006, 0.003);
-  const auto samples =
-      samplesOf(rate + truth, options.noise_density / std::sqrt(0.005), 5000000000);
+  const auto samples = samplesOf(rate + truth, options.noise_density / std::sqrt(0.005), 5000000000);
   GyroBias bias = GyroBias::unknown(options);
   const double sigma = 3e-4;
   std::mt19937 random(5);
@@ -79,8 +75,7 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
     const std::int64_t from = i * 300000000LL;
     const auto prior = integrateGyro(samples, from, from + 300000000, bias, options);
     // Fuse the prior with an independent rotation, as the estimator does.
-    const Eigen::Matrix3d seen =
-        expSo3(0.3 * rate) * expSo3({normal(random), normal(random), normal(random)});
+    const Eigen::Matrix3d seen = expSo3(0.3 * rate) * expSo3({normal(random), normal(random), normal(random)});
     const Eigen::Matrix3d S = prior.covariance(),
                           gain = S * (S + sigma * sigma * Eigen::Matrix3d::Identity()).inverse();
     const Eigen::Matrix3d fused = prior.R * expSo3(gain * logSo3(prior.R.transpose() * seen));

@@ -28,8 +28,7 @@ TEST(PointOdometry, KeepsItsUnitOfLengthAlongThePath)
   PointOdometry odometry(kCamera);
   std::vector<Pose> truth;
   for (int k = 0; k < 24; ++k) {
-    truth.push_back(
-        {expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0.1 * std::sin(0.3 * k), 0.04 * k}});
+    truth.push_back({expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0.1 * std::sin(0.3 * k), 0.04 * k}});
     tracker.track(drawWalls(kCamera, truth.back()));
     odometry.process(tracker, k * 100000000LL);
   }
@@ -116,19 +115,16 @@ TEST(PointOdometry, PlacesTheRenderedFlightsWithinTwoPercentOfTheirPath)
     reference.col(k) = truth[static_cast<std::size_t>(k)];
   }
   const Eigen::Matrix4d aligned = Eigen::umeyama(estimate, reference, true);
-  const Eigen::Matrix3Xd moved =
-      (aligned.topLeftCorner<3, 3>() * estimate).colwise() + aligned.topRightCorner<3, 1>();
+  const Eigen::Matrix3Xd moved = (aligned.topLeftCorner<3, 3>() * estimate).colwise() + aligned.topRightCorner<3, 1>();
   EXPECT_LT(std::sqrt((moved - reference).squaredNorm() / double(n)), 0.01 * length);
 }
 
 /// Dark leaning bars on a bright sky, all towards the image of \p up.
 vpImage<unsigned char> drawTrunks(const PinholeCamera &camera, const Eigen::Vector3d &up)
 {
-  vpImage<unsigned char> image(static_cast<unsigned>(camera.height),
-                               static_cast<unsigned>(camera.width), 220);
+  vpImage<unsigned char> image(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width), 220);
   for (const double bearing : {-0.6, -0.35, -0.1, 0.15, 0.4, 0.65}) {
-    const Eigen::Vector3d side = up.cross(Eigen::Vector3d(0, 0, 1)).normalized(),
-                          ahead = side.cross(up);
+    const Eigen::Vector3d side = up.cross(Eigen::Vector3d(0, 0, 1)).normalized(), ahead = side.cross(up);
     const Eigen::Vector3d foot = std::cos(bearing) * ahead + std::sin(bearing) * side;
     const Eigen::Vector3d normal = foot.cross(up).normalized();
     for (unsigned y = 0; y < image.getHeight(); ++y) {
@@ -172,7 +168,8 @@ TEST(Vertical, EdgesAtRandomTellNothing)
   for (int i = 0; i < 120; ++i) {
     const cv::Point2d p(320 * at(random), 240 * at(random));
     const double angle = M_PI * at(random);
-    cv::line(grey, p, p + 40 * cv::Point2d(std::cos(angle), std::sin(angle)), cv::Scalar(at(random) < 0.5 ? 20 : 235), 3);
+    cv::line(grey, p, p + 40 * cv::Point2d(std::cos(angle), std::sin(angle)), cv::Scalar(at(random) < 0.5 ? 20 : 235),
+             3);
   }
   vpImage<unsigned char> image(240, 320);
   std::copy(grey.datastart, grey.dataend, image.bitmap);
@@ -182,15 +179,13 @@ TEST(Vertical, EdgesAtRandomTellNothing)
 TEST(Vertical, AnImageWithoutEdgesKeepsWhatWasExpected)
 {
   const Eigen::Vector3d expected = Eigen::Vector3d(0.1, -1, 0.1).normalized();
-  const auto estimate =
-      gravityFromVerticals(vpImage<unsigned char>(240, 320, 99), kCamera, expected);
+  const auto estimate = gravityFromVerticals(vpImage<unsigned char>(240, 320, 99), kCamera, expected);
   EXPECT_EQ(estimate.status, VerticalStatus::too_few_edges);
   EXPECT_LT((estimate.up - expected).norm(), 1e-12);
   EXPECT_GT(estimate.covariance(0, 0), 0.1);
 }
 
-std::vector<PointDepth> groundPoints(double height, const Eigen::Vector3d &up, double bushes,
-                                     unsigned seed)
+std::vector<PointDepth> groundPoints(double height, const Eigen::Vector3d &up, double bushes, unsigned seed)
 {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);

@@ -90,8 +90,7 @@ Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
   frame.image = image;
   frame.wMb_odometry = poseAt(k) * bMc.inverse();
   for (int i = 1; i <= 20 && k > 0; ++i) {
-    const Eigen::Matrix3d b0Rb1 =
-        bMc.R * poseAt(k - 1).R.transpose() * poseAt(k).R * bMc.R.transpose();
+    const Eigen::Matrix3d b0Rb1 = bMc.R * poseAt(k - 1).R.transpose() * poseAt(k).R * bMc.R.transpose();
     frame.gyro.push_back({frame.stamp_ns - 100000000LL + i * 5000000LL, logSo3(b0Rb1) / 0.1});
   }
   return frame;

@@ -15,8 +15,7 @@ const PinholeCamera kCamera;
 double jacobianError(double step)
 {
   const Pose aMb = typicalMotion();
-  const Eigen::Vector3d d = aMb.t.normalized(), x_a = kCamera.ray({200, 80}),
-                        x_b = kCamera.ray({190, 85});
+  const Eigen::Vector3d d = aMb.t.normalized(), x_a = kCamera.ray({200, 80}), x_b = kCamera.ray({190, 85});
   Eigen::Matrix<double, 1, 5> J;
   sampsonResidual(x_a, x_b, aMb.R, d, &J);
   double worst = 0;
@@ -47,8 +46,7 @@ TEST(SampsonResidual, IsTheNoiseOfOneImageCoordinate)
   double sum = 0;
   const auto matches = cloudMatches(kCamera, aMb, options);
   for (const auto &match : matches) {
-    const double r = sampsonResidual(kCamera.ray(match.a_px), kCamera.ray(match.b_px), aMb.R,
-                                     aMb.t.normalized());
+    const double r = sampsonResidual(kCamera.ray(match.a_px), kCamera.ray(match.b_px), aMb.R, aMb.t.normalized());
     sum += r * r;
   }
   EXPECT_NEAR(std::sqrt(sum / double(matches.size())) * kCamera.fx, 0.2, 0.01);
@@ -94,13 +92,11 @@ TEST(RelativePose, KeepsOffFortyPercentOfOutliers)
 
 TEST(RelativePose, FindsTheSignOfTheDirectionFromTheDepths)
 {
-  for (const Eigen::Vector3d &t :
-       {Eigen::Vector3d(0, 0, 0.4), Eigen::Vector3d(0, 0, -0.4), Eigen::Vector3d(0.3, 0, 0),
-        Eigen::Vector3d(-0.3, 0, 0), Eigen::Vector3d(0, 0.3, 0.05)}) {
+  for (const Eigen::Vector3d &t : {Eigen::Vector3d(0, 0, 0.4), Eigen::Vector3d(0, 0, -0.4), Eigen::Vector3d(0.3, 0, 0),
+                                   Eigen::Vector3d(-0.3, 0, 0), Eigen::Vector3d(0, 0.3, 0.05)}) {
     CloudOptions options;
     options.noise_px = 0.1;
-    const auto estimate =
-        estimateRelativePose(cloudMatches(kCamera, {expSo3({0, 0.02, 0}), t}, options), kCamera);
+    const auto estimate = estimateRelativePose(cloudMatches(kCamera, {expSo3({0, 0.02, 0}), t}, options), kCamera);
     EXPECT_LT(directionErrorDeg(estimate.direction, t), 5) << t.transpose();
   }
 }
@@ -116,12 +112,10 @@ TEST(RelativePose, CovarianceIsHonestForIndependentNoise)
     options.noise_px = 0.15;
     options.seed = seed;
     const Pose aMb = typicalMotion();
-    const auto estimate =
-        estimateRelativePose(cloudMatches(kCamera, aMb, options), kCamera, {}, independent);
+    const auto estimate = estimateRelativePose(cloudMatches(kCamera, aMb, options), kCamera, {}, independent);
     ASSERT_TRUE(estimate.hasDirection());
     Vector5d error;
-    error << logSo3(estimate.aRb.transpose() * aMb.R),
-        directionMinus(aMb.t.normalized(), estimate.direction);
+    error << logSo3(estimate.aRb.transpose() * aMb.R), directionMinus(aMb.t.normalized(), estimate.direction);
     sum += error.dot(estimate.covariance.ldlt().solve(error));
     ++n;
   }
@@ -174,8 +168,7 @@ TEST(RelativePose, MatchesWithoutACommonMotionAreSaidToBeInconsistent)
 {
   CloudOptions options;
   options.outliers = 1;
-  const auto estimate =
-      estimateRelativePose(cloudMatches(kCamera, typicalMotion(), options), kCamera);
+  const auto estimate = estimateRelativePose(cloudMatches(kCamera, typicalMotion(), options), kCamera);
   EXPECT_EQ(estimate.status, RelativePoseStatus::inconsistent);
 }
 
@@ -195,8 +188,7 @@ TEST(RelativePose, APlaneInViewNeedsTheGyro)
   EXPECT_LT(directionErrorDeg(with.direction, aMb.t), 3);
   // Without it one of the plane's two motions, and if both fit, the status says so.
   const auto without = estimateRelativePose(matches, kCamera);
-  EXPECT_TRUE(without.status == RelativePoseStatus::ambiguous ||
-              directionErrorDeg(without.direction, aMb.t) < 8)
+  EXPECT_TRUE(without.status == RelativePoseStatus::ambiguous || directionErrorDeg(without.direction, aMb.t) < 8)
       << toString(without.status) << " " << without.direction.transpose();
 }
 
@@ -209,8 +201,7 @@ TEST(RelativePose, OptionsNameTheFault)
     FAIL();
   }
   catch (const vpException &e) {
-    EXPECT_NE(std::string(e.what()).find("relative_pose.inflation = 0.5, must be 1 or more"),
-              std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("relative_pose.inflation = 0.5, must be 1 or more"), std::string::npos);
   }
 }
 } // namespace

@@ -36,8 +36,7 @@ inline double texture(double x, double y, unsigned seed)
 /// Walls at z = 5 (left third), 8 (right third) and 14 (behind all), seen from wMc (camera axes).
 inline vpImage<unsigned char> drawWalls(const PinholeCamera &camera, const Pose &wMc)
 {
-  vpImage<unsigned char> image(static_cast<unsigned>(camera.height),
-                               static_cast<unsigned>(camera.width));
+  vpImage<unsigned char> image(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width));
   struct Wall
   {
     double z, from, to, grain;
@@ -50,8 +49,7 @@ inline vpImage<unsigned char> drawWalls(const PinholeCamera &camera, const Pose 
         const double along = (wall.z - wMc.t.z()) / ray.z();
         const Eigen::Vector3d at = wMc.t + along * ray;
         if (along > 0 && at.x() >= wall.from && at.x() <= wall.to) {
-          const double value =
-              texture(at.x() / wall.grain, at.y() / wall.grain, static_cast<unsigned>(wall.z));
+          const double value = texture(at.x() / wall.grain, at.y() / wall.grain, static_cast<unsigned>(wall.z));
           image[y][x] = static_cast<unsigned char>(40 + 170 * value);
           break;
         }

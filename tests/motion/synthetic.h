@@ -23,8 +23,7 @@ struct CloudOptions
 
 /// Matches of a cloud between a camera at the origin (a) and one at aMb; pixels outside of the
 /// images are left out.
-inline std::vector<PointMatch> cloudMatches(const PinholeCamera &camera, const Pose &aMb,
-                                            const CloudOptions &options)
+inline std::vector<PointMatch> cloudMatches(const PinholeCamera &camera, const Pose &aMb, const CloudOptions &options)
 {
   std::mt19937 random(options.seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -56,10 +55,7 @@ inline std::vector<PointMatch> cloudMatches(const PinholeCamera &camera, const P
   return matches;
 }
 
-inline Pose typicalMotion()
-{
-  return {expSo3({0.01, -0.03, 0.02}), Eigen::Vector3d(0.15, -0.03, 0.3)};
-}
+inline Pose typicalMotion() { return {expSo3({0.01, -0.03, 0.02}), Eigen::Vector3d(0.15, -0.03, 0.3)}; }
 
 inline double rotationErrorDeg(const Eigen::Matrix3d &a, const Eigen::Matrix3d &b)
 {

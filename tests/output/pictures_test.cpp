@@ -2,9 +2,9 @@
 // What people look at: the overlay, the videos, the map, the progress line.
 #include "input/video_source.h"
 #include "output/map_svg.h"
-#include <bole/overlay.h>
 #include "output/progress.h"
 #include "output/video_writer.h"
+#include <bole/overlay.h>
 
 #include <gmock/gmock.h>
 
@@ -63,7 +63,8 @@ TEST(Overlay, DrawsTheBordersWhereTheCameraSeesThem)
   ASSERT_GT(picture.getHeight(), 480u);
   for (const Border border : {Border::left, Border::right}) {
     const Eigen::Vector2d u = kCamera.project(overlay.trunks[0].relative.borderDirection(border, 0.1));
-    const auto column = static_cast<unsigned>(std::lround(2 * u.x() + 0.5)), row = static_cast<unsigned>(std::lround(2 * u.y() + 0.5));
+    const auto column = static_cast<unsigned>(std::lround(2 * u.x() + 0.5)),
+               row = static_cast<unsigned>(std::lround(2 * u.y() + 0.5));
     EXPECT_LT(distanceOf(picture[row][column], colourOf(4)), 60);
     const unsigned outside = border == Border::left ? column - 20 : column + 20;
     EXPECT_LT(distanceOf(picture[row][outside], vpRGBa(20, 20, 20, 255)), 10);
@@ -79,7 +80,7 @@ TEST(Overlay, TellsCandidatesFromConfirmedAndPredictedFromObserved)
     return coloured(drawnWith(overlay), 4);
   };
   const int confirmed = count(TrunkStatus::confirmed, true), candidate = count(TrunkStatus::candidate, true);
-  EXPECT_LT(candidate, 0.8 * confirmed);                             // thin
+  EXPECT_LT(candidate, 0.8 * confirmed);                            // thin
   EXPECT_LT(count(TrunkStatus::candidate, false), 0.8 * candidate); // dashed
   EXPECT_GT(count(TrunkStatus::candidate, false), 0);
 }

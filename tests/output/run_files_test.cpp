@@ -35,8 +35,7 @@ protected:
   }
   std::size_t files() const
   {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(m_folder), fs::directory_iterator()));
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(m_folder), fs::directory_iterator()));
   }
 
   fs::path m_folder;
@@ -81,9 +80,8 @@ TEST_F(RunFiles, TrajectoriesComeBackWithExactStamps)
 {
   Trajectory trajectory;
   for (int i = 0; i < 20; ++i)
-    trajectory.push_back(
-        {1403636579763555584LL + i * 50000001LL,
-         Pose(expSo3({0.3 * i, -0.1 * i, 0.2 * i}), {0.1 * i, -2.0 * i, 1e-3 * i})});
+    trajectory.push_back({1403636579763555584LL + i * 50000001LL,
+                          Pose(expSo3({0.3 * i, -0.1 * i, 0.2 * i}), {0.1 * i, -2.0 * i, 1e-3 * i})});
   writeTrajectory(path("t.tum"), trajectory);
 
   const Trajectory read = readTumTrajectory(path("t.tum"));
@@ -97,8 +95,7 @@ TEST_F(RunFiles, TrajectoriesComeBackWithExactStamps)
 
 TEST_F(RunFiles, StampsBeforeZeroComeBackToo)
 {
-  writeTrajectory(path("t.tum"),
-                  {{-1500000000, Pose()}, {-500000000, Pose()}, {250000000, Pose()}});
+  writeTrajectory(path("t.tum"), {{-1500000000, Pose()}, {-500000000, Pose()}, {250000000, Pose()}});
   const Trajectory read = readTumTrajectory(path("t.tum"));
   ASSERT_EQ(read.size(), 3u);
   EXPECT_EQ(read[0].stamp_ns, -1500000000);
@@ -120,9 +117,8 @@ TEST_F(RunFiles, TrunksComeBack)
   writeTrunks(path("trunks.csv"), {trunk, trunk});
 
   EXPECT_THAT(content("trunks.csv"),
-              testing::StartsWith(
-                  "id,x [m],y [m],radius [m],var_xx [m^2],var_xy [m^2],var_yy [m^2],var_radius "
-                  "[m^2],observations,first_seen [s],last_seen [s],status\n3,1.500000,-2.250000,"));
+              testing::StartsWith("id,x [m],y [m],radius [m],var_xx [m^2],var_xy [m^2],var_yy [m^2],var_radius "
+                                  "[m^2],observations,first_seen [s],last_seen [s],status\n3,1.500000,-2.250000,"));
   const auto read = readTrunks(path("trunks.csv"));
   ASSERT_EQ(read.size(), 2u);
   EXPECT_EQ(read[0].id, 3);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What views of a trunk count for. One that is darker than what is behind it, and then brighter: what a drone sees that flies round it.
+// What views of a trunk count for. One that is darker than what is behind it, and then brighter: what a drone sees that
+// flies round it.
 #include "support/drawn_trunks.h"
 
 #include <bole/pipeline.h>
@@ -85,7 +86,8 @@ double radiusSigmaAfter(int rest, double view_correlation)
 
 TEST(ViewCorrelation, OneViewSeenAgainAndAgainTeachesLittle)
 {
-  const double moved = radiusSigmaAfter(1, 0.05), each_counts = radiusSigmaAfter(40, 0), shared = radiusSigmaAfter(40, 0.05);
+  const double moved = radiusSigmaAfter(1, 0.05), each_counts = radiusSigmaAfter(40, 0),
+               shared = radiusSigmaAfter(40, 0.05);
   ASSERT_GT(moved, 0);
   EXPECT_LT(each_counts, 0.85 * moved);
   EXPECT_GT(shared, 0.95 * moved);

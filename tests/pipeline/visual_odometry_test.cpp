@@ -27,7 +27,10 @@ Frame frameAt(int k, const Pose &wMc)
 }
 
 /// Body poses over a ground at z = 0, from poses in camera axes.
-Pose bodyAt(const Pose &wMc) { return Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.5}) * kMount * wMc * kMount.inverse(); }
+Pose bodyAt(const Pose &wMc)
+{
+  return Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.5}) * kMount * wMc * kMount.inverse();
+}
 
 Pose sideways(int k) { return {expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0, 0.04 * k}}; }
 
@@ -97,7 +100,6 @@ TEST(PlainVideo, FrozenFramesStandStill)
   }
 }
 
-
 TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
 {
   Pipeline pipeline(kCamera, kMount);
@@ -147,9 +149,11 @@ vpImage<unsigned char> drawSlabs(const Pose &wMc)
   for (unsigned y = 0; y < image.getHeight(); ++y)
     for (unsigned x = 0; x < image.getWidth(); ++x) {
       const Eigen::Vector3d ray = wMc.R * kCamera.ray({double(x), double(y)});
-      const Eigen::Vector3d near = wMc.t + (4 - wMc.t.z()) / ray.z() * ray, far = wMc.t + (9 - wMc.t.z()) / ray.z() * ray;
-      image[y][x] = isSlab(near.x()) ? static_cast<unsigned char>(10 + 60 * test::texture(near.x() / 0.12, near.y() / 0.12, 4))
-                                     : static_cast<unsigned char>(120 + 120 * test::texture(far.x() / 0.25, far.y() / 0.25, 9));
+      const Eigen::Vector3d near = wMc.t + (4 - wMc.t.z()) / ray.z() * ray,
+                            far = wMc.t + (9 - wMc.t.z()) / ray.z() * ray;
+      image[y][x] = isSlab(near.x())
+                        ? static_cast<unsigned char>(10 + 60 * test::texture(near.x() / 0.12, near.y() / 0.12, 4))
+                        : static_cast<unsigned char>(120 + 120 * test::texture(far.x() / 0.25, far.y() / 0.25, 9));
     }
   return image;
 }

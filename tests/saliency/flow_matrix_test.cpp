@@ -48,7 +48,8 @@ TEST(FlowMatrix, IsTheDerivativeOfTheWarpWithTheSignTurned)
       const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(k);
       const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
       V.col(k) = -(previousPixel(kCamera, Pose(expSo3(d), {0, 0, 0}), u, rho) -
-                   previousPixel(kCamera, Pose(expSo3(-d), {0, 0, 0}), u, rho)) / (2 * h);
+                   previousPixel(kCamera, Pose(expSo3(-d), {0, 0, 0}), u, rho)) /
+                 (2 * h);
       A.col(k) = -(previousPixel(kCamera, Pose(I, d), u, rho) - previousPixel(kCamera, Pose(I, -d), u, rho)) / (2 * h);
     }
     const double error = (V - flowMatrix(kCamera, u)).norm() + (A - rho * translationFlowMatrix(kCamera, u)).norm();

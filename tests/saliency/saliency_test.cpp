@@ -152,8 +152,8 @@ TEST(Saliency, KeepsItsLabelsOnAFrozenFrameAndItsMotionForTheNext)
   const Saliency before = estimator.update(image, turned(I), moved({0.05, 0, 0}));
 
   const Saliency frozen = estimator.update(image, turned(turn), moved({0.05, 0, 0}));
-  const Saliency after =
-      estimator.update(scene.view(Pose(turn * turn, {0.15, 0, 0})), turned(turn), moved(turn.transpose() * Eigen::Vector3d(0.05, 0, 0)));
+  const Saliency after = estimator.update(scene.view(Pose(turn * turn, {0.15, 0, 0})), turned(turn),
+                                          moved(turn.transpose() * Eigen::Vector3d(0.05, 0, 0)));
 
   EXPECT_EQ(frozen.status, SaliencyStatus::stale);
   EXPECT_TRUE(std::equal(before.p_background.bitmap, before.p_background.bitmap + before.p_background.getSize(),
@@ -180,9 +180,6 @@ TEST(SaliencyOptions, AnOptionOutOfRangeIsNamed)
   }
 }
 
-TEST(SaliencyOptions, ThePaperPresetIsValid)
-{
-  EXPECT_NO_THROW(SaliencyOptions::paper().validate());
-}
+TEST(SaliencyOptions, ThePaperPresetIsValid) { EXPECT_NO_THROW(SaliencyOptions::paper().validate()); }
 } // namespace
 } // namespace bole

@@ -47,19 +47,16 @@ vpFeatureTrunk featureAt(const Pose &wMc)
 vpCylinder cylinderAt(const Pose &wMc)
 {
   const Trunk trunk = leaningTrunk();
-  const Eigen::Vector3d point = trunk.axisAt(1),
-                        axis = (trunk.axisAt(2) - trunk.axisAt(1)).normalized();
-  vpCylinder cylinder(axis.x(), axis.y(), axis.z(), point.x(), point.y(), point.z(),
-                      trunk.radius());
+  const Eigen::Vector3d point = trunk.axisAt(1), axis = (trunk.axisAt(2) - trunk.axisAt(1)).normalized();
+  vpCylinder cylinder(axis.x(), axis.y(), axis.z(), point.x(), point.y(), point.z(), trunk.radius());
   cylinder.track(wMc.inverse().toVisp());
   return cylinder;
 }
 
 TEST(vpFeatureTrunk, InteractionAgreesWithCentralDifferencesAtTwoStepSizes)
 {
-  for (const Eigen::Vector3d &turn :
-       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.05, -0.2, 0.1),
-        Eigen::Vector3d(-0.4, 0.3, -0.5), Eigen::Vector3d(0.3, 1.2, 0)}) {
+  for (const Eigen::Vector3d &turn : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.05, -0.2, 0.1),
+                                      Eigen::Vector3d(-0.4, 0.3, -0.5), Eigen::Vector3d(0.3, 1.2, 0)}) {
     const Pose wMc = cameraPose(turn);
     vpFeatureTrunk feature = featureAt(wMc);
     const vpMatrix L = feature.interaction();
@@ -97,8 +94,7 @@ TEST(vpFeatureTrunk, AgreesWithTheInteractionOfThePointsLinesOnTheCylindersLimbs
     const auto lineOf = [&](const vpFeatureTrunk &trunk) -> Eigen::Vector2d {
       // The border whose plane is the nearer one to this line.
       const Eigen::Vector3d plane =
-          Eigen::Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho())
-              .normalized();
+          Eigen::Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho()).normalized();
       const bole::RelativeTrunk relative = trunk.relativeTrunk();
       Eigen::Vector3d normal = relative.borderNormal(bole::Border::left);
       const Eigen::Vector3d right = relative.borderNormal(bole::Border::right);
@@ -182,8 +178,7 @@ TEST(vpFeatureTrunk, ErrorIsZeroAtItselfAndWrapsAngles)
   EXPECT_EQ(a.error(a).sumSquare(), 0);
   b.buildFrom(3.1, 0, 0, -2, 0.2);
   a.buildFrom(-3.1, 0, 0, -2.5, 0.2);
-  const vpColVector e =
-      a.error(b, vpFeatureTrunk::selectBearing() | vpFeatureTrunk::selectLogRatio());
+  const vpColVector e = a.error(b, vpFeatureTrunk::selectBearing() | vpFeatureTrunk::selectLogRatio());
   ASSERT_EQ(e.size(), 2u);
   EXPECT_NEAR(e[0], 2 * M_PI - 6.2, 1e-12);
   EXPECT_NEAR(e[1], -0.5, 1e-12);

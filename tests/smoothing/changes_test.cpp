@@ -66,9 +66,7 @@ TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
   EXPECT_EQ(halves.smoother.observationCount(), whole.smoother.observationCount());
   for (std::size_t j = 0; j < first.size(); ++j)
     if (first[j] >= 0) {
-      EXPECT_LT(
-          halves.smoother.trunk(first[j]).minus(whole.smoother.trunk(whole.trunk_id[j])).norm(),
-          2e-3);
+      EXPECT_LT(halves.smoother.trunk(first[j]).minus(whole.smoother.trunk(whole.trunk_id[j])).norm(), 2e-3);
     }
 }
 

@@ -15,16 +15,14 @@ using Eigen::VectorXd;
 
 /// Largest difference of \p J to central differences, at two steps: falls with the square of the
 /// step.
-void expectDerivative(const std::function<VectorXd(const VectorXd &)> &f, const MatrixXd &J,
-                      double coarse = 1e-2)
+void expectDerivative(const std::function<VectorXd(const VectorXd &)> &f, const MatrixXd &J, double coarse = 1e-2)
 {
   double error[2];
   for (int k = 0; k < 2; ++k) {
     const double h = k == 0 ? coarse : coarse / 2;
     error[k] = 0;
     for (int c = 0; c < J.cols(); ++c) {
-      const VectorXd up = f(h * VectorXd::Unit(J.cols(), c)),
-                     down = f(-h * VectorXd::Unit(J.cols(), c));
+      const VectorXd up = f(h * VectorXd::Unit(J.cols(), c)), down = f(-h * VectorXd::Unit(J.cols(), c));
       error[k] = std::max(error[k], ((up - down) / (2 * h) - J.col(c)).cwiseAbs().maxCoeff());
     }
   }
@@ -45,10 +43,8 @@ TEST(Factors, OdometryJacobiansAgreeWithDifferences)
   const Matrix6d S = Vector6d(1, 2, 3, 4, 5, 6).asDiagonal();
   Matrix6d J_a, J_b;
   residual(o, S, kA, kB, &J_a, &J_b);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(o, S, kA.plus(d), kB, nullptr, nullptr); }, J_a);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(o, S, kA, kB.plus(d), nullptr, nullptr); }, J_b);
+  expectDerivative([&](const VectorXd &d) { return residual(o, S, kA.plus(d), kB, nullptr, nullptr); }, J_a);
+  expectDerivative([&](const VectorXd &d) { return residual(o, S, kA, kB.plus(d), nullptr, nullptr); }, J_b);
 }
 
 TEST(Factors, RelativePoseJacobiansAgreeWithDifferences)
@@ -59,12 +55,8 @@ TEST(Factors, RelativePoseJacobiansAgreeWithDifferences)
   const Matrix5d S = Matrix5d::Identity();
   Matrix56d J_a, J_b;
   residual(m, S, kMc, kA, kB, &J_a, &J_b);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(m, S, kMc, kA.plus(d), kB, nullptr, nullptr); },
-      J_a);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(m, S, kMc, kA, kB.plus(d), nullptr, nullptr); },
-      J_b);
+  expectDerivative([&](const VectorXd &d) { return residual(m, S, kMc, kA.plus(d), kB, nullptr, nullptr); }, J_a);
+  expectDerivative([&](const VectorXd &d) { return residual(m, S, kMc, kA, kB.plus(d), nullptr, nullptr); }, J_b);
 }
 
 TEST(Factors, ARelativePoseEqualToThePredictionHasNoResidual)
@@ -106,15 +98,11 @@ TEST(Factors, SummaryJacobiansAgreeWithDifferences)
   Matrix46d J_pose;
   Matrix45d J_trunk;
   residual(root, kMc, kA, trunk, &J_pose, &J_trunk);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(root, kMc, kA.plus(d), trunk, nullptr, nullptr); },
-      J_pose);
-  expectDerivative(
-      [&](const VectorXd &d) { return residual(root, kMc, kA, trunk.plus(d), nullptr, nullptr); },
-      J_trunk);
+  expectDerivative([&](const VectorXd &d) { return residual(root, kMc, kA.plus(d), trunk, nullptr, nullptr); }, J_pose);
+  expectDerivative([&](const VectorXd &d) { return residual(root, kMc, kA, trunk.plus(d), nullptr, nullptr); },
+                   J_trunk);
   const RelativeTrunk relative = relativeTrunk(kA, kMc, trunk);
-  EXPECT_NEAR(0.5 * root.residual(relative).squaredNorm() + root.constant,
-              summary.energyAt(relative), 1e-12);
+  EXPECT_NEAR(0.5 * root.residual(relative).squaredNorm() + root.constant, summary.energyAt(relative), 1e-12);
   EXPECT_TRUE((root.S.transpose() * root.S).isApprox(summary.F, 1e-12));
 }
 

@@ -14,8 +14,7 @@ namespace
 using testing::HasSubstr;
 
 const char *const kPose = "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n";
-const char *const kPrior =
-    "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+const char *const kPrior = "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
 
 std::string errorOf(const std::string &text)
 {
@@ -59,8 +58,7 @@ TEST(G2o, ReadsBackWhatItWrote)
   EXPECT_EQ(back.heights.size(), 1u);
   EXPECT_NEAR(cost(back), cost(graph), 1e-9 * cost(graph));
   for (std::size_t i = 0; i < graph.odometry.size(); ++i)
-    EXPECT_TRUE(
-        back.odometry[i].odometry.covariance.isApprox(graph.odometry[i].odometry.covariance, 1e-9));
+    EXPECT_TRUE(back.odometry[i].odometry.covariance.isApprox(graph.odometry[i].odometry.covariance, 1e-9));
 }
 
 TEST(G2o, ReplaysToTheSameOptimum)
@@ -78,32 +76,27 @@ TEST(G2o, ReplaysToTheSameOptimum)
 
 TEST(G2o, NamesTheLineOfAnUnknownTag)
 {
-  EXPECT_THAT(errorOf(std::string(kPose) + "VERTEX_CAR 1 2\n"),
-              HasSubstr("file.g2o:2: tag = VERTEX_CAR"));
+  EXPECT_THAT(errorOf(std::string(kPose) + "VERTEX_CAR 1 2\n"), HasSubstr("file.g2o:2: tag = VERTEX_CAR"));
 }
 
 TEST(G2o, NamesTheLineOfADuplicateId)
 {
-  EXPECT_THAT(errorOf(std::string(kPose) + kPose),
-              HasSubstr("file.g2o:2: id = 0, must not be that of line 1"));
+  EXPECT_THAT(errorOf(std::string(kPose) + kPose), HasSubstr("file.g2o:2: id = 0, must not be that of line 1"));
 }
 
 TEST(G2o, NamesTheLineOfNaN)
 {
-  EXPECT_THAT(errorOf("VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\n"),
-              HasSubstr("file.g2o:1: VERTEX_SE3:QUAT: 2 = nan"));
+  EXPECT_THAT(errorOf("VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\n"), HasSubstr("file.g2o:1: VERTEX_SE3:QUAT: 2 = nan"));
 }
 
 TEST(G2o, NamesTheLineOfAnEdgeWithoutItsVertex)
 {
-  EXPECT_THAT(errorOf(std::string(kPose) + kPrior + "EDGE_HEIGHT 7 1 0.1\n"),
-              HasSubstr("file.g2o:3: id = 7"));
+  EXPECT_THAT(errorOf(std::string(kPose) + kPrior + "EDGE_HEIGHT 7 1 0.1\n"), HasSubstr("file.g2o:3: id = 7"));
 }
 
 TEST(G2o, NamesTheLineOfAShortLine)
 {
-  EXPECT_THAT(errorOf("VERTEX_SE3:QUAT 0 0 0\n"),
-              HasSubstr("file.g2o:1: VERTEX_SE3:QUAT: the line ends"));
+  EXPECT_THAT(errorOf("VERTEX_SE3:QUAT 0 0 0\n"), HasSubstr("file.g2o:1: VERTEX_SE3:QUAT: the line ends"));
 }
 
 TEST(G2o, NamesTheLineOfAnIndefiniteSummary)
@@ -124,10 +117,8 @@ TEST(G2o, NamesTheLineOfAPoseThatIsNotTiedToTheWorld)
 
 TEST(G2o, NamesTheLineOfAnInformationMatrixThatIsNone)
 {
-  const std::string indefinite =
-      "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 -1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
-  const std::string huge =
-      "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1e308 0 0 0 0 0 1e-308 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  const std::string indefinite = "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 -1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  const std::string huge = "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1e308 0 0 0 0 0 1e-308 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
   EXPECT_THAT(errorOf(kPose + indefinite), HasSubstr("file.g2o:2: EDGE_SE3_PRIOR:QUAT: matrix"));
   EXPECT_THAT(errorOf(kPose + huge), HasSubstr("file.g2o:2: EDGE_SE3_PRIOR:QUAT: matrix"));
 }

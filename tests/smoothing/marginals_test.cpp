@@ -40,8 +40,7 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
     relativeTrunk(smoother.pose(49), smoother.options().bMc, smoother.trunk(j), &J_pose, &J_trunk);
     const Matrix4d cross = J_pose * C.block(p, t, 6, 5) * J_trunk.transpose();
     const Matrix4d expected = J_pose * C.block(p, p, 6, 6) * J_pose.transpose() +
-                              J_trunk * C.block(t, t, 5, 5) * J_trunk.transpose() + cross +
-                              cross.transpose();
+                              J_trunk * C.block(t, t, 5, 5) * J_trunk.transpose() + cross + cross.transpose();
     EXPECT_TRUE(smoother.relativeCovariance(j).isApprox(expected, 1e-4)) << j;
   }
 }
@@ -70,12 +69,10 @@ TEST(Marginals, ErrorsOfManyFlightsAreWhatTheCovariancesSay)
     Eigen::VectorXd error(count);
     for (std::size_t j = 0; j < flight.trunks.size(); ++j)
       if (replay.trunk_id[j] >= 0)
-        error.segment<5>(5 * replay.trunk_id[j]) =
-            replay.smoother.trunk(replay.trunk_id[j]).minus(flight.trunks[j]);
+        error.segment<5>(5 * replay.trunk_id[j]) = replay.smoother.trunk(replay.trunk_id[j]).minus(flight.trunks[j]);
     const double trunk_nees = error.dot(C.block(from, from, count, count).llt().solve(error));
     const Vector6d pose_error = replay.smoother.pose(59).minus(flight.truth[59]);
-    const double pose_nees =
-        pose_error.dot(replay.smoother.poseCovariance(59).llt().solve(pose_error));
+    const double pose_nees = pose_error.dot(replay.smoother.poseCovariance(59).llt().solve(pose_error));
     // chi-square quantiles by Wilson and Hilferty
     const auto quantile = [](double n, double z) {
       return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
@@ -134,8 +131,7 @@ TEST_F(OneTrunk, WithARankOneSummaryOrNoneIsSolvedAllTheSame)
   const UpdateResult result = smoother.update();
 
   EXPECT_EQ(result.status, UpdateStatus::ok);
-  EXPECT_NEAR(std::sqrt(smoother.trunkCovariance(unseen)(0, 0)), options.prior_position_sigma,
-              1e-6);
+  EXPECT_NEAR(std::sqrt(smoother.trunkCovariance(unseen)(0, 0)), options.prior_position_sigma, 1e-6);
   EXPECT_GT(std::sqrt(smoother.trunkCovariance(trunk)(0, 0)), 5);
 }
 

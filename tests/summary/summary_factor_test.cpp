@@ -16,8 +16,14 @@ struct Random
 {
   std::mt19937 engine{5};
   std::normal_distribution<double> normal;
-  Vector4d vector() { return Vector4d::NullaryExpr([this] { return normal(engine); }); }
-  Matrix4d matrix() { return Matrix4d::NullaryExpr([this] { return normal(engine); }); }
+  Vector4d vector()
+  {
+    return Vector4d::NullaryExpr([this] { return normal(engine); });
+  }
+  Matrix4d matrix()
+  {
+    return Matrix4d::NullaryExpr([this] { return normal(engine); });
+  }
 };
 
 /// A factor with a Hessian of the given rank and a gradient in its range.
@@ -55,7 +61,8 @@ TEST(SummaryFactor, HasItsHessianRoundTheOptimum)
     for (int j = 0; j < 4; ++j) {
       // along a straight line of the tangent the energy is the quadratic of Eq. 9 put right, half included
       const Vector4d d = 0.02 * (Vector4d::Unit(i) + Vector4d::Unit(j));
-      EXPECT_NEAR(factor.energyAt(factor.optimum.plus(d)), factor.energy + 0.5 * d.dot(factor.F * d), 1e-9 * factor.F.norm());
+      EXPECT_NEAR(factor.energyAt(factor.optimum.plus(d)), factor.energy + 0.5 * d.dot(factor.F * d),
+                  1e-9 * factor.F.norm());
     }
 }
 
@@ -86,7 +93,8 @@ TEST(SquareRootSummary, JacobianAgreesWithCentralDifferences)
   const auto differences = [&](double h) {
     Matrix4d D;
     for (int i = 0; i < 4; ++i)
-      D.col(i) = (root.residual(at.plus(h * Vector4d::Unit(i))) - root.residual(at.plus(-h * Vector4d::Unit(i)))) / (2 * h);
+      D.col(i) =
+          (root.residual(at.plus(h * Vector4d::Unit(i))) - root.residual(at.plus(-h * Vector4d::Unit(i)))) / (2 * h);
     return D;
   };
   const double error = (differences(2e-2) - J).norm();

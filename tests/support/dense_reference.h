@@ -56,15 +56,14 @@ public:
   int trunkRow(std::size_t j) const { return static_cast<int>(6 * m_graph.poses.size() + 5 * j); }
 
 private:
-  template <int R, int A>
-  void add1(int a, const Eigen::Matrix<double, R, A> &J, const Eigen::Matrix<double, R, 1> &r)
+  template <int R, int A> void add1(int a, const Eigen::Matrix<double, R, A> &J, const Eigen::Matrix<double, R, 1> &r)
   {
     H.block<A, A>(a, a) += J.transpose() * J;
     g.segment<A>(a) -= J.transpose() * r;
   }
   template <int R, int A, int B>
-  void add2(double w, int a, int b, const Eigen::Matrix<double, R, A> &J_a,
-            const Eigen::Matrix<double, R, B> &J_b, const Eigen::Matrix<double, R, 1> &r)
+  void add2(double w, int a, int b, const Eigen::Matrix<double, R, A> &J_a, const Eigen::Matrix<double, R, B> &J_b,
+            const Eigen::Matrix<double, R, 1> &r)
   {
     H.block<A, A>(a, a) += w * J_a.transpose() * J_a;
     H.block<B, B>(b, b) += w * J_b.transpose() * J_b;
@@ -98,8 +97,7 @@ private:
       Matrix56d J_a, J_b;
       const Matrix5d S = squareRootInformation<5>(e.measurement.covariance, "covariance");
       const Vector5d r = residual(e.measurement, S, m_graph.bMc, pose(e.a), pose(e.b), &J_a, &J_b);
-      add2<5, 6, 6>(m_graph.direction_loss.weight(r.squaredNorm()), poseRow(e.a), poseRow(e.b), J_a,
-                    J_b, r);
+      add2<5, 6, 6>(m_graph.direction_loss.weight(r.squaredNorm()), poseRow(e.a), poseRow(e.b), J_a, J_b, r);
     }
     for (const auto &e : m_graph.heights) {
       Matrix16d J;
@@ -111,10 +109,9 @@ private:
       squareRoot(e.summary, root);
       Matrix46d J_pose;
       Matrix45d J_trunk;
-      const Vector4d r = residual(root, m_graph.bMc, pose(e.pose), m_graph.trunks[e.trunk].trunk,
-                                  &J_pose, &J_trunk);
-      add2<4, 6, 5>(m_graph.summary_loss.weight(r.squaredNorm()), poseRow(e.pose),
-                    trunkRow(e.trunk), J_pose, J_trunk, r);
+      const Vector4d r = residual(root, m_graph.bMc, pose(e.pose), m_graph.trunks[e.trunk].trunk, &J_pose, &J_trunk);
+      add2<4, 6, 5>(m_graph.summary_loss.weight(r.squaredNorm()), poseRow(e.pose), trunkRow(e.trunk), J_pose, J_trunk,
+                    r);
     }
     for (std::size_t j = 0; j < m_graph.trunks.size(); ++j) {
       const Graph::TrunkVertex &v = m_graph.trunks[j];

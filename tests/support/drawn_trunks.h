@@ -4,9 +4,9 @@
 /// Images of cylinders drawn flat before sky and ground, borders smooth over a pixel, with sensor noise: what a
 /// tracker sees when nothing but its model is there.
 
-#include <bole/camera.h>
 #include "geometry/cylinder.h"
 #include "geometry/so3.h"
+#include <bole/camera.h>
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +69,8 @@ inline vpImage<unsigned char> drawTrunks(const PinholeCamera &camera, const Pose
         if (height >= cRt.col(2).dot(seen[k].foot) && height <= cRt.col(2).dot(seen[k].top))
           grey += cover * (45 - grey);
       }
-      image[unsigned(v)][unsigned(u)] = static_cast<unsigned char>(std::lround(std::clamp(grey + noise(random), 0.0, 255.0)));
+      image[unsigned(v)][unsigned(u)] =
+          static_cast<unsigned char>(std::lround(std::clamp(grey + noise(random), 0.0, 255.0)));
     }
   return image;
 }

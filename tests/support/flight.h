@@ -161,8 +161,7 @@ struct Replay
   std::vector<int> trunk_id;
   int next = 0;
 
-  Replay(const Flight &f, const SmootherOptions &options)
-      : flight(f), smoother(options), trunk_id(f.trunks.size(), -1)
+  Replay(const Flight &f, const SmootherOptions &options) : flight(f), smoother(options), trunk_id(f.trunks.size(), -1)
   {
   }
 
@@ -170,14 +169,13 @@ struct Replay
   void add()
   {
     const int i = next++;
-    const std::size_t pose =
-        i == 0 ? smoother.addFirstPose(flight.first, flight.first_covariance)
-               : smoother.addPose(flight.odometry[i].aMb, flight.odometry[i].covariance);
+    const std::size_t pose = i == 0 ? smoother.addFirstPose(flight.first, flight.first_covariance)
+                                    : smoother.addPose(flight.odometry[i].aMb, flight.odometry[i].covariance);
     const Pose wMc = smoother.pose(pose) * smoother.options().bMc;
     for (const auto &[j, summary] : flight.views[i]) {
       if (trunk_id[j] < 0)
-        trunk_id[j] = static_cast<int>(smoother.addTrunk(
-            trunkFromRelative(wMc, summary.optimum, smoother.options().prior_radius)));
+        trunk_id[j] = static_cast<int>(
+            smoother.addTrunk(trunkFromRelative(wMc, summary.optimum, smoother.options().prior_radius)));
       smoother.addObservation(pose, trunk_id[j], summary);
     }
   }

@@ -3,9 +3,9 @@
 /// \file
 /// A rendered flight of the shared data, whole in memory, with its truth: for tests and benchmarks of one stage.
 
+#include "geometry/so3.h"
 #include <bole/camera.h>
 #include <bole/pose.h>
-#include "geometry/so3.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -26,8 +26,8 @@ struct ForestFlight
   std::vector<std::int64_t> stamps_ns;
   std::vector<vpImage<unsigned char>> images;
   std::vector<Pose> wMb_odometry, wMb_truth;
-  std::vector<Eigen::Matrix3d> pRc_gyro;   ///< from the frame before, integrated
-  std::vector<vpImage<float>> depths_m;    ///< infinity where there is none
+  std::vector<Eigen::Matrix3d> pRc_gyro; ///< from the frame before, integrated
+  std::vector<vpImage<float>> depths_m;  ///< infinity where there is none
 
   std::size_t size() const { return images.size(); }
   Pose wMc_truth(std::size_t i) const { return wMb_truth[i] * bMc; }
@@ -84,12 +84,14 @@ inline ForestFlight readForestFlight(const std::string &name, std::size_t first,
         metres[v][u] = mm == 65535 ? std::numeric_limits<float>::infinity() : mm * 1e-3f;
       }
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-    const double from = flight.stamps_ns.empty() ? static_cast<double>(stamp) : static_cast<double>(flight.stamps_ns.back());
+    const double from =
+        flight.stamps_ns.empty() ? static_cast<double>(stamp) : static_cast<double>(flight.stamps_ns.back());
     for (; sample + 1 < gyro.size() && gyro[sample][0] < static_cast<double>(stamp); ++sample) {
       if (gyro[sample][0] < from)
         continue;
       const double dt = (gyro[sample + 1][0] - gyro[sample][0]) * 1e-9;
-      const Eigen::Vector3d rate(0.5 * (gyro[sample][1] + gyro[sample + 1][1]), 0.5 * (gyro[sample][2] + gyro[sample + 1][2]),
+      const Eigen::Vector3d rate(0.5 * (gyro[sample][1] + gyro[sample + 1][1]),
+                                 0.5 * (gyro[sample][2] + gyro[sample + 1][2]),
                                  0.5 * (gyro[sample][3] + gyro[sample + 1][3]));
       turn = turn * expSo3(rate * dt);
     }

@@ -52,17 +52,13 @@ struct LineChart
                          "y=\"{2:.1f}\" text-anchor=\"end\">{1:g}</text>\n",
                          py(y), y, py(y) + 4);
     out << fmt::format("<text x=\"320\" y=\"372\" text-anchor=\"middle\">{}</text>\n", x_name);
-    out << fmt::format(
-        "<text transform=\"translate(18 190) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-        y_name);
+    out << fmt::format("<text transform=\"translate(18 190) rotate(-90)\" text-anchor=\"middle\">{}</text>\n", y_name);
     double legend = 70;
     for (const Line &line : lines) {
-      out << fmt::format("<polyline fill=\"none\" stroke-width=\"1.8\" stroke=\"{}\" points=\"",
-                         line.colour);
+      out << fmt::format("<polyline fill=\"none\" stroke-width=\"1.8\" stroke=\"{}\" points=\"", line.colour);
       for (const auto &[x, y] : line.points)
         out << fmt::format("{:.1f},{:.1f} ", px(x), py(y));
-      out << fmt::format("\"/><text x=\"580\" y=\"{:.0f}\" fill=\"{}\">{}</text>\n", legend,
-                         line.colour, line.name);
+      out << fmt::format("\"/><text x=\"580\" y=\"{:.0f}\" fill=\"{}\">{}</text>\n", legend, line.colour, line.name);
       legend += 20;
     }
     out << "</svg>\n";

@@ -47,10 +47,7 @@ struct GraphCommand : testing::Test
   {
     folder = testing::TempDir() + "bole_graph_run_" + std::to_string(getpid());
     fs::remove_all(folder);
-    ASSERT_EQ(
-        run("track " BOLE_SOURCE_DIR "/data/park-forward -o " + folder + " --no-video --frames 40")
-            .status,
-        0);
+    ASSERT_EQ(run("track " BOLE_SOURCE_DIR "/data/park-forward -o " + folder + " --no-video --frames 40").status, 0);
     file = folder + "/exported.g2o";
     const Outcome exported = run("graph " + folder + " --export " + file);
     ASSERT_EQ(exported.status, 0) << exported.text;
@@ -59,8 +56,7 @@ struct GraphCommand : testing::Test
   static void TearDownTestSuite() { fs::remove_all(folder); }
   /// The exported graph with its first line of \p tag changed by \p edit, and the place of that
   /// line.
-  template <typename Edit>
-  std::pair<std::string, std::string> broken(const std::string &tag, const Edit &edit)
+  template <typename Edit> std::pair<std::string, std::string> broken(const std::string &tag, const Edit &edit)
   {
     std::vector<std::string> lines = linesOf(file);
     const std::string path = folder + "/broken.g2o";
@@ -75,8 +71,7 @@ struct GraphCommand : testing::Test
     }
     return {path, path + ":" + std::to_string(place) + ": "};
   }
-  static void expectRefused(const std::pair<std::string, std::string> &file_and_place,
-                            const std::string &says)
+  static void expectRefused(const std::pair<std::string, std::string> &file_and_place, const std::string &says)
   {
     const Outcome outcome = run("solve " + file_and_place.first + " -o " + folder + "/none.g2o");
     EXPECT_NE(outcome.status, 0);
@@ -100,23 +95,20 @@ TEST_F(GraphCommand, ExportsAGraphThatSolvesToTheCostOfTheRun)
 
 TEST_F(GraphCommand, NamesTheLineOfNaN)
 {
-  expectRefused(broken("VERTEX_SE3:QUAT",
-                       [](const std::string &) { return "VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1"; }),
+  expectRefused(broken("VERTEX_SE3:QUAT", [](const std::string &) { return "VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1"; }),
                 "must be a finite number");
 }
 
 TEST_F(GraphCommand, NamesTheLineOfAnUnknownTag)
 {
-  expectRefused(broken("VERTEX_SE3:QUAT", [](const std::string &) { return "VERTEX_CAR 0 1 2"; }),
-                "tag = VERTEX_CAR");
+  expectRefused(broken("VERTEX_SE3:QUAT", [](const std::string &) { return "VERTEX_CAR 0 1 2"; }), "tag = VERTEX_CAR");
 }
 
 TEST_F(GraphCommand, NamesTheLineOfAnIdUsedTwice)
 {
   expectRefused(broken("VERTEX_TRUNK",
                        [](const std::string &line) {
-                         return std::regex_replace(line, std::regex("VERTEX_TRUNK [0-9]+"),
-                                                   "VERTEX_TRUNK 3");
+                         return std::regex_replace(line, std::regex("VERTEX_TRUNK [0-9]+"), "VERTEX_TRUNK 3");
                        }),
                 "must not be that of line");
 }
@@ -124,15 +116,13 @@ TEST_F(GraphCommand, NamesTheLineOfAnIdUsedTwice)
 TEST_F(GraphCommand, NamesTheLineOfAnIndefiniteSummary)
 {
   expectRefused(
-      broken("EDGE_TRUNK_SUMMARY",
-             [](const std::string &line) { return line.substr(0, line.rfind(' ')) + " -1e9"; }),
+      broken("EDGE_TRUNK_SUMMARY", [](const std::string &line) { return line.substr(0, line.rfind(' ')) + " -1e9"; }),
       "F, must be positive semi-definite");
 }
 
 TEST_F(GraphCommand, NamesTheLineOfAPoseThatNothingTies)
 {
-  const auto [path, place] =
-      broken("VERTEX_SE3:QUAT", [](const std::string &line) { return line; });
+  const auto [path, place] = broken("VERTEX_SE3:QUAT", [](const std::string &line) { return line; });
   std::ofstream(path, std::ios::app) << "VERTEX_SE3:QUAT 123456 0 0 0 0 0 0 1\n";
   expectRefused({path, path + ":" + std::to_string(linesOf(path).size()) + ": "},
                 "pose 123456, must be tied to the world");

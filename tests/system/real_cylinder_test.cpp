@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A real cylinder: ViSP's sequence of a cube and a cylinder that are pushed over a table by hand. ViSP's tracker
 // follows the cube alone, which gives the odometry of the camera in the cube's frame; bole maps the cylinder in it.
-#include <bole/pose.h>
 #include "input/camera_file.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
+#include <bole/pose.h>
 
 #include <gtest/gtest.h>
 
@@ -26,10 +26,7 @@ const std::string kImages = BOLE_VISP_IMAGES_DIR "/mbt/cube/image%04d.pgm";
 const Eigen::Vector2d kAxis(-0.170, -0.030);
 constexpr double kRadius = 0.040;
 
-std::string imagePath(int number)
-{
-  return fmt::format("{}/mbt/cube/image{:04d}.pgm", BOLE_VISP_IMAGES_DIR, number);
-}
+std::string imagePath(int number) { return fmt::format("{}/mbt/cube/image{:04d}.pgm", BOLE_VISP_IMAGES_DIR, number); }
 
 /// The camera in the frame of the cube, image by image, as the body of a TUM file that looks ahead.
 Trajectory cubeOdometry(double rate_hz)
@@ -56,7 +53,8 @@ const TrunkRecord *nearestConfirmed(const std::vector<TrunkRecord> &trunks)
 {
   const TrunkRecord *nearest = nullptr;
   for (const TrunkRecord &trunk : trunks)
-    if (trunk.status == TrunkStatus::confirmed && (!nearest || (trunk.xy - kAxis).norm() < (nearest->xy - kAxis).norm()))
+    if (trunk.status == TrunkStatus::confirmed &&
+        (!nearest || (trunk.xy - kAxis).norm() < (nearest->xy - kAxis).norm()))
       nearest = &trunk;
   return nearest;
 }
@@ -80,8 +78,8 @@ TEST(RealCylinder, IsMappedWhereItStandsAndAsThickAsItIs)
   const TrunkRecord *cylinder = nearestConfirmed(trunks);
   ASSERT_NE(cylinder, nullptr) << "nothing confirmed, see " << folder;
   const double axis_error = (cylinder->xy - kAxis).norm();
-  fmt::print("radius {:.1f} mm (true 40.0), axis {:.1f} mm off, {} observations; {} trunks in the map\n", 1e3 * cylinder->radius,
-             1e3 * axis_error, cylinder->observations, trunks.size());
+  fmt::print("radius {:.1f} mm (true 40.0), axis {:.1f} mm off, {} observations; {} trunks in the map\n",
+             1e3 * cylinder->radius, 1e3 * axis_error, cylinder->observations, trunks.size());
   EXPECT_NEAR(cylinder->radius, kRadius, 0.1 * kRadius);
   EXPECT_LT(axis_error, 0.015);
 }

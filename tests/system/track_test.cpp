@@ -40,8 +40,8 @@ TEST(Track, MapsTheDemonstrationFlight)
 {
   const std::string folder = freshFolder("demo");
   ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video").status, 0);
-  for (const char *file : {"trajectory.tum", "trajectory_online.tum", "trunks.csv", "map.svg", "timing.csv",
-                           "summary.json", "graph.g2o"})
+  for (const char *file :
+       {"trajectory.tum", "trajectory_online.tum", "trunks.csv", "map.svg", "timing.csv", "summary.json", "graph.g2o"})
     EXPECT_TRUE(fs::exists(folder + "/" + file)) << file;
   ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
   const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
@@ -74,14 +74,15 @@ TEST(Track, MapsAPlainVideoAndSaysWhereItsMetreComesFrom)
   const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
   const auto &path = evaluation.at("trajectory").at("smoothed");
   EXPECT_LT(path.at("ate").at("xy_yaw_scale").at("rmse_m"), 0.02 * 6); // 60 frames fly more than 6 m
-  EXPECT_NEAR(std::log(path.at("scale").get<double>()), 0, 0.8);      // the prior knows it to a factor of 1.6
+  EXPECT_NEAR(std::log(path.at("scale").get<double>()), 0, 0.8);       // the prior knows it to a factor of 1.6
 }
 
 TEST(Track, AKnownHeightOfTheCameraIsTheMetreOfAPlainVideo)
 {
   const std::string folder = freshFolder("height");
-  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --odometry none --camera-height 1.5 --frames 60").status,
-            0);
+  ASSERT_EQ(
+      run("track " + kFlight + " -o " + folder + " --no-video --odometry none --camera-height 1.5 --frames 60").status,
+      0);
   const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
   EXPECT_EQ(summary.at("scale"), "height");
   ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
@@ -125,7 +126,8 @@ TEST(Track, RefusesStampsThatGoBack)
 {
   const std::string flight = freshFolder("back_flight");
   copyFlight(flight);
-  std::ofstream(flight + "/mav0/cam0/data.csv") << "#timestamp [ns],filename\n100000000,0000100000000.png\n0,0000000000000.png\n";
+  std::ofstream(flight + "/mav0/cam0/data.csv")
+      << "#timestamp [ns],filename\n100000000,0000100000000.png\n0,0000000000000.png\n";
   expectRefused(flight, freshFolder("back"), "cam0/data.csv:3");
 }
 

@@ -49,12 +49,12 @@ TrackingPrediction predictionNear(const RelativeTrunk &truth, const Vector4d &er
 void expectFound(const vpImage<unsigned char> &image, const RelativeTrunk &truth)
 {
   const PinholeCamera camera;
-  const TrackingResult result = trackTrunk(computeGradient(image), camera,
-                                           predictionNear(truth, {0.005, 0, 0.015, 0.05}), TrackingOptions());
+  const TrackingResult result =
+      trackTrunk(computeGradient(image), camera, predictionNear(truth, {0.005, 0, 0.015, 0.05}), TrackingOptions());
   ASSERT_EQ(result.status, TrackingStatus::tracked) << toString(result.status);
   const Vector4d error = result.optimum.minus(truth);
-  EXPECT_LT(std::abs(error(2)) * camera.fx, 0.15);                 // bearing [px]
-  EXPECT_LT(std::abs(error(3)), 0.02);                             // r/d
+  EXPECT_LT(std::abs(error(2)) * camera.fx, 0.15); // bearing [px]
+  EXPECT_LT(std::abs(error(3)), 0.02);             // r/d
   EXPECT_GT(result.F.trace(), 1);
   EXPECT_LT((result.F - result.F.transpose()).norm(), 1e-9 * result.F.norm());
 }
@@ -66,8 +66,8 @@ TEST(TrunkTracker, FindsATrunkUnderRoll) { expectFound(drawn(PinholeCamera(), se
 TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
 {
   vpImage<unsigned char> image(240, 320, 0);
-  const TrackingResult result = trackTrunk(computeGradient(image), PinholeCamera(),
-                                           predictionNear(seen(), Vector4d::Zero()), TrackingOptions());
+  const TrackingResult result =
+      trackTrunk(computeGradient(image), PinholeCamera(), predictionNear(seen(), Vector4d::Zero()), TrackingOptions());
   EXPECT_EQ(result.status, TrackingStatus::no_border);
 }
 

@@ -20,10 +20,12 @@ Pose turned(const Pose &cMo, double yaw) { return Pose(expSo3({0, -yaw, 0}), Vec
 
 double bilinear(const vpImage<unsigned char> &image, const Vector2d &p)
 {
-  const double u = std::clamp(p.x(), 0.0, image.getWidth() - 1.001), v = std::clamp(p.y(), 0.0, image.getHeight() - 1.001);
+  const double u = std::clamp(p.x(), 0.0, image.getWidth() - 1.001),
+               v = std::clamp(p.y(), 0.0, image.getHeight() - 1.001);
   const unsigned i = unsigned(u), j = unsigned(v);
   const double a = u - i, b = v - j;
-  return (1 - b) * ((1 - a) * image[j][i] + a * image[j][i + 1]) + b * ((1 - a) * image[j + 1][i] + a * image[j + 1][i + 1]);
+  return (1 - b) * ((1 - a) * image[j][i] + a * image[j][i + 1]) +
+         b * ((1 - a) * image[j + 1][i] + a * image[j + 1][i + 1]);
 }
 
 /// What the pixel would show of the flat scene: sky, ground, the nearest trunk, its borders smooth over a pixel.
@@ -31,7 +33,7 @@ class FlatScene
 {
 public:
   FlatScene(const TestFlight &flight, const Pose &cMo, const PinholeCamera &camera, double range_m)
-    : m_camera(camera), m_up(cMo.R.col(2))
+      : m_camera(camera), m_up(cMo.R.col(2))
   {
     for (const Cylinder &trunk : flight.trunks) {
       const Cylinder c = cMo * trunk;
@@ -49,7 +51,8 @@ public:
     const Vector3d ray = m_camera.ray(p);
     double value = m_up.dot(ray) > 0 ? kSky : kGround;
     for (const Drawn &trunk : m_trunks) { // far to near
-      const double cover = std::min({1.0, 0.5 - m_camera.fx * trunk.left.dot(ray), 0.5 - m_camera.fx * trunk.right.dot(ray)});
+      const double cover =
+          std::min({1.0, 0.5 - m_camera.fx * trunk.left.dot(ray), 0.5 - m_camera.fx * trunk.right.dot(ray)});
       if (cover <= 0 || trunk.relative.cRt.col(0).dot(ray) <= 0)
         continue;
       const double height = trunk.relative.cRt.col(2).dot(ray) / trunk.relative.cRt.col(0).dot(ray) * trunk.c.radius /
@@ -104,9 +107,10 @@ TurnedPair turnedPair(const TestFlight &flight, std::size_t k, double step_px, b
     for (int v = 0; v < pair.camera.height; ++v)
       for (int u = 0; u < pair.camera.width; ++u) {
         const Vector2d p(u, v);
-        const double grey = has_clutter ? bilinear(seen.image, flight.camera.project(seenRframe * pair.camera.ray(p)))
-                                        : scene.grey(p);
-        frame->image[unsigned(v)][unsigned(u)] = static_cast<unsigned char>(std::lround(std::clamp(grey + noise(random), 0.0, 255.0)));
+        const double grey =
+            has_clutter ? bilinear(seen.image, flight.camera.project(seenRframe * pair.camera.ray(p))) : scene.grey(p);
+        frame->image[unsigned(v)][unsigned(u)] =
+            static_cast<unsigned char>(std::lround(std::clamp(grey + noise(random), 0.0, 255.0)));
       }
   }
   return pair;
@@ -135,7 +139,8 @@ BasinRow basin(const TestFlight &flight, const std::string &cao_path, Contender 
         contender.track(two, 1, pair.before.image);
         const Answer answer = contender.track(two, 2, pair.after.image);
         const PoseError error = poseError(answer.cMo, pair.after.cMo);
-        const bool is_right = error.position_m <= options.limits.position_m && error.rotation_deg <= options.limits.rotation_deg;
+        const bool is_right =
+            error.position_m <= options.limits.position_m && error.rotation_deg <= options.limits.rotation_deg;
         ++row.pairs;
         right += is_right && !answer.complained ? 1 : 0;
         silent += !is_right && !answer.complained ? 1 : 0;

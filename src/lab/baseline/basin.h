@@ -16,11 +16,11 @@ namespace bole
 struct BasinOptions
 {
   std::vector<double> steps_px{1, 2, 4, 8, 12, 16, 24, 32}; ///< in the middle of the image (0 .. 32)
-  int every = 8;             ///< frames of the flight between starts (1 ..)
-  double range_m = 15;       ///< trunks further away are neither drawn nor in the model
-  int min_trunks = 2;        ///< starts with fewer in view are left out
-  double noise_grey = 1.5;   ///< standard deviation of the sensor noise added
-  Limits limits{0.3, 1.0};   ///< right is within: 1 degree is 3.5 px at f = 200 px
+  int every = 8;                                            ///< frames of the flight between starts (1 ..)
+  double range_m = 15;                                      ///< trunks further away are neither drawn nor in the model
+  int min_trunks = 2;                                       ///< starts with fewer in view are left out
+  double noise_grey = 1.5;                                  ///< standard deviation of the sensor noise added
+  Limits limits{0.3, 1.0};                                  ///< right is within: 1 degree is 3.5 px at f = 200 px
   unsigned seed = 7;
 };
 
@@ -28,7 +28,7 @@ struct BasinRow
 {
   std::string name, settings;
   bool has_clutter = false;
-  int pairs = 0; ///< a step size
+  int pairs = 0;                         ///< a step size
   std::vector<double> steps_px, success; ///< share of the pairs, a step size each
   std::vector<double> silent;            ///< share that was wrong without complaint
 };

@@ -28,10 +28,10 @@ struct Score
   TrackerKind kind = TrackerKind::trunk;
   Help help = Help::alone;
   std::string settings;
-  int frames = 0;             ///< given to it, the first (its start) not counted
-  int until_loss = 0;         ///< before the first that it complained about or got wrong
-  int tracked = 0;            ///< without complaint and right
-  int silent_failures = 0;    ///< wrong without complaint
+  int frames = 0;          ///< given to it, the first (its start) not counted
+  int until_loss = 0;      ///< before the first that it complained about or got wrong
+  int tracked = 0;         ///< without complaint and right
+  int silent_failures = 0; ///< wrong without complaint
   int reinitialisations = 0;
   double position_rmse_m = 0; ///< while tracked: until the first loss
   double rotation_rmse_deg = 0;

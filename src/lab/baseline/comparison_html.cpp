@@ -15,8 +15,7 @@ namespace
 const std::array<const char *, 12> kColours = {"#1f77b4", "#aec7e8", "#17becf", "#d62728", "#ff9896", "#e377c2",
                                                "#ff7f0e", "#ffbb78", "#bcbd22", "#2ca02c", "#006400", "#7f7f7f"};
 
-template <typename... Arguments>
-void add(std::string &text, const char *format, const Arguments &...arguments)
+template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
 {
   fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
 }
@@ -33,9 +32,11 @@ std::string escaped(const std::string &raw)
 class Plot
 {
 public:
-  Plot(double x_most, double y_least, double y_most, bool log_y) : m_x_most(x_most), m_y0(y_least), m_y1(y_most), m_log(log_y)
+  Plot(double x_most, double y_least, double y_most, bool log_y)
+      : m_x_most(x_most), m_y0(y_least), m_y1(y_most), m_log(log_y)
   {
-    m_svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"360\" font-family=\"sans-serif\" font-size=\"12\">"
+    m_svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"360\" font-family=\"sans-serif\" "
+            "font-size=\"12\">"
             "<rect width=\"1000\" height=\"360\" fill=\"white\"/>\n";
   }
   double x(double v) const { return 60 + 600 * v / m_x_most; }
@@ -46,23 +47,32 @@ public:
   }
   void xTick(double v)
   {
-    add(m_svg, "<path d=\"M{0:.1f} 30V320\" stroke=\"#ddd\"/><text x=\"{0:.1f}\" y=\"336\" text-anchor=\"middle\">{1:g}</text>\n", x(v), v);
+    add(m_svg,
+        "<path d=\"M{0:.1f} 30V320\" stroke=\"#ddd\"/><text x=\"{0:.1f}\" y=\"336\" "
+        "text-anchor=\"middle\">{1:g}</text>\n",
+        x(v), v);
   }
   void yTick(double v)
   {
-    add(m_svg, "<path d=\"M60 {0:.1f}H660\" stroke=\"#ddd\"/><text x=\"54\" y=\"{1:.1f}\" text-anchor=\"end\">{2:g}</text>\n", y(v), y(v) + 4, v);
+    add(m_svg,
+        "<path d=\"M60 {0:.1f}H660\" stroke=\"#ddd\"/><text x=\"54\" y=\"{1:.1f}\" text-anchor=\"end\">{2:g}</text>\n",
+        y(v), y(v) + 4, v);
   }
   void names(const std::string &x_name, const std::string &y_name)
   {
-    add(m_svg, "<text x=\"360\" y=\"354\" text-anchor=\"middle\">{}</text><text x=\"60\" y=\"20\">{}</text>\n", x_name, y_name);
+    add(m_svg, "<text x=\"360\" y=\"354\" text-anchor=\"middle\">{}</text><text x=\"60\" y=\"20\">{}</text>\n", x_name,
+        y_name);
   }
-  void line(const std::vector<std::pair<double, double>> &points, const std::string &name, std::size_t index, bool dashed)
+  void line(const std::vector<std::pair<double, double>> &points, const std::string &name, std::size_t index,
+            bool dashed)
   {
     const char *colour = kColours[index % kColours.size()];
-    add(m_svg, "<polyline fill=\"none\" stroke-width=\"1.6\" stroke=\"{}\"{} points=\"", colour, dashed ? " stroke-dasharray=\"5 3\"" : "");
+    add(m_svg, "<polyline fill=\"none\" stroke-width=\"1.6\" stroke=\"{}\"{} points=\"", colour,
+        dashed ? " stroke-dasharray=\"5 3\"" : "");
     for (const auto &[u, v] : points)
       add(m_svg, "{:.1f},{:.1f} ", x(u), y(v));
-    add(m_svg, "\"/><text x=\"670\" y=\"{}\" fill=\"{}\">{}{}</text>\n", 40 + 18 * m_lines++, colour, escaped(name), dashed ? " (dashed)" : "");
+    add(m_svg, "\"/><text x=\"670\" y=\"{}\" fill=\"{}\">{}{}</text>\n", 40 + 18 * m_lines++, colour, escaped(name),
+        dashed ? " (dashed)" : "");
   }
   std::string text() const { return m_svg + "</svg>\n"; }
 
@@ -102,8 +112,10 @@ std::string basinPlot(const std::vector<BasinRow> &rows)
     std::vector<std::pair<double, double>> points;
     for (std::size_t s = 0; s < rows[i].steps_px.size(); ++s)
       points.emplace_back(rows[i].steps_px[s], rows[i].success[s]);
-    const auto same = std::find_if(rows.begin(), rows.end(), [&](const BasinRow &row) { return row.name == rows[i].name; });
-    plot.line(points, rows[i].name + (rows[i].has_clutter ? ", forest" : ", plain"), 3 * std::size_t(same - rows.begin()) + 1,
+    const auto same =
+        std::find_if(rows.begin(), rows.end(), [&](const BasinRow &row) { return row.name == rows[i].name; });
+    plot.line(points, rows[i].name + (rows[i].has_clutter ? ", forest" : ", plain"),
+              3 * std::size_t(same - rows.begin()) + 1,
               !rows[i].has_clutter); // every third colour: a hue a tracker
   }
   return plot.text();
@@ -126,21 +138,27 @@ void addBasin(std::string &html, const std::vector<BasinRow> &rows)
 
 void addScores(std::string &html, const std::vector<Score> &scores)
 {
-  html += "<table><tr><th>tracker, help<th>frames until loss<th>frames right<th>position RMSE until loss [m]<th>rotation [deg]"
-          "<th>position RMSE, all frames [m]<th>rotation [deg]<th>silent failures<th>started again<th>ms median<th>ms p95<th>settings</tr>\n";
+  html += "<table><tr><th>tracker, help<th>frames until loss<th>frames right<th>position RMSE until loss "
+          "[m]<th>rotation [deg]"
+          "<th>position RMSE, all frames [m]<th>rotation [deg]<th>silent failures<th>started again<th>ms median<th>ms "
+          "p95<th>settings</tr>\n";
   for (const Score &s : scores)
-    add(html, "<tr><td>{}<td>{} of {}<td>{}<td>{:.3f}<td>{:.2f}<td>{:.3f}<td>{:.2f}<td>{}<td>{}<td>{:.2f}<td>{:.2f}<td>{}</tr>\n",
-        escaped(s.name), s.until_loss, s.frames, s.tracked, s.position_rmse_m, s.rotation_rmse_deg, s.all_position_rmse_m,
-        s.all_rotation_rmse_deg, s.silent_failures, s.reinitialisations, s.median_ms, s.p95_ms, escaped(s.settings));
+    add(html,
+        "<tr><td>{}<td>{} of "
+        "{}<td>{}<td>{:.3f}<td>{:.2f}<td>{:.3f}<td>{:.2f}<td>{}<td>{}<td>{:.2f}<td>{:.2f}<td>{}</tr>\n",
+        escaped(s.name), s.until_loss, s.frames, s.tracked, s.position_rmse_m, s.rotation_rmse_deg,
+        s.all_position_rmse_m, s.all_rotation_rmse_deg, s.silent_failures, s.reinitialisations, s.median_ms, s.p95_ms,
+        escaped(s.settings));
   html += "</table>\n";
 }
 
 void addFaults(std::string &html, const std::vector<FaultRow> &rows)
 {
-  html += "<h2>Faults</h2><table><tr><th>tracker, help<th>fault<th>noticed<th>silent failures<th>recovered<th>slowest [frames]</tr>\n";
+  html += "<h2>Faults</h2><table><tr><th>tracker, help<th>fault<th>noticed<th>silent failures<th>recovered<th>slowest "
+          "[frames]</tr>\n";
   for (const FaultRow &row : rows)
-    add(html, "<tr><td>{}<td>{}<td>{} of {}<td>{}<td>{} of {}<td>{}</tr>\n", escaped(row.name), row.fault.text(), row.noticed,
-        row.fault_frames, row.silent_failures, row.recovered, row.runs, row.slowest);
+    add(html, "<tr><td>{}<td>{}<td>{} of {}<td>{}<td>{} of {}<td>{}</tr>\n", escaped(row.name), row.fault.text(),
+        row.noticed, row.fault_frames, row.silent_failures, row.recovered, row.runs, row.slowest);
   html += "</table>\n";
 }
 
@@ -148,7 +166,9 @@ void addSweeps(std::string &html, const std::vector<SweepResult> &sweeps)
 {
   html += "<h2>Settings tried</h2>\n";
   for (const SweepResult &sweep : sweeps) {
-    add(html, "<details><summary>{}, {}: best of {} is {}</summary><table><tr><th>settings<th>frames right<th>position RMSE, all frames [m]</tr>\n",
+    add(html,
+        "<details><summary>{}, {}: best of {} is {}</summary><table><tr><th>settings<th>frames right<th>position RMSE, "
+        "all frames [m]</tr>\n",
         toString(sweep.kind), toString(sweep.help), sweep.tried.size(), sweep.best.text());
     for (const auto &[settings, score] : sweep.tried)
       add(html, "<tr><td>{}<td>{}<td>{:.3f}</tr>\n", settings.text(), score.tracked, score.all_position_rmse_m);
@@ -161,11 +181,15 @@ std::string toSvg(const ComparisonReport &report) { return errorPlot(report); }
 
 std::string toHtml(const ComparisonReport &report)
 {
-  std::string html = "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><style>body{font-family:sans-serif;margin:2em}"
-                     "td,th{padding:2px 8px;text-align:right}td:first-child,th:first-child{text-align:left}"
-                     "tr:nth-child(even){background:#f4f4f4}</style>\n";
-  add(html, "<title>{0}</title><h1>{0}</h1><p>{1} frames, {2} trunks in the model; wrong is more than {3:g} m or {4:g} degrees. <code>{5}</code></p>\n",
-      escaped(report.sequence), report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg, escaped(report.command));
+  std::string html =
+      "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><style>body{font-family:sans-serif;margin:2em}"
+      "td,th{padding:2px 8px;text-align:right}td:first-child,th:first-child{text-align:left}"
+      "tr:nth-child(even){background:#f4f4f4}</style>\n";
+  add(html,
+      "<title>{0}</title><h1>{0}</h1><p>{1} frames, {2} trunks in the model; wrong is more than {3:g} m or {4:g} "
+      "degrees. <code>{5}</code></p>\n",
+      escaped(report.sequence), report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg,
+      escaped(report.command));
   addScores(html, report.scores);
   html += errorPlot(report);
   if (!report.timing.empty()) {

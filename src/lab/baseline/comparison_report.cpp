@@ -11,21 +11,20 @@ namespace
 {
 using Json = nlohmann::ordered_json;
 
-template <typename... Arguments>
-void add(std::string &text, const char *format, const Arguments &...arguments)
+template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
 {
   fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
 }
 
 void addScores(std::string &text, const std::vector<Score> &scores)
 {
-  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "", "until", "", "RMSE", "", "RMSE", "",
-      "", "re-", "ms", "ms");
-  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "tracker, help", "loss", "right", "held [m]",
-      "[deg]", "all [m]", "[deg]", "silent", "started", "median", "p95");
+  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "", "until", "", "RMSE", "", "RMSE",
+      "", "", "re-", "ms", "ms");
+  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "tracker, help", "loss", "right",
+      "held [m]", "[deg]", "all [m]", "[deg]", "silent", "started", "median", "p95");
   for (const Score &s : scores)
-    add(text, "{:<42} {:>6} {:>6} {:>8.3f} {:>7.2f} {:>8.3f} {:>7.2f} {:>6} {:>7} {:>6.2f} {:>6.2f}\n", s.name, s.until_loss,
-        s.tracked, s.position_rmse_m, s.rotation_rmse_deg, s.all_position_rmse_m, s.all_rotation_rmse_deg,
+    add(text, "{:<42} {:>6} {:>6} {:>8.3f} {:>7.2f} {:>8.3f} {:>7.2f} {:>6} {:>7} {:>6.2f} {:>6.2f}\n", s.name,
+        s.until_loss, s.tracked, s.position_rmse_m, s.rotation_rmse_deg, s.all_position_rmse_m, s.all_rotation_rmse_deg,
         s.silent_failures, s.reinitialisations, s.median_ms, s.p95_ms);
 }
 
@@ -33,7 +32,8 @@ void addBasin(std::string &text, const std::vector<BasinRow> &rows)
 {
   if (rows.empty())
     return;
-  add(text, "\nBasin: share of right answers one frame after a yaw step [px]; silent failures at the widest\n{:<42}", "");
+  add(text, "\nBasin: share of right answers one frame after a yaw step [px]; silent failures at the widest\n{:<42}",
+      "");
   for (const double step : rows[0].steps_px)
     add(text, " {:>5g}", step);
   add(text, " {:>6} {:>6}\n", "silent", "pairs");
@@ -49,7 +49,8 @@ void addFaults(std::string &text, const std::vector<FaultRow> &rows)
 {
   if (rows.empty())
     return;
-  add(text, "\nFaults\n{:<42} {:<14} {:>9} {:>7} {:>11} {:>8}\n", "", "fault", "noticed", "silent", "recovered", "slowest");
+  add(text, "\nFaults\n{:<42} {:<14} {:>9} {:>7} {:>11} {:>8}\n", "", "fault", "noticed", "silent", "recovered",
+      "slowest");
   for (const FaultRow &row : rows)
     add(text, "{:<42} {:<14} {:>4} of {:<3} {:>5} {:>6} of {:<3} {:>7}\n", row.name, row.fault.text(), row.noticed,
         row.fault_frames, row.silent_failures, row.recovered, row.runs, row.slowest);
@@ -75,7 +76,8 @@ Json scoreJson(const Score &s, bool has_errors)
     return json;
   Json &errors = json["errors"] = Json::array();
   for (const FrameError &e : s.errors)
-    errors.push_back({{"position_m", e.position_m}, {"rotation_deg", e.rotation_deg}, {"complained", e.complained}, {"ms", e.ms}});
+    errors.push_back(
+        {{"position_m", e.position_m}, {"rotation_deg", e.rotation_deg}, {"complained", e.complained}, {"ms", e.ms}});
   return json;
 }
 } // namespace
@@ -117,17 +119,32 @@ std::string toJson(const ComparisonReport &report)
   for (const SweepResult &sweep : report.sweeps) {
     Json tried = Json::array();
     for (const auto &[settings, score] : sweep.tried)
-      tried.push_back({{"settings", settings.text()}, {"frames_right", score.tracked}, {"position_rmse_all_frames_m", score.all_position_rmse_m}});
-    sweeps.push_back({{"tracker", toString(sweep.kind)}, {"help", toString(sweep.help)}, {"best", sweep.best.text()}, {"tried", tried}});
+      tried.push_back({{"settings", settings.text()},
+                       {"frames_right", score.tracked},
+                       {"position_rmse_all_frames_m", score.all_position_rmse_m}});
+    sweeps.push_back({{"tracker", toString(sweep.kind)},
+                      {"help", toString(sweep.help)},
+                      {"best", sweep.best.text()},
+                      {"tried", tried}});
   }
   Json &basin = json["basin"] = Json::array();
   for (const BasinRow &row : report.basin)
-    basin.push_back({{"tracker", row.name}, {"settings", row.settings}, {"clutter", row.has_clutter}, {"pairs", row.pairs},
-                     {"steps_px", row.steps_px}, {"success", row.success}, {"silent", row.silent}});
+    basin.push_back({{"tracker", row.name},
+                     {"settings", row.settings},
+                     {"clutter", row.has_clutter},
+                     {"pairs", row.pairs},
+                     {"steps_px", row.steps_px},
+                     {"success", row.success},
+                     {"silent", row.silent}});
   Json &faults = json["faults"] = Json::array();
   for (const FaultRow &row : report.faults)
-    faults.push_back({{"tracker", row.name}, {"fault", row.fault.text()}, {"runs", row.runs}, {"fault_frames", row.fault_frames},
-                      {"noticed", row.noticed}, {"silent_failures", row.silent_failures}, {"recovered", row.recovered},
+    faults.push_back({{"tracker", row.name},
+                      {"fault", row.fault.text()},
+                      {"runs", row.runs},
+                      {"fault_frames", row.fault_frames},
+                      {"noticed", row.noticed},
+                      {"silent_failures", row.silent_failures},
+                      {"recovered", row.recovered},
                       {"slowest_recovery_frames", row.slowest}});
   return json.dump(1) + "\n";
 }

@@ -42,10 +42,14 @@ double threadTime_ms()
 const char *toString(TrackerKind kind)
 {
   switch (kind) {
-  case TrackerKind::visp_edge: return "vpMbEdgeTracker";
-  case TrackerKind::visp_generic_edge: return "vpMbGenericTracker EDGE";
-  case TrackerKind::visp_generic_edge_klt: return "vpMbGenericTracker EDGE+KLT";
-  case TrackerKind::trunk: return "vpMbTrunkTracker";
+  case TrackerKind::visp_edge:
+    return "vpMbEdgeTracker";
+  case TrackerKind::visp_generic_edge:
+    return "vpMbGenericTracker EDGE";
+  case TrackerKind::visp_generic_edge_klt:
+    return "vpMbGenericTracker EDGE+KLT";
+  case TrackerKind::trunk:
+    return "vpMbTrunkTracker";
   }
   return "?";
 }
@@ -53,22 +57,26 @@ const char *toString(TrackerKind kind)
 const char *toString(Help help)
 {
   switch (help) {
-  case Help::alone: return "alone";
-  case Help::prior: return "prior";
-  case Help::reinitialised: return "re-initialised";
-  case Help::truth: return "true pose";
+  case Help::alone:
+    return "alone";
+  case Help::prior:
+    return "prior";
+  case Help::reinitialised:
+    return "re-initialised";
+  case Help::truth:
+    return "true pose";
   }
   return "?";
 }
 
 std::string EdgeSettings::text() const
 {
-  return fmt::format("mask {}, range {}, threshold {:g}, step {:g}, far {:g} m", mask_size, range, threshold, sample_step,
-                     far_m);
+  return fmt::format("mask {}, range {}, threshold {:g}, step {:g}, far {:g} m", mask_size, range, threshold,
+                     sample_step, far_m);
 }
 
 Contender::Contender(TrackerKind kind, Help help, const EdgeSettings &settings, const std::string &trunk_xml)
-  : m_kind(kind), m_help(help), m_settings(settings), m_trunk_xml(trunk_xml)
+    : m_kind(kind), m_help(help), m_settings(settings), m_trunk_xml(trunk_xml)
 {
 }
 Contender::~Contender() = default;
@@ -98,9 +106,11 @@ std::unique_ptr<vpMbTracker> Contender::make(const std::string &cao_path, const 
     auto edge = std::make_unique<vpMbEdgeTracker>();
     edge->setMovingEdge(me);
     tracker = std::move(edge);
-  } else if (m_kind == TrackerKind::trunk) {
+  }
+  else if (m_kind == TrackerKind::trunk) {
     tracker = std::make_unique<vpMbTrunkTracker>();
-  } else {
+  }
+  else {
     const bool klt = m_kind == TrackerKind::visp_generic_edge_klt;
     auto generic = std::make_unique<vpMbGenericTracker>(
         1, klt ? vpMbGenericTracker::EDGE_TRACKER | vpMbGenericTracker::KLT_TRACKER : vpMbGenericTracker::EDGE_TRACKER);

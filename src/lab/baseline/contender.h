@@ -14,12 +14,19 @@ class vpMbTrunkTracker;
 
 namespace bole
 {
-enum class TrackerKind { visp_edge, visp_generic_edge, visp_generic_edge_klt, trunk };
+enum class TrackerKind
+{
+  visp_edge,
+  visp_generic_edge,
+  visp_generic_edge_klt,
+  trunk
+};
 
 /// How much the caller helps.
-enum class Help {
-  alone,       ///< nothing but the first pose
-  prior,       ///< odometry's prediction every frame: setPose() for ViSP's, setMotionPrior() for ours
+enum class Help
+{
+  alone,         ///< nothing but the first pose
+  prior,         ///< odometry's prediction every frame: setPose() for ViSP's, setMotionPrior() for ours
   reinitialised, ///< initFromPose() at odometry's prediction after each complaint
   truth ///< setPose() at the true pose every frame: only to time a tracker on the trunks that really are in view
 };
@@ -29,11 +36,11 @@ const char *toString(Help help);
 /// ViSP's moving-edge settings: what the sweep varies. Defaults are those of ViSP's tutorials.
 struct EdgeSettings
 {
-  int mask_size = 5;       ///< [px]
-  int range = 8;           ///< search along the normal [px]
-  double threshold = 10000;///< likelihood
-  double sample_step = 4;  ///< [px]
-  double far_m = 15;       ///< clipping of the model [m]
+  int mask_size = 5;        ///< [px]
+  int range = 8;            ///< search along the normal [px]
+  double threshold = 10000; ///< likelihood
+  double sample_step = 4;   ///< [px]
+  double far_m = 15;        ///< clipping of the model [m]
   std::string text() const;
 };
 

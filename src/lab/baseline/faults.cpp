@@ -12,11 +12,16 @@ namespace
 const char *toString(Fault fault)
 {
   switch (fault) {
-  case Fault::black: return "black";
-  case Fault::noise: return "noise";
-  case Fault::smear: return "half smeared";
-  case Fault::frozen: return "frozen";
-  case Fault::wrong_size: return "wrong size";
+  case Fault::black:
+    return "black";
+  case Fault::noise:
+    return "noise";
+  case Fault::smear:
+    return "half smeared";
+  case Fault::frozen:
+    return "frozen";
+  case Fault::wrong_size:
+    return "wrong size";
   }
   return "?";
 }
@@ -65,7 +70,9 @@ vpImage<unsigned char> faultyImage(const TestFlight &flight, std::size_t k, std:
   vpImage<unsigned char> image = flight.frames[k].image;
   const unsigned w = image.getWidth(), h = image.getHeight();
   switch (fault) {
-  case Fault::black: image = static_cast<unsigned char>(0); break;
+  case Fault::black:
+    image = static_cast<unsigned char>(0);
+    break;
   case Fault::noise: {
     std::mt19937 random(unsigned(k) + 1);
     for (unsigned i = 0; i < image.getSize(); ++i)
@@ -76,7 +83,9 @@ vpImage<unsigned char> faultyImage(const TestFlight &flight, std::size_t k, std:
     for (unsigned v = h / 2; v < h; ++v)
       std::copy(image[h / 2 - 1], image[h / 2 - 1] + w, image[v]);
     break;
-  case Fault::frozen: image = flight.frames[first - 1].image; break;
+  case Fault::frozen:
+    image = flight.frames[first - 1].image;
+    break;
   case Fault::wrong_size: {
     vpImage<unsigned char> small(h / 2, w / 2);
     for (unsigned v = 0; v < h / 2; ++v)

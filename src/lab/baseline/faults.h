@@ -12,7 +12,14 @@
 
 namespace bole
 {
-enum class Fault { black, noise, smear, frozen, wrong_size };
+enum class Fault
+{
+  black,
+  noise,
+  smear,
+  frozen,
+  wrong_size
+};
 struct FaultCase
 {
   Fault fault = Fault::black;
@@ -27,9 +34,10 @@ vpImage<unsigned char> faultyImage(const TestFlight &flight, std::size_t k, std:
 
 struct FaultOptions
 {
-  std::vector<std::size_t> begins{20, 40, 60, 80}; ///< frames at which the fault begins; those near the end are left out
-  int lead = 5;   ///< frames tracked before it
-  int tail = 15;  ///< and after it
+  std::vector<std::size_t> begins{20, 40, 60,
+                                  80}; ///< frames at which the fault begins; those near the end are left out
+  int lead = 5;                        ///< frames tracked before it
+  int tail = 15;                       ///< and after it
 };
 
 struct FaultRow

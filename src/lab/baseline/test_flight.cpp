@@ -171,7 +171,8 @@ TestFlight readCubeFlight(const std::string &folder, int max_frames)
     flight.frames.push_back(std::move(frame));
   }
   if (flight.frames.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no cube/image0000.pgm that ViSP's tracker can follow", folder));
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: no cube/image0000.pgm that ViSP's tracker can follow", folder));
   flight.upright = false;
   flight.step_sigma << Vector3d::Constant(sigma_m), Vector3d::Constant(sigma_rad);
   return flight;

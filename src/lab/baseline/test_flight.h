@@ -4,8 +4,8 @@
 /// A flight with everything that a fair comparison of trackers needs: images, the true pose of each, what odometry
 /// said of the motion between them, and the true model.
 
-#include <bole/camera.h>
 #include "geometry/cylinder.h"
+#include <bole/camera.h>
 
 #include <optional>
 #include <string>
@@ -17,8 +17,8 @@ namespace bole
 struct TestFrame
 {
   vpImage<unsigned char> image;
-  Pose cMo;                      ///< true pose
-  std::optional<Pose> odometry;  ///< cMo by odometry alone: drifts away from cMo
+  Pose cMo;                     ///< true pose
+  std::optional<Pose> odometry; ///< cMo by odometry alone: drifts away from cMo
 };
 
 /// More is wrong.
@@ -34,11 +34,11 @@ struct TestFlight
   PinholeCamera camera;
   std::vector<TestFrame> frames;
   std::vector<Cylinder> trunks; ///< true model, world frame
-  Limits limits; ///< what counts as wrong at the scale of this flight
+  Limits limits;                ///< what counts as wrong at the scale of this flight
   /// Odometry knows height, roll and pitch for good (sonar, gravity) and drifts in x, y and yaw only.
   bool upright = true;
-  Vector6d step_sigma = Vector6d::Constant(0.01);     ///< of odometry's step, world frame: t [m], rotation [rad]
-  Vector6d absolute_sigma = Vector6d::Constant(1e3);  ///< of what odometry knows for good, the same order
+  Vector6d step_sigma = Vector6d::Constant(0.01);    ///< of odometry's step, world frame: t [m], rotation [rad]
+  Vector6d absolute_sigma = Vector6d::Constant(1e3); ///< of what odometry knows for good, the same order
 
   /// Where odometry expects the camera in frame \p k, given where it was (\p cMo) in the frame before: what a
   /// pilot's program would compute. Upright: the step in x, y and yaw is put on \p cMo; height, roll and pitch are

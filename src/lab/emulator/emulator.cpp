@@ -31,8 +31,7 @@ bool within(std::int64_t now_ns, double from_s, double for_s)
 
 DronePackets::Options packetOptions(const PacketFeed &feed, const ArDroneEmulator::Options &options)
 {
-  return {feed.generation(), feed.frameRateHz(), options.bit_rate, options.key_interval,
-          options.clock_wrap};
+  return {feed.generation(), feed.frameRateHz(), options.bit_rate, options.key_interval, options.clock_wrap};
 }
 } // namespace
 
@@ -113,15 +112,12 @@ struct ArDroneEmulator::State
   bool readyToStart(std::int64_t now_ns) const
   {
     return wire.hasVideoListener() &&
-           ((wire.hasNavdataListener() && packets.isConfigured()) ||
-            now_ns - wire.videoSinceNs() > kSecond_ns / 2);
+           ((wire.hasNavdataListener() && packets.isConfigured()) || now_ns - wire.videoSinceNs() > kSecond_ns / 2);
   }
 
   std::int64_t flightTime(std::int64_t now_ns) const
   {
-    return start_ns < 0
-               ? 0
-               : static_cast<std::int64_t>(static_cast<double>(now_ns - start_ns) * options.speed);
+    return start_ns < 0 ? 0 : static_cast<std::int64_t>(static_cast<double>(now_ns - start_ns) * options.speed);
   }
 
   /// Sleeps until something comes, or is due.
@@ -129,10 +125,8 @@ struct ArDroneEmulator::State
   {
     auto pause = std::chrono::nanoseconds(kTick);
     if (next_sent_ns >= 0) {
-      const double left_ns =
-          static_cast<double>(next_sent_ns - flightTime(steadyNowNs())) / options.speed;
-      pause = std::min(pause,
-                       std::chrono::nanoseconds(static_cast<std::int64_t>(std::max(0.0, left_ns))));
+      const double left_ns = static_cast<double>(next_sent_ns - flightTime(steadyNowNs())) / options.speed;
+      pause = std::min(pause, std::chrono::nanoseconds(static_cast<std::int64_t>(std::max(0.0, left_ns))));
     }
     if (pause.count() > 0)
       std::this_thread::sleep_for(pause);
@@ -160,12 +154,10 @@ struct ArDroneEmulator::State
     }
     last_sequence = command.sequence;
     last_command_ns = now_ns;
-    if (command.name == "CONFIG" && command.arguments.size() == 2 &&
-        command.arguments[0] == "general:navdata_demo")
+    if (command.name == "CONFIG" && command.arguments.size() == 2 && command.arguments[0] == "general:navdata_demo")
       packets.configure(command.arguments[1] == "FALSE");
     if (command.name == "REF" && !command.arguments.empty()) {
-      const auto bits =
-          static_cast<std::uint32_t>(std::strtol(command.arguments[0].c_str(), nullptr, 10));
+      const auto bits = static_cast<std::uint32_t>(std::strtol(command.arguments[0].c_str(), nullptr, 10));
       ground = (bits & kTakeOffBit) == 0;
       emergency = emergency != ((bits & kEmergencyBit) != 0);
     }
@@ -250,8 +242,7 @@ struct ArDroneEmulator::State
     if (!wire.hasNavdataListener())
       return;
     DronePackets::Condition condition{ground, emergency, false};
-    condition.command_watchdog =
-        last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns;
+    condition.command_watchdog = last_command_ns != 0 && steadyNowNs() - last_command_ns > kWatchdog_ns;
     auto bytes = packets.status(navdata, stamp_ns, condition);
     if (!bytes.empty())
       post(Port::navdata, std::move(bytes), &Counters::navdata);
@@ -317,8 +308,7 @@ void ArDroneEmulator::stop()
 bool ArDroneEmulator::wait(double timeout_s)
 {
   std::unique_lock<std::mutex> lock(m_state->mutex);
-  return m_state->ended.wait_for(lock, std::chrono::duration<double>(timeout_s),
-                                 [this] { return m_state->finished; });
+  return m_state->ended.wait_for(lock, std::chrono::duration<double>(timeout_s), [this] { return m_state->finished; });
 }
 
 ArDroneAddress ArDroneEmulator::address() const

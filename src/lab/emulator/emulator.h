@@ -47,20 +47,18 @@ public:
 
 struct SequenceFeedOptions
 {
-  int generation = 2;           ///< 1 or 2
-  bool loop = false;            ///< there and back for ever: the motion stays continuous
-  double navdata_rate_hz = 200; ///< (1, 1000); as the drone's full navdata
-  double video_delay_s = 0.06;  ///< [s], [0, 0.5]: exposure to sending; 50 to 75 ms on the drone
-  std::size_t max_frames = 0;   ///< 0: all
-  std::size_t max_bytes = std::size_t{2}
-                          << 30; ///< of images in memory: a longer sequence is refused
+  int generation = 2;                           ///< 1 or 2
+  bool loop = false;                            ///< there and back for ever: the motion stays continuous
+  double navdata_rate_hz = 200;                 ///< (1, 1000); as the drone's full navdata
+  double video_delay_s = 0.06;                  ///< [s], [0, 0.5]: exposure to sending; 50 to 75 ms on the drone
+  std::size_t max_frames = 0;                   ///< 0: all
+  std::size_t max_bytes = std::size_t{2} << 30; ///< of images in memory: a longer sequence is refused
   void validate() const;
 };
 /// Frames of \p source with navdata made from its odometry (velocity from differences, attitude,
 /// height) and gyro; level and still where it has none. Read into memory, since a loop flies it
 /// backwards too.
-std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source,
-                                             const SequenceFeedOptions &options);
+std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options);
 /// The raw bytes of a recording (see recording.h).
 std::unique_ptr<PacketFeed> makeRecordingFeed(const std::string &folder);
 
@@ -75,23 +73,19 @@ public:
   {
     std::string host = "127.0.0.1";
     std::uint16_t navdata_port = 0, video_port = 0, at_port = 0; ///< 0: any free one
-    double speed = 1; ///< [1, 20]: flight seconds a second
-    double bit_rate =
-        1.3e6; ///< [bit/s], [1e4, 1e8]: of a captured stream of an AR.Drone 2; its most is 4e6
-    int key_interval = 15; ///< frames, [1, 300]; 15 on the drone
+    double speed = 1;                                            ///< [1, 20]: flight seconds a second
+    double bit_rate = 1.3e6; ///< [bit/s], [1e4, 1e8]: of a captured stream of an AR.Drone 2; its most is 4e6
+    int key_interval = 15;   ///< frames, [1, 300]; 15 on the drone
     // Faults.
     double loss = 0;     ///< share of datagrams and TCP frames that are not sent, [0, 1)
     double jitter_s = 0; ///< [s], [0, 1]: random extra delay of each packet; datagrams overtake
     double corrupt = 0;  ///< share of packets with one to four bytes changed, [0, 1)
     bool corrupt_navdata = true, corrupt_video = true;
-    double reboot_at_s =
-        -1; ///< flight time of a reboot: silence, then clocks and numbers from zero; < 0: none
+    double reboot_at_s = -1; ///< flight time of a reboot: silence, then clocks and numbers from zero; < 0: none
     double reboot_for_s = 1; ///< [s] of silence
-    double freeze_at_s =
-        -1; ///< flight time from which the camera sends the same picture; < 0: never
+    double freeze_at_s = -1; ///< flight time from which the camera sends the same picture; < 0: never
     double freeze_for_s = 2; ///< [s]
-    double stall_at_s =
-        -1; ///< flight time from which no video comes though the connection stands; < 0: never
+    double stall_at_s = -1;  ///< flight time from which no video comes though the connection stands; < 0: never
     double stall_for_s = 2;  ///< [s]
     bool clock_wrap = false; ///< start both clocks 3 s before they wrap
     unsigned seed = 1;
@@ -105,7 +99,7 @@ public:
     std::size_t refused = 0;         ///< frames dropped since the client did not read
     std::size_t out_of_sequence = 0; ///< commands refused for their number
     double flight_s = 0;
-    std::int64_t started_ns = -1;    ///< host's steady clock at flight time zero; -1 before
+    std::int64_t started_ns = -1; ///< host's steady clock at flight time zero; -1 before
   };
 
   ArDroneEmulator(std::unique_ptr<PacketFeed> feed, const Options &options);

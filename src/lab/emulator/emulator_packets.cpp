@@ -11,13 +11,11 @@ namespace
 {
 constexpr std::int64_t kSecond_ns = 1'000'000'000, kDemoEvery_ns = kSecond_ns / 15;
 constexpr std::int64_t kWrapSoon_ms = 3000;
-constexpr std::uint32_t kUsualState =
-    0x0f800080 | 0x10; // threads up, camera ready, altitude control
+constexpr std::uint32_t kUsualState = 0x0f800080 | 0x10; // threads up, camera ready, altitude control
 constexpr std::uint32_t kLanded = 2, kFlying = 3;
 } // namespace
 
-DronePackets::DronePackets(const Options &options)
-    : m_options(options), m_last_demo_ns(-kSecond_ns)
+DronePackets::DronePackets(const Options &options) : m_options(options), m_last_demo_ns(-kSecond_ns)
 {
   if (options.clock_wrap) {
     m_clock_ms = kPaveTimePeriod_ms - kWrapSoon_ms;
@@ -46,21 +44,17 @@ void DronePackets::forgetPicture()
   m_force_key = true;
 }
 
-std::vector<std::uint8_t> DronePackets::picture(const vpImage<unsigned char> &image,
-                                                std::int64_t stamp_ns)
+std::vector<std::uint8_t> DronePackets::picture(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
 {
   ++m_frame_number;
-  return m_options.generation == 1 ? encodeUvlc(image, m_frame_number)
-                                   : pavePicture(image, stamp_ns);
+  return m_options.generation == 1 ? encodeUvlc(image, m_frame_number) : pavePicture(image, stamp_ns);
 }
 
-std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char> &image,
-                                                    std::int64_t stamp_ns)
+std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
 {
   if (!m_encoder)
-    m_encoder = std::make_unique<H264Encoder>(
-        static_cast<int>(image.getWidth()), static_cast<int>(image.getHeight()),
-        m_options.frame_rate_hz, m_options.bit_rate, m_options.key_interval);
+    m_encoder = std::make_unique<H264Encoder>(static_cast<int>(image.getWidth()), static_cast<int>(image.getHeight()),
+                                              m_options.frame_rate_hz, m_options.bit_rate, m_options.key_interval);
   const auto encoded = m_encoder->encode(image, m_force_key);
   m_force_key = false;
   PaveHeader header;
@@ -81,17 +75,14 @@ std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char>
   return bytes;
 }
 
-std::vector<std::uint8_t> DronePackets::status(Navdata navdata, std::int64_t stamp_ns,
-                                               const Condition &condition)
+std::vector<std::uint8_t> DronePackets::status(Navdata navdata, std::int64_t stamp_ns, const Condition &condition)
 {
   const bool is_demo = m_configured && !m_wants_full;
   if (is_demo && stamp_ns - m_last_demo_ns < kDemoEvery_ns)
     return {};
   m_last_demo_ns = stamp_ns;
   navdata.state = kUsualState | (condition.on_ground ? 0u : 1u);
-  const auto raise = [&](DroneState bit, bool on) {
-    navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u;
-  };
+  const auto raise = [&](DroneState bit, bool on) { navdata.state |= on ? static_cast<std::uint32_t>(bit) : 0u; };
   raise(DroneState::bootstrap, !m_configured);
   raise(DroneState::demo_mode, is_demo);
   raise(DroneState::command_watchdog, condition.command_watchdog);

@@ -32,8 +32,7 @@ public:
     bool on_ground = false, emergency = false, command_watchdog = false;
   };
   /// \p navdata with state, sequence and time; empty when a client in demo mode need not have it.
-  std::vector<std::uint8_t> status(Navdata navdata, std::int64_t stamp_ns,
-                                   const Condition &condition);
+  std::vector<std::uint8_t> status(Navdata navdata, std::int64_t stamp_ns, const Condition &condition);
 
   /// The client asked for navdata: all of them, or the demo's.
   void configure(bool wants_full);
@@ -45,8 +44,7 @@ public:
   void forgetPicture();
 
 private:
-  std::vector<std::uint8_t> pavePicture(const vpImage<unsigned char> &image,
-                                        std::int64_t stamp_ns);
+  std::vector<std::uint8_t> pavePicture(const vpImage<unsigned char> &image, std::int64_t stamp_ns);
 
   Options m_options;
   std::unique_ptr<H264Encoder> m_encoder;

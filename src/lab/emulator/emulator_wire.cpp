@@ -12,8 +12,8 @@ constexpr std::size_t kMostPending = 1 << 20;
 constexpr std::int64_t kClientLost_ns = 10'000'000'000;
 } // namespace
 
-DroneWire::DroneWire(const std::string &host, int generation, std::uint16_t navdata_port,
-                     std::uint16_t video_port, std::uint16_t at_port)
+DroneWire::DroneWire(const std::string &host, int generation, std::uint16_t navdata_port, std::uint16_t video_port,
+                     std::uint16_t at_port)
     : m_host(host),
       m_generation(generation),
       m_video_port(video_port),
@@ -27,8 +27,7 @@ void DroneWire::comeUp()
 {
   if (m_video.valid())
     return;
-  m_video = m_generation == 2 ? Socket::listenTcp(m_host, m_video_port)
-                              : Socket::bindUdp(m_host, m_video_port);
+  m_video = m_generation == 2 ? Socket::listenTcp(m_host, m_video_port) : Socket::bindUdp(m_host, m_video_port);
   if (m_video_port == 0) // chosen once: other threads ask for it, and it stays over a reboot
     m_video_port = m_video.localPort();
 }
@@ -50,8 +49,7 @@ DroneWire::Received DroneWire::receive(std::int64_t now_ns, bool is_down)
   std::size_t size = 0;
   sockaddr_in sender = {};
   const auto came = [&](const Socket &socket) {
-    return socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
-           Socket::Read::data;
+    return socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data;
   };
   while (came(m_navdata)) {
     if (is_down)
@@ -64,8 +62,7 @@ DroneWire::Received DroneWire::receive(std::int64_t now_ns, bool is_down)
     if (is_down)
       continue;
     m_navdata_seen_ns = now_ns;
-    received.commands.emplace_back(buffer.begin(),
-                                   buffer.begin() + static_cast<std::ptrdiff_t>(size));
+    received.commands.emplace_back(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
   }
   if (m_navdata_client && now_ns - m_navdata_seen_ns > kClientLost_ns)
     m_navdata_client.reset();
@@ -89,8 +86,7 @@ void DroneWire::acceptVideo(std::int64_t now_ns)
   std::array<std::uint8_t, 64> buffer{};
   std::size_t size = 0;
   sockaddr_in sender = {};
-  while (m_video.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) ==
-         Socket::Read::data) {
+  while (m_video.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data) {
     if (!m_video_peer)
       m_video_since_ns = now_ns;
     m_video_peer = sender;
@@ -143,8 +139,7 @@ void DroneWire::flush()
 {
   if (m_pending.empty())
     return;
-  const std::int64_t sent =
-      m_video_client.valid() ? m_video_client.sendSome(m_pending.data(), m_pending.size()) : -1;
+  const std::int64_t sent = m_video_client.valid() ? m_video_client.sendSome(m_pending.data(), m_pending.size()) : -1;
   if (sent < 0) {
     m_video_client.close();
     m_pending.clear();

@@ -23,8 +23,8 @@ public:
     navdata
   };
   /// Port 0 takes any free one. Throws vpException when a port is taken.
-  DroneWire(const std::string &host, int generation, std::uint16_t navdata_port,
-            std::uint16_t video_port, std::uint16_t at_port);
+  DroneWire(const std::string &host, int generation, std::uint16_t navdata_port, std::uint16_t video_port,
+            std::uint16_t at_port);
 
   struct Received
   {

@@ -12,10 +12,7 @@ namespace
 class RecordingFeed : public PacketFeed
 {
 public:
-  explicit RecordingFeed(const std::string &folder)
-      : m_reader(folder), m_generation(recordedGeneration(folder))
-  {
-  }
+  explicit RecordingFeed(const std::string &folder) : m_reader(folder), m_generation(recordedGeneration(folder)) {}
 
   int generation() const override { return m_generation; }
   double frameRateHz() const override { return m_generation == 1 ? 15 : 30; }
@@ -33,8 +30,7 @@ public:
     packet.kind = piece.channel == LinkChannel::video     ? FeedPacket::Kind::raw_video
                   : piece.channel == LinkChannel::navdata ? FeedPacket::Kind::raw_navdata
                                                           : FeedPacket::Kind::video_connected;
-    if (packet.kind == FeedPacket::Kind::video_connected &&
-        std::exchange(m_is_first_connection, false))
+    if (packet.kind == FeedPacket::Kind::video_connected && std::exchange(m_is_first_connection, false))
       packet.sent_ns = 0;
     return true;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/emulator/emulator.h"
 #include "ardrone/navdata_odometry.h"
 #include "geometry/so3.h"
+#include "lab/emulator/emulator.h"
 
 #include <algorithm>
 #include <cmath>
@@ -65,10 +65,7 @@ public:
   }
 
 private:
-  static std::int64_t nanoseconds(double s)
-  {
-    return static_cast<std::int64_t>(std::llround(s * 1e9));
-  }
+  static std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(s * 1e9)); }
 
   void load(FrameSource &source)
   {
@@ -83,14 +80,14 @@ private:
       bytes += frame.image.getSize();
       if (bytes > m_options.max_bytes)
         throw vpException(vpException::badValue,
-                          fmt::format("{}: more than {} MB of images, must fit; give fewer frames",
-                                      source.name(), m_options.max_bytes >> 20));
+                          fmt::format("{}: more than {} MB of images, must fit; give fewer frames", source.name(),
+                                      m_options.max_bytes >> 20));
       if (m_frames.size() == m_options.max_frames)
         break;
     }
     if (m_frames.size() < 2)
-      throw vpException(vpException::badValue, fmt::format("{}: {} frames, must be at least 2",
-                                                           source.name(), m_frames.size()));
+      throw vpException(vpException::badValue,
+                        fmt::format("{}: {} frames, must be at least 2", source.name(), m_frames.size()));
   }
 
   // Frame k of the flight: there, back, there, ...; the turning frames are shown once.
@@ -102,10 +99,8 @@ private:
   double frameTime(std::size_t k) const
   {
     const std::size_t last = m_frames.size() - 1, within = k % (2 * last);
-    const double there =
-        m_frames[within <= last ? within : 2 * last - within].time_s - m_frames.front().time_s;
-    return static_cast<double>(k / (2 * last)) * 2 * m_duration_s +
-           (within <= last ? there : 2 * m_duration_s - there);
+    const double there = m_frames[within <= last ? within : 2 * last - within].time_s - m_frames.front().time_s;
+    return static_cast<double>(k / (2 * last)) * 2 * m_duration_s + (within <= last ? there : 2 * m_duration_s - there);
   }
 
   Navdata navdataAt(double flight_s) const
@@ -114,9 +109,8 @@ private:
     const bool back = within > m_duration_s;
     const double direction = back ? -1 : 1;
     const double time_s = m_frames.front().time_s + (back ? 2 * m_duration_s - within : within);
-    const auto after =
-        std::upper_bound(m_frames.begin() + 1, m_frames.end() - 1, time_s,
-                         [](double t, const StoredFrame &frame) { return t < frame.time_s; });
+    const auto after = std::upper_bound(m_frames.begin() + 1, m_frames.end() - 1, time_s,
+                                        [](double t, const StoredFrame &frame) { return t < frame.time_s; });
     const StoredFrame &a = *(after - 1), &b = *after;
     Navdata navdata;
     navdata.demo = Navdata::Demo{};
@@ -133,8 +127,7 @@ private:
     const double height = a.wMb->t.z() + share * (b.wMb->t.z() - a.wMb->t.z());
     navdata.demo->phi_theta_psi_mdeg = (attitudeToDrone(wRb) / kDegree * 1000).cast<float>();
     navdata.demo->velocity_mm_s = (flipDroneAxes(velocity) * 1000).cast<float>();
-    navdata.demo->altitude_mm =
-        static_cast<std::int32_t>(std::lround(std::max(0.0, height) * 1000));
+    navdata.demo->altitude_mm = static_cast<std::int32_t>(std::lround(std::max(0.0, height) * 1000));
     navdata.physical->rate_deg_s = (flipDroneAxes(rate) / kDegree).cast<float>();
     return navdata;
   }
@@ -144,9 +137,8 @@ private:
   {
     if (m_rates.empty())
       return otherwise;
-    const auto after =
-        std::lower_bound(m_rates.begin(), m_rates.end(), time_s,
-                         [](const StoredRate &sample, double t) { return sample.time_s < t; });
+    const auto after = std::lower_bound(m_rates.begin(), m_rates.end(), time_s,
+                                        [](const StoredRate &sample, double t) { return sample.time_s < t; });
     if (after == m_rates.end())
       return m_rates.back().rate;
     if (after != m_rates.begin() && time_s - (after - 1)->time_s < after->time_s - time_s)
@@ -167,15 +159,12 @@ void SequenceFeedOptions::validate() const
   if (generation != 1 && generation != 2)
     throw vpException(vpException::badValue, "generation = %d, must be 1 or 2", generation);
   if (!(navdata_rate_hz > 1 && navdata_rate_hz < 1000))
-    throw vpException(vpException::badValue, "navdata_rate_hz = %g, must be in (1, 1000) Hz",
-                      navdata_rate_hz);
+    throw vpException(vpException::badValue, "navdata_rate_hz = %g, must be in (1, 1000) Hz", navdata_rate_hz);
   if (!(video_delay_s >= 0 && video_delay_s <= 0.5))
-    throw vpException(vpException::badValue, "video_delay_s = %g, must be in [0, 0.5] s",
-                      video_delay_s);
+    throw vpException(vpException::badValue, "video_delay_s = %g, must be in [0, 0.5] s", video_delay_s);
 }
 
-std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source,
-                                             const SequenceFeedOptions &options)
+std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options)
 {
   return std::make_unique<SequenceFeed>(source, options);
 }

@@ -152,10 +152,9 @@ Size sizeCode(unsigned width, unsigned height)
     if (width == 88u << (resolution - 1) && height == 72u << (resolution - 1))
       return {1, resolution};
   }
-  throw vpException(
-      vpException::dimensionError,
-      "image size = %ux%u, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
-      height);
+  throw vpException(vpException::dimensionError,
+                    "image size = %ux%u, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
+                    height);
 }
 
 Block pixelsAt(const vpImage<unsigned char> &image, int left, int top)

@@ -21,8 +21,7 @@ constexpr double kTwoPi = 2 * M_PI;
 void requireRange(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
   }
 }
 } // namespace
@@ -49,8 +48,7 @@ PathKind pathKindFromString(const std::string &word)
       return kind;
     }
   }
-  throw vpException(vpException::badValue,
-                    fmt::format("path = {}, must be forward, lateral, loop or slalom", word));
+  throw vpException(vpException::badValue, fmt::format("path = {}, must be forward, lateral, loop or slalom", word));
 }
 
 void FlightOptions::validate() const
@@ -91,8 +89,7 @@ FlightPath::FlightPath(const FlightOptions &options) : m_options(options)
 Eigen::Vector3d FlightPath::position(double t) const
 {
   const double along = m_options.speed * t;
-  const double z = m_options.height + 0.1 * std::sin(0.7 * t + m_phase[0]) +
-                   0.06 * std::sin(1.9 * t + m_phase[1]);
+  const double z = m_options.height + 0.1 * std::sin(0.7 * t + m_phase[0]) + 0.06 * std::sin(1.9 * t + m_phase[1]);
   switch (m_options.kind) {
   case PathKind::forward:
     return {along, m_swing * std::sin(kTwoPi * along / m_wave_length + m_phase[2]), z};
@@ -138,14 +135,12 @@ Pose FlightPath::bodyPose(double t) const
   // heading.
   const Eigen::Vector3d up = (acceleration(t) + Eigen::Vector3d(0, 0, kGravity)).normalized();
   const double yaw = heading(t);
-  const Eigen::Vector3d left =
-      up.cross(Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0)).normalized();
+  const Eigen::Vector3d left = up.cross(Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0)).normalized();
   Eigen::Matrix3d R;
   R << left.cross(up), left, up;
   const double wobble = m_options.wobble_deg * M_PI / 180;
-  const Eigen::Vector3d shake(
-      wobble * (0.8 * std::sin(2.6 * t + m_phase[5]) + 0.4 * std::sin(9 * t + m_phase[1])),
-      wobble * (0.8 * std::sin(2.1 * t + m_phase[2]) + 0.4 * std::sin(8 * t + m_phase[3])), 0);
+  const Eigen::Vector3d shake(wobble * (0.8 * std::sin(2.6 * t + m_phase[5]) + 0.4 * std::sin(9 * t + m_phase[1])),
+                              wobble * (0.8 * std::sin(2.1 * t + m_phase[2]) + 0.4 * std::sin(8 * t + m_phase[3])), 0);
   return {R * expSo3(shake), position(t)};
 }
 
@@ -173,8 +168,7 @@ std::vector<SimulatedTrunk> FlightPath::gates() const
   }
   Random random(m_options.seed, 302);
   const double length = m_options.speed * m_options.duration + 6;
-  for (double x = 0.25 * m_wave_length, side = 1; x < length;
-       x += 0.5 * m_wave_length, side = -side) {
+  for (double x = 0.25 * m_wave_length, side = 1; x < length; x += 0.5 * m_wave_length, side = -side) {
     SimulatedTrunk trunk; // inside the bend, 1.2 to 1.7 m from the path
     trunk.radius = random.uniform(0.1, 0.25);
     trunk.foot = {x, side * (m_swing - random.uniform(1.2, 1.7)), 0};

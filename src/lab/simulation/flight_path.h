@@ -3,8 +3,8 @@
 /// \file
 /// Flights whose pose is known at every instant.
 
-#include <bole/pose.h>
 #include "lab/simulation/forest.h"
+#include <bole/pose.h>
 
 #include <string>
 #include <vector>

@@ -13,8 +13,7 @@ namespace
 void requireRange(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
   }
 }
 } // namespace
@@ -42,15 +41,13 @@ ImuSample SimulatedImu::measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3
 {
   ImuSample sample;
   sample.gyro = rate + m_bias + m_random.normal3(m_options.gyro_noise);
-  sample.accelerometer = wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) +
-                         m_random.normal3(m_options.accelerometer_noise);
+  sample.accelerometer =
+      wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + m_random.normal3(m_options.accelerometer_noise);
   return sample;
 }
 
 PoseFilter::PoseFilter(const SensorOptions &options)
-    : m_options(options),
-      m_random(options.seed, 402),
-      m_scale(1 + options.odometry_scale * m_random.normal())
+    : m_options(options), m_random(options.seed, 402), m_scale(1 + options.odometry_scale * m_random.normal())
 {
   options.validate();
 }

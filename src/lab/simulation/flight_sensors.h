@@ -4,8 +4,8 @@
 /// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on
 /// board.
 
-#include <bole/pose.h>
 #include "lab/simulation/random.h"
+#include <bole/pose.h>
 
 namespace bole
 {
@@ -14,8 +14,8 @@ namespace bole
 struct SensorOptions
 {
   std::uint64_t seed = 1;
-  double gyro_noise = 0.01; ///< standard deviation a sample [rad/s], 0 to 1
-  double gyro_bias = 0.006; ///< standard deviation of the constant bias an axis [rad/s], 0 to 1
+  double gyro_noise = 0.01;           ///< standard deviation a sample [rad/s], 0 to 1
+  double gyro_bias = 0.006;           ///< standard deviation of the constant bias an axis [rad/s], 0 to 1
   double accelerometer_noise = 0.1;   ///< standard deviation a sample [m/s^2], 0 to 10
   double odometry_step_noise = 0.012; ///< of a frame's horizontal step, an axis [m], 0 to 1
   double odometry_scale = 0.02;       ///< standard deviation of the scale error, 0 to 0.5
@@ -39,8 +39,7 @@ public:
   explicit SimulatedImu(const SensorOptions &options);
   /// \param rate angular rate in the body frame [rad/s]; \param acceleration of the body in the
   /// world [m/s^2].
-  ImuSample measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
-                    const Eigen::Vector3d &acceleration);
+  ImuSample measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate, const Eigen::Vector3d &acceleration);
 
 private:
   SensorOptions m_options;

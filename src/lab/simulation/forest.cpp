@@ -14,8 +14,7 @@ namespace bole
 namespace
 {
 constexpr double kBreastHeight = 1.3;
-constexpr double kFarRadius =
-    70; ///< of the scenery [m]: beyond, haze and the size of a pixel hide a trunk
+constexpr double kFarRadius = 70;     ///< of the scenery [m]: beyond, haze and the size of a pixel hide a trunk
 constexpr double kFarDensity = 0.018; ///< at most, trunks a m^2: seen edge on it is already a wall
 constexpr double kSpacing = 0.8;      ///< between two trunks [m]
 
@@ -41,8 +40,7 @@ double distanceToPath(const Eigen::Vector2d &p, const std::vector<Eigen::Vector3
 SimulatedTrunk grow(Random &random, const ForestOptions &options)
 {
   SimulatedTrunk trunk;
-  trunk.radius = std::clamp(
-      options.radius_median * std::exp(options.radius_spread * random.normal()), 0.06, 0.45);
+  trunk.radius = std::clamp(options.radius_median * std::exp(options.radius_spread * random.normal()), 0.06, 0.45);
   const double lean = std::tan(options.lean_deg * M_PI / 180);
   trunk.lean = {lean * random.normal(), lean * random.normal()};
   trunk.bow = {options.bow * random.normal(), options.bow * random.normal()};
@@ -52,8 +50,7 @@ SimulatedTrunk grow(Random &random, const ForestOptions &options)
   trunk.crown_base = random.uniform(2.8, 7);
   trunk.crown_radius = random.uniform(1.1, 2.3);
   trunk.shade = random.uniform(0.75, 1.3);
-  const bool bright =
-      options.bark == Bark::bright || (options.bark == Bark::mixed && random.uniform() < 0.5);
+  const bool bright = options.bark == Bark::bright || (options.bark == Bark::mixed && random.uniform() < 0.5);
   trunk.bright = bright;
   return trunk;
 }
@@ -68,9 +65,8 @@ bool isFree(const Eigen::Vector2d &p, const std::vector<SimulatedTrunk> &trunks,
 /// Darts thrown at the rectangle \p low, \p high until \p count trunks stand, or there is no more
 /// room.
 template <class Accept>
-void throwTrunks(Forest &forest, std::vector<SimulatedTrunk> &trunks, std::uint64_t stream,
-                 int first_id, double count, const Eigen::Vector2d &low,
-                 const Eigen::Vector2d &high, const Accept &accept)
+void throwTrunks(Forest &forest, std::vector<SimulatedTrunk> &trunks, std::uint64_t stream, int first_id, double count,
+                 const Eigen::Vector2d &low, const Eigen::Vector2d &high, const Accept &accept)
 {
   Random random(forest.options.seed, stream);
   const std::size_t wanted = static_cast<std::size_t>(std::lround(count)) + trunks.size();
@@ -123,18 +119,14 @@ void placeSun(Forest &forest)
 void requireRange(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
   }
 }
 } // namespace
 
 const char *toString(Light light) { return light == Light::sun ? "sun" : "overcast"; }
 
-const char *toString(Bark bark)
-{
-  return bark == Bark::dark ? "dark" : bark == Bark::bright ? "bright" : "mixed";
-}
+const char *toString(Bark bark) { return bark == Bark::dark ? "dark" : bark == Bark::bright ? "bright" : "mixed"; }
 
 void ForestOptions::validate() const
 {
@@ -155,8 +147,7 @@ void ForestOptions::validate() const
 Eigen::Vector3d SimulatedTrunk::axisAt(double h) const
 {
   const double arch = 4 * h / height * (1 - h / height);
-  return {foot.x() + lean.x() * h + bow.x() * arch, foot.y() + lean.y() * h + bow.y() * arch,
-          foot.z() + h};
+  return {foot.x() + lean.x() * h + bow.x() * arch, foot.y() + lean.y() * h + bow.y() * arch, foot.z() + h};
 }
 
 double SimulatedTrunk::radiusAt(double h) const
@@ -222,19 +213,16 @@ Forest Forest::plant(const ForestOptions &options, const std::vector<Eigen::Vect
     forest.trunks.push_back(trunk);
   }
   const double area = (forest.near_max - forest.near_min).prod();
-  throwTrunks(forest, forest.trunks, kNear, 0, options.density * area, forest.near_min,
-              forest.near_max, [&](const Eigen::Vector2d &p, const SimulatedTrunk &trunk) {
-                return distanceToPath(p, path) >
-                       options.clearance + trunk.radius * (1 + 0.3 * trunk.flare);
+  throwTrunks(forest, forest.trunks, kNear, 0, options.density * area, forest.near_min, forest.near_max,
+              [&](const Eigen::Vector2d &p, const SimulatedTrunk &trunk) {
+                return distanceToPath(p, path) > options.clearance + trunk.radius * (1 + 0.3 * trunk.flare);
               });
   const Eigen::Vector2d reach(kFarRadius, kFarRadius);
   const Eigen::Vector2d low = forest.near_min - reach, high = forest.near_max + reach;
   const double far_area = (high - low).prod() - area;
-  throwTrunks(forest, forest.far_trunks, kFar, 10000,
-              std::min(options.density * 0.3, kFarDensity) * far_area, low, high,
-              [&](const Eigen::Vector2d &p, const SimulatedTrunk &) {
-                return (p.array() < forest.near_min.array()).any() ||
-                       (p.array() > forest.near_max.array()).any();
+  throwTrunks(forest, forest.far_trunks, kFar, 10000, std::min(options.density * 0.3, kFarDensity) * far_area, low,
+              high, [&](const Eigen::Vector2d &p, const SimulatedTrunk &) {
+                return (p.array() < forest.near_min.array()).any() || (p.array() > forest.near_max.array()).any();
               });
   plantUndergrowth(forest, path);
   return forest;

@@ -30,7 +30,7 @@ const char *toString(Bark bark);
 struct ForestOptions
 {
   std::uint64_t seed = 1; ///< same seed and options, same forest to the last bit
-  double density = 0.06; ///< trunks a m^2 near the path, 0 to 0.3: managed stands have 0.03 to 0.12
+  double density = 0.06;  ///< trunks a m^2 near the path, 0 to 0.3: managed stands have 0.03 to 0.12
   Light light = Light::overcast;
   Bark bark = Bark::dark;
   double radius_median = 0.15;   ///< of the trunks at breast height, 0.02 to 1
@@ -42,9 +42,8 @@ struct ForestOptions
   double undergrowth = 0.05;     ///< bushes a m^2, 0 to 1
   double saplings = 0.01;        ///< stems of 1 to 2.5 cm a m^2, not part of the truth, 0 to 1
   double ground_amplitude = 0.1; ///< of the unevenness of the ground, 0 to 1
-  double margin =
-      14; ///< trunks as near as this to the path's bounding box are part of the truth, 5 to 40
-  double clearance = 0.7; ///< free space between path and bark, 0 to 3
+  double margin = 14;            ///< trunks as near as this to the path's bounding box are part of the truth, 5 to 40
+  double clearance = 0.7;        ///< free space between path and bark, 0 to 3
 
   /// Throws vpException "name = value, must be ...".
   void validate() const;

@@ -53,16 +53,14 @@ void addTrunk(ForestMesh &mesh, const SimulatedTrunk &trunk, std::uint16_t index
     for (int side = 0; ring > 0 && side < sides; ++side) {
       const int next = (side + 1) % sides;
       mesh.bark.addQuad(below + side, below + next, first + next, first + side);
-      mesh.bark_quads.push_back(
-          {index, static_cast<std::uint16_t>(side), static_cast<std::uint16_t>(sides),
-           static_cast<float>(heights[ring - 1]), static_cast<float>(heights[ring])});
+      mesh.bark_quads.push_back({index, static_cast<std::uint16_t>(side), static_cast<std::uint16_t>(sides),
+                                 static_cast<float>(heights[ring - 1]), static_cast<float>(heights[ring])});
     }
     below = first;
   }
 }
 
-void addLeaf(ForestMesh &mesh, const Eigen::Vector3d &centre, double size, double albedo,
-             Random &random)
+void addLeaf(ForestMesh &mesh, const Eigen::Vector3d &centre, double size, double albedo, Random &random)
 {
   const Eigen::Vector3d normal = random.normal3(1).normalized();
   const Eigen::Vector3d u = normal.unitOrthogonal() * size * random.uniform(0.6, 1.2);
@@ -74,8 +72,7 @@ void addLeaf(ForestMesh &mesh, const Eigen::Vector3d &centre, double size, doubl
 }
 
 /// A thin prism of three sides.
-void addTwig(ForestMesh &mesh, const Eigen::Vector3d &from, const Eigen::Vector3d &to,
-             double radius, double albedo)
+void addTwig(ForestMesh &mesh, const Eigen::Vector3d &from, const Eigen::Vector3d &to, double radius, double albedo)
 {
   const Eigen::Vector3d axis = (to - from).normalized();
   const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
@@ -99,8 +96,7 @@ Eigen::Vector3d inCrown(Random &random)
   return direction * std::pow(random.uniform(), 0.25);
 }
 
-void addCrown(ForestMesh &mesh, const SimulatedTrunk &trunk, int leaves, double leaf_size,
-              bool twigs, Random &random)
+void addCrown(ForestMesh &mesh, const SimulatedTrunk &trunk, int leaves, double leaf_size, bool twigs, Random &random)
 {
   const double half = 0.5 * (trunk.height - trunk.crown_base);
   const double middle = trunk.crown_base + half;
@@ -119,8 +115,7 @@ void addCrown(ForestMesh &mesh, const SimulatedTrunk &trunk, int leaves, double 
     const Eigen::Vector3d tip = trunk.axisAt(h) + length * out;
     addTwig(mesh, trunk.axisAt(h), tip, 0.012 + 0.08 * trunk.radius, 0.12 * trunk.shade);
     for (int leaf = 0; leaf < 5; ++leaf) {
-      addLeaf(mesh, tip - out * random.uniform(0, 0.4) + random.normal3(0.1), 0.09,
-              random.uniform(0.06, 0.18), random);
+      addLeaf(mesh, tip - out * random.uniform(0, 0.4) + random.normal3(0.1), 0.09, random.uniform(0.06, 0.18), random);
     }
   }
 }
@@ -132,21 +127,18 @@ void addBush(ForestMesh &mesh, const Bush &bush, Random &random)
     p.z() = std::abs(p.z());
     const Eigen::Vector3d centre =
         bush.foot + Eigen::Vector3d(bush.radius * p.x(), bush.radius * p.y(), bush.height * p.z());
-    addLeaf(mesh, centre, random.uniform(0.04, 0.1), bush.shade * random.uniform(0.06, 0.22),
-            random);
+    addLeaf(mesh, centre, random.uniform(0.04, 0.1), bush.shade * random.uniform(0.06, 0.22), random);
   }
 }
 
 void addSapling(ForestMesh &mesh, const Sapling &sapling, Random &random)
 {
-  const Eigen::Vector3d top =
-      sapling.foot + sapling.height * Eigen::Vector3d(sapling.lean.x(), sapling.lean.y(), 1);
-  addTwig(mesh, sapling.foot - Eigen::Vector3d(0, 0, 0.1), top, sapling.radius,
-          random.uniform(0.08, 0.25));
+  const Eigen::Vector3d top = sapling.foot + sapling.height * Eigen::Vector3d(sapling.lean.x(), sapling.lean.y(), 1);
+  addTwig(mesh, sapling.foot - Eigen::Vector3d(0, 0, 0.1), top, sapling.radius, random.uniform(0.08, 0.25));
   for (int k = 0; k < 14; ++k) {
     const double along = random.uniform(0.45, 1.05);
-    addLeaf(mesh, sapling.foot + along * (top - sapling.foot) + random.normal3(0.13), 0.06,
-            random.uniform(0.06, 0.2), random);
+    addLeaf(mesh, sapling.foot + along * (top - sapling.foot) + random.normal3(0.13), 0.06, random.uniform(0.06, 0.2),
+            random);
   }
 }
 

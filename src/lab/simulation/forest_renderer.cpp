@@ -22,8 +22,7 @@ constexpr double kDepthReach = 65; ///< [m]
 void requireRange(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
   }
 }
 
@@ -43,8 +42,7 @@ public:
   Eigen::Vector2f at(int column, int row, float fu, float fv) const
   {
     const Eigen::Vector2f *p = &m_xy[static_cast<std::size_t>(row) * m_stride + column];
-    return (p[0] * (1 - fu) + p[1] * fu) * (1 - fv) +
-           (p[m_stride] * (1 - fu) + p[m_stride + 1] * fu) * fv;
+    return (p[0] * (1 - fu) + p[1] * fu) * (1 - fv) + (p[m_stride] * (1 - fu) + p[m_stride + 1] * fu) * fv;
   }
 
 private:
@@ -58,11 +56,9 @@ private:
       residual = u_px - camera.distort(xy);
     }
     if (!(residual.norm() < 0.01)) {
-      throw vpException(
-          vpException::badValue,
-          fmt::format(
-              "distortion = no ray reaches pixel ({}, {}), must be a lens that covers the image",
-              u_px.x(), u_px.y()));
+      throw vpException(vpException::badValue,
+                        fmt::format("distortion = no ray reaches pixel ({}, {}), must be a lens that covers the image",
+                                    u_px.x(), u_px.y()));
     }
     return xy;
   }
@@ -107,7 +103,9 @@ RayTiles tilesOf(const RayTable &table, const PinholeCamera &camera, int sample)
 float azimuthOf(float x, float y)
 {
   const float ax = std::abs(x), ay = std::abs(y), t = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-20f), t2 = t * t;
-  float angle = t * (0.99997726f + t2 * (-0.33262347f + t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
+  float angle =
+      t * (0.99997726f +
+           t2 * (-0.33262347f + t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
   angle = ay > ax ? 1.57079633f - angle : angle;
   angle = x < 0 ? 3.14159265f - angle : angle;
   return y < 0 ? -angle : angle;
@@ -162,8 +160,7 @@ ForestRenderer::State::State(const Forest &forest_, const RendererOptions &optio
       smooth(smoothBark(forest.options.seed)),
       cover(groundCover(forest.options.seed)),
       sensor(options),
-      radiance(static_cast<std::size_t>(options.camera.pinhole.width) *
-               options.camera.pinhole.height)
+      radiance(static_cast<std::size_t>(options.camera.pinhole.width) * options.camera.pinhole.height)
 {
   const RayTable table(options.camera);
   for (int sample = 0; sample < options.samples_per_pixel; ++sample)
@@ -178,8 +175,7 @@ ForestRenderer::State::State(const Forest &forest_, const RendererOptions &optio
 const SimulatedTrunk &ForestRenderer::State::trunkAt(unsigned quad) const
 {
   const std::size_t index = mesh.bark_quads[quad].trunk;
-  return index < forest.trunks.size() ? forest.trunks[index]
-                                      : forest.far_trunks[index - forest.trunks.size()];
+  return index < forest.trunks.size() ? forest.trunks[index] : forest.far_trunks[index - forest.trunks.size()];
 }
 
 /// Rays of the 4x4 pixels whose directions stand at \p first of \p tiles. The parameter of a ray is its depth along the
@@ -228,8 +224,7 @@ float ForestRenderer::State::shadeGround(const Eigen::Vector3f &p, float distanc
   const float footprint = 1.7f * distance * pixel_angle; // seen at a grazing angle
   const float fine = cover.at(p.x() * 90, p.y() * 90, footprint * 90);
   const float wide = cover.at(300 + p.y() * 7, p.x() * 7, footprint * 7);
-  const LightGrid &grid =
-      light.near_ground.contains(p.x(), p.y()) ? light.near_ground : light.far_ground;
+  const LightGrid &grid = light.near_ground.contains(p.x(), p.y()) ? light.near_ground : light.far_ground;
   return ground_albedo * fine * (0.5f + 0.5f * wide) * grid.at(p.x(), p.y());
 }
 
@@ -242,8 +237,7 @@ float ForestRenderer::State::shadeBark(unsigned quad, float u, float v, float di
   const NoiseTexture &texture = trunk.bright ? smooth : furrowed;
   const float texels_per_m = 256 / (6.2832f * static_cast<float>(std::max(0.12, trunk.radius)));
   const float footprint = distance * pixel_angle * texels_per_m;
-  const float grain = texture.at(256 * turn + 37.f * bark.trunk,
-                                 height * texels_per_m + 211.f * bark.trunk, footprint);
+  const float grain = texture.at(256 * turn + 37.f * bark.trunk, height * texels_per_m + 211.f * bark.trunk, footprint);
   const float albedo = (trunk.bright ? 0.45f : 0.17f) * static_cast<float>(trunk.shade);
   return albedo * grain * light.bark[bark.trunk].at(turn, height);
 }
@@ -291,8 +285,7 @@ void ForestRenderer::State::trace(const Pose &wMc_open, const Pose &wMc_close)
         scene.intersect(valid, packet);
         for (int k = 0; k < 16; ++k) {
           if (valid[k]) {
-            radiance[static_cast<std::size_t>(row + (k >> 2)) * width + column + (k & 3)] +=
-                shade(packet, k);
+            radiance[static_cast<std::size_t>(row + (k >> 2)) * width + column + (k & 3)] += shade(packet, k);
           }
         }
       }
@@ -344,8 +337,7 @@ ForestRenderer &ForestRenderer::operator=(ForestRenderer &&) noexcept = default;
 
 const CameraModel &ForestRenderer::camera() const { return m_state->options.camera; }
 
-void ForestRenderer::render(const Pose &wMc_open, const Pose &wMc_close, RenderedFrame &frame,
-                            bool with_truth)
+void ForestRenderer::render(const Pose &wMc_open, const Pose &wMc_close, RenderedFrame &frame, bool with_truth)
 {
   m_state->trace(wMc_open, wMc_close);
   frame.gain = m_state->sensor.expose(m_state->radiance, frame.image);

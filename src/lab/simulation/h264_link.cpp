@@ -96,13 +96,11 @@ void H264Link::State::openEncoder(int width, int height, double rate_hz, double 
 H264Link::H264Link(int width, int height, double rate_hz, double kbps)
 {
   if (width % 2 || height % 2 || width < 16 || height < 16) {
-    throw vpException(
-        vpException::badValue,
-        fmt::format("image size = {}x{}, must be even for H.264 and at least 16", width, height));
+    throw vpException(vpException::badValue,
+                      fmt::format("image size = {}x{}, must be even for H.264 and at least 16", width, height));
   }
   if (!(kbps >= 50 && kbps <= 20000)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("h264_kbps = {}, must be 50 to 20000", kbps));
+    throw vpException(vpException::badValue, fmt::format("h264_kbps = {}, must be 50 to 20000", kbps));
   }
   m_state = std::make_unique<State>(width, height, rate_hz, kbps);
 }
@@ -116,20 +114,17 @@ std::size_t H264Link::lastBytes() const { return m_state->bytes; }
 void H264Link::pass(vpImage<unsigned char> &image)
 {
   State &s = *m_state;
-  const unsigned width = static_cast<unsigned>(s.sent->width),
-                 height = static_cast<unsigned>(s.sent->height);
+  const unsigned width = static_cast<unsigned>(s.sent->width), height = static_cast<unsigned>(s.sent->height);
   if (image.getWidth() != width || image.getHeight() != height) {
-    throw vpException(vpException::dimensionError,
-                      fmt::format("image size = {}x{}, must be {}x{}", image.getWidth(),
-                                  image.getHeight(), width, height));
+    throw vpException(vpException::dimensionError, fmt::format("image size = {}x{}, must be {}x{}", image.getWidth(),
+                                                               image.getHeight(), width, height));
   }
   check(av_frame_make_writable(s.sent.get()), "frame");
   for (unsigned row = 0; row < height; ++row) {
     std::memcpy(s.sent->data[0] + row * s.sent->linesize[0], image[row], width);
   }
   for (int plane = 1; plane < 3; ++plane) {
-    std::memset(s.sent->data[plane], 128,
-                static_cast<std::size_t>(s.sent->linesize[plane]) * (height / 2));
+    std::memset(s.sent->data[plane], 128, static_cast<std::size_t>(s.sent->linesize[plane]) * (height / 2));
   }
   s.sent->pts = s.count++;
   check(avcodec_send_frame(s.encoder.get(), s.sent.get()), "encoding");

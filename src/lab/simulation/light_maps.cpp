@@ -12,8 +12,7 @@ namespace bole
 {
 namespace
 {
-constexpr double kGroundBounce =
-    0.14; ///< light that comes back from the ground, relative to the sky's
+constexpr double kGroundBounce = 0.14; ///< light that comes back from the ground, relative to the sky's
 
 /// Part of the sky that a point sees, weighted by the cosine to its normal; a few fixed directions.
 double skyShare(const RayScene &scene, const Eigen::Vector3d &point, const Eigen::Vector3d &normal)
@@ -54,19 +53,15 @@ template <class Value> void fill(LightGrid &grid, const Value &value)
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
       const double x = grid.x0 + column / grid.cells_per_m, y = grid.y0 + row / grid.cells_per_m;
-      grid.values[static_cast<std::size_t>(row) * grid.columns + column] =
-          static_cast<float>(value(x, y));
+      grid.values[static_cast<std::size_t>(row) * grid.columns + column] = static_cast<float>(value(x, y));
     }
   }
 }
 
-LightGrid groundLight(const Forest &forest, const RayScene &scene, const LightMaps &maps,
-                      const Eigen::Vector2d &low, const Eigen::Vector2d &high, double cell,
-                      double sky_cell)
+LightGrid groundLight(const Forest &forest, const RayScene &scene, const LightMaps &maps, const Eigen::Vector2d &low,
+                      const Eigen::Vector2d &high, double cell, double sky_cell)
 {
-  const auto above = [&](double x, double y) {
-    return Eigen::Vector3d(x, y, forest.terrain.height(x, y) + 0.03);
-  };
+  const auto above = [&](double x, double y) { return Eigen::Vector3d(x, y, forest.terrain.height(x, y) + 0.03); };
   LightGrid sky = emptyGrid(low, high, sky_cell);
   fill(sky, [&](double x, double y) {
     return maps.sky * (0.15 + 0.85 * skyShare(scene, above(x, y), Eigen::Vector3d::UnitZ()));
@@ -96,26 +91,24 @@ template <class Value> void fill(BarkLight &map, const Value &value)
 {
   for (int row = 0; row < map.rows; ++row) {
     for (int column = 0; column < map.columns; ++column) {
-      map.values[static_cast<std::size_t>(row) * map.columns + column] = static_cast<float>(value(
-          static_cast<float>(column) / map.columns, static_cast<float>(row) / map.rows_per_m));
+      map.values[static_cast<std::size_t>(row) * map.columns + column] =
+          static_cast<float>(value(static_cast<float>(column) / map.columns, static_cast<float>(row) / map.rows_per_m));
     }
   }
 }
 
-BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const RayScene &scene,
-                    const LightMaps &maps, bool far)
+BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const RayScene &scene, const LightMaps &maps,
+                    bool far)
 {
   const auto pointAndNormal = [&trunk](double turn, double height) {
     const Eigen::Vector3d normal(std::cos(2 * M_PI * turn), std::sin(2 * M_PI * turn), 0);
-    return std::pair(
-        Eigen::Vector3d(trunk.axisAt(height) + (trunk.radiusAt(height) + 0.02) * normal), normal);
+    return std::pair(Eigen::Vector3d(trunk.axisAt(height) + (trunk.radiusAt(height) + 0.02) * normal), normal);
   };
   const double reach = far ? 10 : 8;
   BarkLight sky = emptyBark(8, far ? 2 : 6, reach);
   fill(sky, [&](double turn, double height) {
     const auto [point, normal] = pointAndNormal(turn, std::max(0.1, height));
-    return maps.sky * (0.12 + kGroundBounce + 1.0 * skyShare(scene, point, normal)) +
-           kGroundBounce * maps.sun * 0.4;
+    return maps.sky * (0.12 + kGroundBounce + 1.0 * skyShare(scene, point, normal)) + kGroundBounce * maps.sun * 0.4;
   });
   BarkLight map = far ? emptyBark(8, 4, reach) : emptyBark(32, 100, reach);
   fill(map, [&](float turn, float height) {
@@ -130,16 +123,14 @@ BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const Ray
   return map;
 }
 
-std::vector<float> leafLight(const Forest &forest, const ForestMesh &mesh, const RayScene &scene,
-                             const LightMaps &maps)
+std::vector<float> leafLight(const Forest &forest, const ForestMesh &mesh, const RayScene &scene, const LightMaps &maps)
 {
   std::vector<float> light(mesh.leaves.size());
   for (std::size_t k = 0; k < light.size(); ++k) {
     const auto corner = [&](int n) {
       return mesh.leaves.vertices[mesh.leaves.indices[4 * k + n]].cast<double>().eval();
     };
-    const Eigen::Vector3d normal =
-        (corner(2) - corner(0)).cross(corner(3) - corner(1)).normalized();
+    const Eigen::Vector3d normal = (corner(2) - corner(0)).cross(corner(3) - corner(1)).normalized();
     const Eigen::Vector3d centre = 0.25 * (corner(0) + corner(1) + corner(2) + corner(3));
     double value = maps.sky * (0.35 + 0.4 * std::abs(normal.z()));
     if (maps.sun > 0 && !scene.occluded(centre + 0.03 * forest.to_sun, forest.to_sun)) {
@@ -158,20 +149,17 @@ float LightGrid::at(float x, float y) const
   const int column = static_cast<int>(u), row = static_cast<int>(v);
   const float fu = u - column, fv = v - row;
   const float *p = &values[static_cast<std::size_t>(row) * columns + column];
-  return (p[0] * (1 - fu) + p[1] * fu) * (1 - fv) +
-         (p[columns] * (1 - fu) + p[columns + 1] * fu) * fv;
+  return (p[0] * (1 - fu) + p[1] * fu) * (1 - fv) + (p[columns] * (1 - fu) + p[columns + 1] * fu) * fv;
 }
 
 float BarkLight::at(float turn, float height) const
 {
   const float u = (turn - std::floor(turn)) * columns;
   const float v = std::clamp(height * rows_per_m, 0.f, rows - 1.001f);
-  const int column = static_cast<int>(u) % columns, next = (column + 1) % columns,
-            row = static_cast<int>(v);
+  const int column = static_cast<int>(u) % columns, next = (column + 1) % columns, row = static_cast<int>(v);
   const float fu = u - std::floor(u), fv = v - row;
   const float *low = &values[static_cast<std::size_t>(row) * columns], *high = low + columns;
-  return (low[column] * (1 - fu) + low[next] * fu) * (1 - fv) +
-         (high[column] * (1 - fu) + high[next] * fu) * fv;
+  return (low[column] * (1 - fu) + low[next] * fu) * (1 - fv) + (high[column] * (1 - fu) + high[next] * fu) * fv;
 }
 
 LightMaps::LightMaps(const Forest &forest, const ForestMesh &mesh, const RayScene &scene)
@@ -181,8 +169,7 @@ LightMaps::LightMaps(const Forest &forest, const ForestMesh &mesh, const RayScen
   sky = sunny ? 0.45f : 1.f;
   near_ground = groundLight(forest, scene, *this, forest.near_min, forest.near_max, 0.1, 0.7);
   const Eigen::Vector2d reach(90, 90);
-  far_ground =
-      groundLight(forest, scene, *this, forest.near_min - reach, forest.near_max + reach, 0.6, 6);
+  far_ground = groundLight(forest, scene, *this, forest.near_min - reach, forest.near_max + reach, 0.6, 6);
   for (const SimulatedTrunk &trunk : forest.trunks) {
     bark.push_back(barkLight(forest, trunk, scene, *this, false));
   }

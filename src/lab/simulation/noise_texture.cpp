@@ -12,8 +12,8 @@ namespace
 {
 /// Periodic value noise with \p cells_u x \p cells_v random values over the texture, added to \p
 /// texels.
-void addNoise(std::vector<float> &texels, int columns, int rows, int cells_u, int cells_v,
-              float amplitude, Random &random)
+void addNoise(std::vector<float> &texels, int columns, int rows, int cells_u, int cells_v, float amplitude,
+              Random &random)
 {
   std::vector<float> grid(static_cast<std::size_t>(cells_u) * cells_v);
   for (float &value : grid) {
@@ -30,8 +30,7 @@ void addNoise(std::vector<float> &texels, int columns, int rows, int cells_u, in
       const float fx = smooth(x - x0);
       const float low = grid[y0 * cells_u + x0] * (1 - fx) + grid[y0 * cells_u + x1] * fx;
       const float high = grid[y1 * cells_u + x0] * (1 - fx) + grid[y1 * cells_u + x1] * fx;
-      texels[static_cast<std::size_t>(row) * columns + column] +=
-          amplitude * (low * (1 - fy) + high * fy);
+      texels[static_cast<std::size_t>(row) * columns + column] += amplitude * (low * (1 - fy) + high * fy);
     }
   }
 }
@@ -60,8 +59,7 @@ NoiseTexture::NoiseTexture(int columns, int rows, std::vector<float> texels)
     for (int row = 0; row < height; ++row) {
       for (int column = 0; column < width; ++column) {
         const float *p = &fine[static_cast<std::size_t>(2 * row) * columns + 2 * column];
-        coarse[static_cast<std::size_t>(row) * width + column] =
-            0.25f * (p[0] + p[1] + p[columns] + p[columns + 1]);
+        coarse[static_cast<std::size_t>(row) * width + column] = 0.25f * (p[0] + p[1] + p[columns] + p[columns + 1]);
       }
     }
     columns = width;
@@ -106,12 +104,8 @@ NoiseTexture groundCover(std::uint64_t seed)
   constexpr int kSize = 1024;
   Random random(seed, 103);
   std::vector<float> texels(kSize * kSize, 0.f);
-  for (const auto &[cells, amplitude] : {std::pair(8, 0.12f),
-                                         {32, 0.10f},
-                                         {128, 0.13f},
-                                         {256, 0.18f},
-                                         {512, 0.22f},
-                                         {1024, 0.24f}}) {
+  for (const auto &[cells, amplitude] :
+       {std::pair(8, 0.12f), {32, 0.10f}, {128, 0.13f}, {256, 0.18f}, {512, 0.22f}, {1024, 0.24f}}) {
     addNoise(texels, kSize, kSize, cells, cells, amplitude, random);
   }
   return NoiseTexture(kSize, kSize, exponential(std::move(texels)));

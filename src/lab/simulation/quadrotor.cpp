@@ -12,9 +12,9 @@ namespace bole
 namespace
 {
 constexpr double kGravity = 9.81;
-constexpr double kStanding = 0.05;   ///< height of the body's origin when it stands [m]
+constexpr double kStanding = 0.05;    ///< height of the body's origin when it stands [m]
 constexpr double kLandingSpeed = 0.4; ///< [m/s]
-constexpr double kHeightGain = 1.5;  ///< of the held height [1/s]
+constexpr double kHeightGain = 1.5;   ///< of the held height [1/s]
 constexpr double kLargestClimb = 1.5; ///< what the motors can [m/s]
 
 Eigen::Vector2d noise(Random &random, double sigma)
@@ -53,8 +53,11 @@ void QuadrotorOptions::validate() const
 }
 
 Quadrotor::Quadrotor(const QuadrotorOptions &options, const Eigen::Vector2d &xy, double heading, double ground)
-  : m_options(options), m_random(options.seed, 501), m_ground(ground), m_yaw(heading),
-    m_position(xy.x(), xy.y(), ground + kStanding)
+    : m_options(options),
+      m_random(options.seed, 501),
+      m_ground(ground),
+      m_yaw(heading),
+      m_position(xy.x(), xy.y(), ground + kStanding)
 {
   options.validate();
 }
@@ -66,10 +69,10 @@ void Quadrotor::command(const QuadrotorCommand &command)
 
 Pose Quadrotor::pose() const
 {
-  const Eigen::Matrix3d R = (Eigen::AngleAxisd(m_yaw, Eigen::Vector3d::UnitZ()) *
-                             Eigen::AngleAxisd(m_lean.x(), Eigen::Vector3d::UnitY()) *
-                             Eigen::AngleAxisd(-m_lean.y(), Eigen::Vector3d::UnitX()))
-                                .toRotationMatrix();
+  const Eigen::Matrix3d R =
+      (Eigen::AngleAxisd(m_yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(m_lean.x(), Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(-m_lean.y(), Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
   return {R, m_position};
 }
 
@@ -147,7 +150,8 @@ void Quadrotor::step(double dt)
 
   const Eigen::Vector3d up = pose().R.col(2);
   const double climbing = (wantedClimb(m_command) - m_velocity.z()) / m_options.climb_lag;
-  m_acceleration.head<2>() = (kGravity + climbing) / up.z() * up.head<2>() - m_options.drag * m_velocity.head<2>() + m_gust;
+  m_acceleration.head<2>() =
+      (kGravity + climbing) / up.z() * up.head<2>() - m_options.drag * m_velocity.head<2>() + m_gust;
   m_acceleration.z() = climbing;
   m_velocity += dt * m_acceleration;
   m_position += dt * m_velocity;

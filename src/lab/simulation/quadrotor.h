@@ -5,12 +5,13 @@
 ///
 /// Idea: an AR.Drone's firmware takes tilts, a rate of climb and a rate of turn, and closes the fast loops itself. So
 /// the body is what is left for a user to feel: a second-order attitude loop, thrust along z of the body, drag, lags in
-/// climb and turn, limits, a command that comes late, gusts, and a hover of its own on the velocity of its floor camera.
+/// climb and turn, limits, a command that comes late, gusts, and a hover of its own on the velocity of its floor
+/// camera.
 ///
 /// Frames: w world (z up), b body (x forward, y left, z up). SI.
 
-#include <bole/pose.h>
 #include "lab/simulation/random.h"
+#include <bole/pose.h>
 
 #include <deque>
 
@@ -21,18 +22,18 @@ namespace bole
 struct QuadrotorOptions
 {
   std::uint64_t seed = 1;
-  double largest_tilt = 0.28;   ///< [rad], 0.02 to 1
-  double tilt_frequency = 10;   ///< natural frequency of the attitude loop [rad/s], 1 to 60
-  double tilt_damping = 0.8;    ///< 0.2 to 3
-  double drag = 0.25;           ///< [1/s], 0 to 5
-  double climb_lag = 0.35;      ///< time constant of the rate of climb [s], 0.02 to 5
-  double turn_lag = 0.2;        ///< time constant of the rate of turn [s], 0.02 to 5
-  double command_delay = 0.04;  ///< radio and firmware [s], 0 to 1
-  double hover_gain = 1.5;      ///< braking of the drone's own hover [1/s], 0 to 10
-  double takeoff_height = 1.2;  ///< over the place it stood [m], 0.3 to 5
-  double gust = 0.05;           ///< standard deviation of the wind's push, horizontal axis [m/s^2], 0 to 5: calm
-  double gust_time = 1;         ///< its correlation time [s], 0.05 to 60
-  double velocity_noise = 0.03; ///< of the velocity that it measures itself, an axis [m/s], 0 to 1
+  double largest_tilt = 0.28;       ///< [rad], 0.02 to 1
+  double tilt_frequency = 10;       ///< natural frequency of the attitude loop [rad/s], 1 to 60
+  double tilt_damping = 0.8;        ///< 0.2 to 3
+  double drag = 0.25;               ///< [1/s], 0 to 5
+  double climb_lag = 0.35;          ///< time constant of the rate of climb [s], 0.02 to 5
+  double turn_lag = 0.2;            ///< time constant of the rate of turn [s], 0.02 to 5
+  double command_delay = 0.04;      ///< radio and firmware [s], 0 to 1
+  double hover_gain = 1.5;          ///< braking of the drone's own hover [1/s], 0 to 10
+  double takeoff_height = 1.2;      ///< over the place it stood [m], 0.3 to 5
+  double gust = 0.05;               ///< standard deviation of the wind's push, horizontal axis [m/s^2], 0 to 5: calm
+  double gust_time = 1;             ///< its correlation time [s], 0.05 to 60
+  double velocity_noise = 0.03;     ///< of the velocity that it measures itself, an axis [m/s], 0 to 1
   double velocity_noise_time = 0.3; ///< correlation time of that [s], 0.01 to 10
 
   /// Throws vpException "name = value, must be ...".
@@ -42,11 +43,11 @@ struct QuadrotorOptions
 /// What the firmware is told.
 struct QuadrotorCommand
 {
-  bool is_flying = false;                           ///< false: on the ground, or going there
-  bool is_hovering = true;                          ///< the firmware holds the place; the rest is ignored
-  Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   ///< shares of the largest tilt that push forward and left, -1 to 1
-  double climb = 0;                                 ///< [m/s]
-  double turn = 0;                                  ///< [rad/s]
+  bool is_flying = false;                         ///< false: on the ground, or going there
+  bool is_hovering = true;                        ///< the firmware holds the place; the rest is ignored
+  Eigen::Vector2d tilt = Eigen::Vector2d::Zero(); ///< shares of the largest tilt that push forward and left, -1 to 1
+  double climb = 0;                               ///< [m/s]
+  double turn = 0;                                ///< [rad/s]
 };
 
 /// Laws (each a test): tilted for long, the speed is g tan(tilt) / drag; the tilt never exceeds its limit by more than
@@ -63,12 +64,12 @@ public:
   void step(double dt);
 
   double time() const { return m_time; }
-  Pose pose() const; ///< wMb
+  Pose pose() const;                                                     ///< wMb
   const Eigen::Vector3d &velocity() const { return m_velocity; }         ///< world
   const Eigen::Vector3d &acceleration() const { return m_acceleration; } ///< world, without gravity
   /// Horizontal velocity in the body's heading (x forward, y left) as the floor camera measures it.
   Eigen::Vector2d measuredVelocity() const;
-  double tilt() const;                                 ///< of the body's z against the vertical [rad]
+  double tilt() const; ///< of the body's z against the vertical [rad]
   bool isInAir() const { return m_is_in_air; }
 
 private:

@@ -17,8 +17,7 @@ std::uint64_t mixed(std::uint64_t z)
 }
 } // namespace
 
-Random::Random(std::uint64_t seed, std::uint64_t stream)
-    : m_state(mixed(seed + kGamma) ^ mixed(mixed(stream) + kGamma))
+Random::Random(std::uint64_t seed, std::uint64_t stream) : m_state(mixed(seed + kGamma) ^ mixed(mixed(stream) + kGamma))
 {
 }
 

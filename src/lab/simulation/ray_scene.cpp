@@ -34,8 +34,8 @@ void RayScene::attach(const QuadMesh &mesh, unsigned id)
     return;
   }
   RTCGeometry geometry = rtcNewGeometry(m_device, RTC_GEOMETRY_TYPE_QUAD);
-  void *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                           3 * sizeof(float), mesh.vertices.size());
+  void *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                           mesh.vertices.size());
   std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * 3 * sizeof(float));
   void *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
                                           4 * sizeof(std::uint32_t), mesh.size());
@@ -45,8 +45,7 @@ void RayScene::attach(const QuadMesh &mesh, unsigned id)
   rtcReleaseGeometry(geometry);
 }
 
-bool RayScene::occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &direction,
-                        double reach) const
+bool RayScene::occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &direction, double reach) const
 {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);

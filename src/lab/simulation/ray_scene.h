@@ -25,8 +25,7 @@ public:
   RayScene &operator=(const RayScene &) = delete;
 
   /// True when something stands between \p from and infinity (or \p reach [m]) along \p direction.
-  bool occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &direction,
-                double reach = 200) const;
+  bool occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &direction, double reach = 200) const;
   /// Sixteen neighbouring rays at once. \p valid has -1 for the rays to trace.
   void intersect(const int *valid, RTCRayHit16 &rays) const;
 

@@ -134,17 +134,15 @@ public:
       }
     }
   }
-  [[noreturn]] void fail(const YAML::Node &node, const std::string &key,
-                         const std::string &wanted) const
+  [[noreturn]] void fail(const YAML::Node &node, const std::string &key, const std::string &wanted) const
   {
     const std::string value = node.IsScalar() && node.Scalar() != key ? " = " + node.Scalar() : "";
-    throw vpException(vpException::badValue, fmt::format("{}:{}: {}{}, must be {}", m_file,
-                                                         node.Mark().line + 1, key, value, wanted));
+    throw vpException(vpException::badValue,
+                      fmt::format("{}:{}: {}{}, must be {}", m_file, node.Mark().line + 1, key, value, wanted));
   }
 
 private:
-  template <class T>
-  void number(const YAML::Node &node, const char *key, T &field, const char *wanted) const
+  template <class T> void number(const YAML::Node &node, const char *key, T &field, const char *wanted) const
   {
     T value{};
     if (!node.IsScalar() || !YAML::convert<T>::decode(node, value)) {
@@ -159,18 +157,12 @@ private:
       fail(node, key, "a finite number");
     }
   }
-  void assign(const YAML::Node &node, const char *key, int &field) const
-  {
-    number(node, key, field, "a whole number");
-  }
+  void assign(const YAML::Node &node, const char *key, int &field) const { number(node, key, field, "a whole number"); }
   void assign(const YAML::Node &node, const char *key, std::uint64_t &field) const
   {
     number(node, key, field, "a whole number, 0 or more");
   }
-  void assign(const YAML::Node &node, const char *key, bool &field) const
-  {
-    number(node, key, field, "true or false");
-  }
+  void assign(const YAML::Node &node, const char *key, bool &field) const { number(node, key, field, "true or false"); }
   void assign(const YAML::Node &node, const char *key, std::array<double, 4> &field) const
   {
     if (!node.IsSequence() || node.size() != 4) {
@@ -200,8 +192,7 @@ private:
   }
   void assign(const YAML::Node &node, const char *key, Bark &field) const
   {
-    oneOf<Bark, 3>(node, key, field,
-                   {{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}}});
+    oneOf<Bark, 3>(node, key, field, {{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}}});
   }
   void assign(const YAML::Node &node, const char *key, PathKind &field) const
   {
@@ -239,8 +230,7 @@ std::string text(const std::array<double, 4> &value)
   return fmt::format("[{}, {}, {}, {}]", value[0], value[1], value[2], value[3]);
 }
 
-void readTrunks(const std::string &path, const YAML::Node &node,
-                std::vector<SimulatedTrunk> &trunks)
+void readTrunks(const std::string &path, const YAML::Node &node, std::vector<SimulatedTrunk> &trunks)
 {
   if (node && !node.IsSequence()) {
     Section(path, {}, "trunks").fail(node, "trunks", "a list");
@@ -248,11 +238,9 @@ void readTrunks(const std::string &path, const YAML::Node &node,
   for (const YAML::Node &entry : node) {
     Section section(path, entry, "trunks");
     SimulatedTrunk trunk;
-    visitTrunk(trunk,
-               [&](const char *, const char *key, auto &field) { section.read(key, field); });
+    visitTrunk(trunk, [&](const char *, const char *key, auto &field) { section.read(key, field); });
     section.finish();
-    if (!(trunk.radius >= 0.01 && trunk.radius <= 2) ||
-        !(trunk.height >= 1 && trunk.height <= 100)) {
+    if (!(trunk.radius >= 0.01 && trunk.radius <= 2) || !(trunk.height >= 1 && trunk.height <= 100)) {
       section.fail(entry, "trunk", "of a radius of 0.01 to 2 and a height of 1 to 100");
     }
     trunks.push_back(trunk);
@@ -270,13 +258,11 @@ SceneOptions readScene(const std::string &path)
     throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
   }
   catch (const YAML::ParserException &error) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{}:{}: {}", path, error.mark.line + 1, error.msg));
+    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", path, error.mark.line + 1, error.msg));
   }
   SceneOptions scene;
   if (!root.IsMap()) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{}:1: a scene must be a mapping of sections", path));
+    throw vpException(vpException::badValue, fmt::format("{}:1: a scene must be a mapping of sections", path));
   }
   const char *names[] = {"forest", "flight", "camera", "sensors"};
   Section top(path, root, "scene");

@@ -53,16 +53,13 @@ double SensorImage::expose(const std::vector<float> &radiance, vpImage<unsigned 
   for (unsigned row = 0; row < height; ++row) {
     const std::size_t offset = random.next();
     for (unsigned column = 0; column < width; ++column) {
-      const float grey =
-          static_cast<float>(gain) * radiance[static_cast<std::size_t>(row) * width + column];
-      const float noise =
-          std::sqrt(read2 + shot2 * grey) * m_normals[(offset + 17 * column) & 0xffff];
+      const float grey = static_cast<float>(gain) * radiance[static_cast<std::size_t>(row) * width + column];
+      const float noise = std::sqrt(read2 + shot2 * grey) * m_normals[(offset + 17 * column) & 0xffff];
       image[row][column] = static_cast<unsigned char>(std::clamp(grey + noise + 0.5f, 0.f, 255.f));
     }
   }
   if (m_options.exposure_lag_frames > 0) {
-    m_gain *= std::pow(m_options.exposure_target / meanGrey(radiance, gain),
-                       1 / (1 + m_options.exposure_lag_frames));
+    m_gain *= std::pow(m_options.exposure_target / meanGrey(radiance, gain), 1 / (1 + m_options.exposure_lag_frames));
   }
   return gain;
 }

@@ -27,8 +27,8 @@ std::string poseLine(std::int64_t stamp_ns, const Pose &pose)
   if (q.w() < 0) {
     q.coeffs() = -q.coeffs();
   }
-  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp_ns, pose.t.x(),
-                     pose.t.y(), pose.t.z(), q.w(), q.x(), q.y(), q.z());
+  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp_ns, pose.t.x(), pose.t.y(),
+                     pose.t.z(), q.w(), q.x(), q.y(), q.z());
 }
 
 std::string sensorYaml(const CameraModel &camera, const Pose &bMc, double rate_hz)
@@ -44,11 +44,11 @@ std::string sensorYaml(const CameraModel &camera, const Pose &bMc, double rate_h
   const auto &c = camera.coefficients;
   const int count = camera.distortion == Distortion::fov ? 1 : 4; // as readCamera() wants them
   const PinholeCamera &p = camera.pinhole;
-  return fmt::format(
-      "sensor_type: camera\ncomment: simulated front camera\nT_BS:\n  cols: 4\n  rows: 4\n"
-      "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
-      "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
-      matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, model, fmt::join(c.begin(), c.begin() + count, ", "));
+  return fmt::format("sensor_type: camera\ncomment: simulated front camera\nT_BS:\n  cols: 4\n  rows: 4\n"
+                     "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
+                     "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
+                     matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, model,
+                     fmt::join(c.begin(), c.begin() + count, ", "));
 }
 
 void writePng(const std::string &path, const cv::Mat &image)
@@ -68,8 +68,8 @@ std::uint16_t rounded(std::uint16_t depth_mm)
 }
 } // namespace
 
-SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &camera,
-                               const Pose &bMc, double rate_hz, bool overwrite)
+SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc, double rate_hz,
+                               bool overwrite)
     : m_folder(folder), m_partial(folder + ".partial"), m_overwrite(overwrite)
 {
   if (folder.empty()) {
@@ -80,13 +80,11 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
     m_partial = m_folder + ".partial";
   }
   if (fs::exists(m_folder) && !overwrite) {
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: exists already; --overwrite replaces it", m_folder));
+    throw vpException(vpException::ioError, fmt::format("{}: exists already; --overwrite replaces it", m_folder));
   }
   std::error_code error;
   fs::remove_all(m_partial, error);
-  for (const char *name :
-       {"mav0/cam0/data", "mav0/imu0", "mav0/odom0", "mav0/state_groundtruth_estimate0"}) {
+  for (const char *name : {"mav0/cam0/data", "mav0/imu0", "mav0/odom0", "mav0/state_groundtruth_estimate0"}) {
     fs::create_directories(path(name), error);
     if (error) {
       throw vpException(vpException::ioError, fmt::format("{}: {}", path(name), error.message()));
@@ -105,8 +103,8 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
   m_truth << kPoseHeader;
 }
 
-void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame,
-                                const Pose &wMb_truth, const Pose &wMb_odometry)
+void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth,
+                                const Pose &wMb_odometry)
 {
   const std::string name = fmt::format("{:013d}.png", stamp_ns);
   m_images << stamp_ns << ',' << name << '\n';
@@ -114,15 +112,13 @@ void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &fram
   m_odometry << poseLine(stamp_ns, wMb_odometry);
   vpImage<unsigned char> image = frame.image;
   writePng(path("mav0/cam0/data/" + name),
-           cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
-                   image.bitmap));
+           cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U, image.bitmap));
   if (frame.depth.getSize() == 0) {
     return;
   }
   fs::create_directories(path("depth"));
   fs::create_directories(path("trunk_id"));
-  const int height = static_cast<int>(frame.depth.getHeight()),
-            width = static_cast<int>(frame.depth.getWidth());
+  const int height = static_cast<int>(frame.depth.getHeight()), width = static_cast<int>(frame.depth.getWidth());
   cv::Mat depth(height, width, CV_16U), trunk_id(height, width, CV_16U);
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column) {
@@ -137,8 +133,8 @@ void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &fram
 void SequenceWriter::writeImu(std::int64_t stamp_ns, const ImuSample &sample)
 {
   const Eigen::Vector3d &w = sample.gyro, &a = sample.accelerometer;
-  m_imu << fmt::format("{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", stamp_ns, w.x(), w.y(),
-                       w.z(), a.x(), a.y(), a.z());
+  m_imu << fmt::format("{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", stamp_ns, w.x(), w.y(), w.z(), a.x(), a.y(),
+                       a.z());
 }
 
 void SequenceWriter::writeForest(const Forest &forest)
@@ -146,8 +142,8 @@ void SequenceWriter::writeForest(const Forest &forest)
   std::string near = "id,x [m],y [m],radius [m],lean [deg]\n", far = "id,x [m],y [m]\n";
   for (const SimulatedTrunk &trunk : forest.trunks) {
     const Eigen::Vector3d breast = trunk.axisAt(kBreastHeight); // where TruthTrunk is told
-    near += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.2f}\n", trunk.id, breast.x(), breast.y(),
-                        trunk.radius, std::atan(trunk.lean.norm()) * 180 / M_PI);
+    near += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.2f}\n", trunk.id, breast.x(), breast.y(), trunk.radius,
+                        std::atan(trunk.lean.norm()) * 180 / M_PI);
   }
   for (const SimulatedTrunk &trunk : forest.far_trunks) {
     const Eigen::Vector3d breast = trunk.axisAt(kBreastHeight);

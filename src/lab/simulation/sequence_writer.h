@@ -24,11 +24,10 @@ class SequenceWriter
 {
 public:
   /// Throws vpException where \p folder exists, unless \p overwrite, or cannot be made.
-  SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc,
-                 double rate_hz, bool overwrite = false);
+  SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc, double rate_hz,
+                 bool overwrite = false);
 
-  void writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth,
-                  const Pose &wMb_odometry);
+  void writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth, const Pose &wMb_odometry);
   void writeImu(std::int64_t stamp_ns, const ImuSample &sample);
   void writeForest(const Forest &forest);
   /// Any other small text file, e.g. the scene: name relative to the folder.

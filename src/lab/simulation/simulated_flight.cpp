@@ -16,13 +16,11 @@ namespace
 void requireRange(const char *name, double value, double low, double high)
 {
   if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("{} = {}, must be {} to {}", name, value, low, high));
+    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
   }
 }
 
-void recordImu(const FlightPath &path, const SensorOptions &options, double duration,
-               SequenceWriter &writer)
+void recordImu(const FlightPath &path, const SensorOptions &options, double duration, SequenceWriter &writer)
 {
   constexpr std::int64_t kPeriodNs = 5000000;
   SimulatedImu imu(options);
@@ -49,14 +47,12 @@ void SceneOptions::validate() const
   requireRange("h264_kbps", h264_kbps, 0, 20000);
 }
 
-void recordFlight(const SceneOptions &scene, const RecordOptions &options,
-                  const std::function<void(int)> &progress)
+void recordFlight(const SceneOptions &scene, const RecordOptions &options, const std::function<void(int)> &progress)
 {
   scene.validate();
   requireRange("frames", options.frames, 1, 100000);
   const Pose bMc = forwardCamera();
-  SequenceWriter writer(options.folder, scene.renderer.camera, bMc, scene.rate_hz,
-                        options.overwrite);
+  SequenceWriter writer(options.folder, scene.renderer.camera, bMc, scene.rate_hz, options.overwrite);
   FlightOptions flight = scene.flight;
   flight.duration = (options.frames - 1) / scene.rate_hz;
   const FlightPath path(flight);
@@ -72,16 +68,15 @@ void recordFlight(const SceneOptions &scene, const RecordOptions &options,
   PoseFilter filter(scene.sensors);
   std::optional<H264Link> link;
   if (scene.h264_kbps > 0) {
-    link.emplace(scene.renderer.camera.pinhole.width, scene.renderer.camera.pinhole.height,
-                 scene.rate_hz, scene.h264_kbps);
+    link.emplace(scene.renderer.camera.pinhole.width, scene.renderer.camera.pinhole.height, scene.rate_hz,
+                 scene.h264_kbps);
   }
   RenderedFrame frame;
   const double half = 0.5e-3 * scene.exposure_ms;
   for (int k = 0; k < options.frames; ++k) {
     const std::int64_t stamp = std::llround(k * 1e9 / scene.rate_hz);
     const double t = 1e-9 * static_cast<double>(stamp);
-    renderer.render(path.bodyPose(t - half) * bMc, path.bodyPose(t + half) * bMc, frame,
-                    options.truth_images);
+    renderer.render(path.bodyPose(t - half) * bMc, path.bodyPose(t + half) * bMc, frame, options.truth_images);
     if (link) {
       link->pass(frame.image);
     }

@@ -23,7 +23,7 @@ struct SceneOptions
   std::vector<SimulatedTrunk> trunks; ///< planted first, as they are
   double rate_hz = 10;                ///< of the camera, 1 to 120
   double exposure_ms = 6;             ///< time of exposure: motion blur, 0 to 100
-  double h264_kbps = 0; ///< bit rate of the drone's video link, 0 = uncompressed, to 20000
+  double h264_kbps = 0;               ///< bit rate of the drone's video link, 0 = uncompressed, to 20000
 
   /// One seed for forest, path, sensor noise and image noise.
   void setSeed(std::uint64_t seed);

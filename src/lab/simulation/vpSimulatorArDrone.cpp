@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/simulation/vpSimulatorArDrone.h"
 #include "geometry/body_velocity.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
 #include "input/camera_file.h"
 #include "lab/simulation/h264_link.h"
-#include "lab/simulation/vpSimulatorArDrone.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +14,8 @@
 
 namespace
 {
-constexpr double kTick = 0.005;        ///< of the gyro and of the motion [s]
-constexpr int kTicksPerCommand = 6;    ///< the velocity loop, as vpRobotArDrone's
+constexpr double kTick = 0.005;     ///< of the gyro and of the motion [s]
+constexpr int kTicksPerCommand = 6; ///< the velocity loop, as vpRobotArDrone's
 
 std::int64_t nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
 } // namespace
@@ -23,8 +23,14 @@ std::int64_t nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
 struct vpSimulatorArDrone::State
 {
   State(const bole::Forest &f, const Options &o)
-    : options(o), forest(f), body(o.body, o.start, o.heading, f.terrain.height(o.start.x(), o.start.y())),
-      imu(o.sensors), filter(o.sensors), renderer(f, o.renderer), bMc(bole::Pose::fromVisp(o.bMc)), last(body.pose())
+      : options(o),
+        forest(f),
+        body(o.body, o.start, o.heading, f.terrain.height(o.start.x(), o.start.y())),
+        imu(o.sensors),
+        filter(o.sensors),
+        renderer(f, o.renderer),
+        bMc(bole::Pose::fromVisp(o.bMc)),
+        last(body.pose())
   {
     if (options.h264_kbps > 0)
       link.emplace(options.renderer.camera.pinhole.width, options.renderer.camera.pinhole.height, options.rate_hz,
@@ -123,10 +129,7 @@ struct vpSimulatorArDrone::State
 
 vpSimulatorArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) { renderer.samples_per_pixel = 3; }
 
-void vpSimulatorArDrone::Options::setSeed(std::uint64_t seed)
-{
-  body.seed = sensors.seed = renderer.noise_seed = seed;
-}
+void vpSimulatorArDrone::Options::setSeed(std::uint64_t seed) { body.seed = sensors.seed = renderer.noise_seed = seed; }
 
 void vpSimulatorArDrone::Options::validate() const
 {
@@ -158,10 +161,7 @@ vpSimulatorArDrone::~vpSimulatorArDrone() = default;
 
 void vpSimulatorArDrone::open(Permission permission) { m_state->is_open |= permission == Permission::fly; }
 
-void vpSimulatorArDrone::close()
-{
-  m_state->in_air = m_state->has_wanted = m_state->is_open = false;
-}
+void vpSimulatorArDrone::close() { m_state->in_air = m_state->has_wanted = m_state->is_open = false; }
 
 bool vpSimulatorArDrone::isOpen() const { return m_state->is_open; }
 
@@ -200,7 +200,8 @@ void vpSimulatorArDrone::trim() { m_state->requireOpen(); }
 void vpSimulatorArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v)
 {
   m_state->requireOpen();
-  m_state->wanted = bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
+  m_state->wanted =
+      bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
   m_state->has_wanted = true;
   m_state->renewed = m_state->time();
 }

@@ -3,10 +3,10 @@
 /// \file
 /// An AR.Drone in a rendered forest, with ViSP's robot interface.
 
-#include <bole/frame.h>
 #include "lab/simulation/flight_sensors.h"
 #include "lab/simulation/forest_renderer.h"
 #include "lab/simulation/quadrotor.h"
+#include <bole/frame.h>
 
 #include <memory>
 #include <visp3/robot/vpRobot.h>
@@ -39,19 +39,19 @@ public:
   };
   struct Options
   {
-    double hover_after_s = 0.5;   ///< as vpRobotArDrone::Options: [s], (0.05, 2)
-    double land_after_s = 3;      ///< [s], (0.1, 60), more than hover_after_s
-    double gain = 0.3;            ///< share of the largest tilt per m/s, (0, 2)
-    double largest_share = 0.5;   ///< (0, 1]
-    double largest_climb = 0.7;   ///< [m/s], (0, 5)
-    double largest_turn = 1.74;   ///< [rad/s], (0, 7)
-    vpHomogeneousMatrix bMc;      ///< camera in the body; default: looks ahead at the body's origin
+    double hover_after_s = 0.5;                      ///< as vpRobotArDrone::Options: [s], (0.05, 2)
+    double land_after_s = 3;                         ///< [s], (0.1, 60), more than hover_after_s
+    double gain = 0.3;                               ///< share of the largest tilt per m/s, (0, 2)
+    double largest_share = 0.5;                      ///< (0, 1]
+    double largest_climb = 0.7;                      ///< [m/s], (0, 5)
+    double largest_turn = 1.74;                      ///< [rad/s], (0, 7)
+    vpHomogeneousMatrix bMc;                         ///< camera in the body; default: looks ahead at the body's origin
     Eigen::Vector2d start = Eigen::Vector2d::Zero(); ///< where it stands [m]
-    double heading = 0;           ///< [rad]
-    double rate_hz = 10;          ///< of the camera, 1 to 60
-    double exposure_s = 0.006;    ///< motion blur, 0 to 0.1
-    double video_delay_s = 0.06;  ///< from the middle of the exposure to next(), 0 to 1
-    double h264_kbps = 0;         ///< of the video link, 0 = uncompressed, to 20000
+    double heading = 0;                              ///< [rad]
+    double rate_hz = 10;                             ///< of the camera, 1 to 60
+    double exposure_s = 0.006;                       ///< motion blur, 0 to 0.1
+    double video_delay_s = 0.06;                     ///< from the middle of the exposure to next(), 0 to 1
+    double h264_kbps = 0;                            ///< of the video link, 0 = uncompressed, to 20000
     bole::QuadrotorOptions body;
     bole::SensorOptions sensors;
     bole::RendererOptions renderer; ///< its lens must have no distortion: frames are taken as a pinhole's
@@ -83,10 +83,10 @@ public:
   };
   Watchdog watchdog() const;
   void init() override {}
-  void get_eJe(vpMatrix &jacobian) override; ///< 6x4: columns vx, vy, vz, wz
-  void get_fJe(vpMatrix &jacobian) override; ///< throws
-  void getPosition(const vpRobot::vpControlFrameType frame, vpColVector &q) override;     ///< of the pose filter
-  void getDisplacement(const vpRobot::vpControlFrameType frame, vpColVector &q) override; ///< since the last call
+  void get_eJe(vpMatrix &jacobian) override;                                          ///< 6x4: columns vx, vy, vz, wz
+  void get_fJe(vpMatrix &jacobian) override;                                          ///< throws
+  void getPosition(const vpRobot::vpControlFrameType frame, vpColVector &q) override; ///< of the pose filter
+  void getDisplacement(const vpRobot::vpControlFrameType frame, vpColVector &q) override;   ///< since the last call
   void setPosition(const vpRobot::vpControlFrameType frame, const vpColVector &q) override; ///< throws
 
   // The camera. next() never ends.

@@ -4,8 +4,8 @@
 /// What a drone is believed to do with the velocities it is sent.
 ///
 /// Idea: a frame is old when it arrives, a command is late when it acts, and the drone takes its time to obey. What was
-/// sent and has not shown yet is known, so a control law need not order it twice. Each axis is a delay and a first-order
-/// lag; what is wrong with that (drag, wind, a soft velocity loop) is for a FeatureFilter to find.
+/// sent and has not shown yet is known, so a control law need not order it twice. Each axis is a delay and a
+/// first-order lag; what is wrong with that (drag, wind, a soft velocity loop) is for a FeatureFilter to find.
 
 #include <Eigen/Core>
 

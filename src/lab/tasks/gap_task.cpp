@@ -10,13 +10,13 @@ namespace bole
 {
 namespace
 {
-constexpr double kSweep_s = 9;     ///< one sidestep to and fro before a gap is chosen
+constexpr double kSweep_s = 9;        ///< one sidestep to and fro before a gap is chosen
 constexpr double kSearchAgain = 0.35; ///< amplitude of the sidestep once it has left its start [m]
-constexpr double kAcrossGain = 0.8; ///< [1/s]
-constexpr double kLinedUp = 0.2;   ///< across the axis, at the entry [m]
-constexpr double kInView = 1.2;    ///< nearer to the middle the trunks leave the image [m]
-constexpr int kViews = 8;          ///< of a candidate that counts as in the way
-constexpr double kNearRange = 2.5; ///< points beyond this do not matter yet [m]
+constexpr double kAcrossGain = 0.8;   ///< [1/s]
+constexpr double kLinedUp = 0.2;      ///< across the axis, at the entry [m]
+constexpr double kInView = 1.2;       ///< nearer to the middle the trunks leave the image [m]
+constexpr int kViews = 8;             ///< of a candidate that counts as in the way
+constexpr double kNearRange = 2.5;    ///< points beyond this do not matter yet [m]
 
 Eigen::Vector2d leftOf(const Eigen::Vector2d &v) { return {-v.y(), v.x()}; }
 
@@ -169,8 +169,7 @@ TaskCommand GapTask::fly(const std::vector<Obstacle> &around, const Pose &wMb)
   }
   velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), around, m_options.body_radius,
                        m_options.evidence);
-  return {false, towards(wMb, velocity, heading),
-          m_is_lined_up ? "passes the gap" : "lines up"};
+  return {false, towards(wMb, velocity, heading), m_is_lined_up ? "passes the gap" : "lines up"};
 }
 
 /// It may stand between trunks now, and the last search was straight behind: sweeps less.

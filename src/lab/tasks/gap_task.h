@@ -18,16 +18,16 @@ namespace bole
 {
 struct GapTaskOptions
 {
-  double width_min = 1.2;     ///< least free width, bark to bark [m], 0.3 to 5
-  double width_max = 3.5;     ///< wider is no gap [m], more than width_min, to 20
-  double range = 8;           ///< of the gap's middle [m], 1 to 20
-  double evidence = 1.5;      ///< of both its trunks, at first: lower log odds only after two sweeps, -20 to 20
-  double angle = 0.5;         ///< of the gap's middle from straight ahead [rad], 0.05 to 0.7
-  double body_radius = 0.28;  ///< of the drone with its hull [m], 0.05 to 2
-  double entry = 1.5;         ///< lines up this far before the middle [m], 0.3 to 5
-  double beyond = 1.5;        ///< and stops this far behind it [m], 0.3 to 5
-  double speed = 0.6;         ///< [m/s], 0.05 to 3
-  double search_s = 45;       ///< gives up after [s], 1 to 600
+  double width_min = 1.2;    ///< least free width, bark to bark [m], 0.3 to 5
+  double width_max = 3.5;    ///< wider is no gap [m], more than width_min, to 20
+  double range = 8;          ///< of the gap's middle [m], 1 to 20
+  double evidence = 1.5;     ///< of both its trunks, at first: lower log odds only after two sweeps, -20 to 20
+  double angle = 0.5;        ///< of the gap's middle from straight ahead [rad], 0.05 to 0.7
+  double body_radius = 0.28; ///< of the drone with its hull [m], 0.05 to 2
+  double entry = 1.5;        ///< lines up this far before the middle [m], 0.3 to 5
+  double beyond = 1.5;       ///< and stops this far behind it [m], 0.3 to 5
+  double speed = 0.6;        ///< [m/s], 0.05 to 3
+  double search_s = 45;      ///< gives up after [s], 1 to 600
   SafetyOptions safety;
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
@@ -36,10 +36,10 @@ struct GapTaskOptions
 /// Two trunks and the way between them.
 struct Gap
 {
-  int left = -1, right = -1;                       ///< ids
+  int left = -1, right = -1;                        ///< ids
   Eigen::Vector2d middle = Eigen::Vector2d::Zero(); ///< [m]
   Eigen::Vector2d along = Eigen::Vector2d::UnitX(); ///< unit vector through it, away from the drone
-  double width = 0;                                ///< free, bark to bark [m]
+  double width = 0;                                 ///< free, bark to bark [m]
 };
 
 /// The gap between two trunks as seen from \p from: the middle of the free width.

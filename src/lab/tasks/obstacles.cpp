@@ -8,9 +8,9 @@ namespace bole
 {
 namespace
 {
-constexpr double kMisread = 0.3; ///< of the radius: a border read inside the bark, where light and shade meet
-constexpr double kDoubted = -2;  ///< log odds below which a candidate is taken for nothing
-constexpr double kSeenThrough = 4; ///< MapTrunk::lookedThrough from which nothing stands there
+constexpr double kMisread = 0.3;      ///< of the radius: a border read inside the bark, where light and shade meet
+constexpr double kDoubted = -2;       ///< log odds below which a candidate is taken for nothing
+constexpr double kSeenThrough = 4;    ///< MapTrunk::lookedThrough from which nothing stands there
 constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
 constexpr double kWidth = 0.15;       ///< of a column of points [m]
 constexpr double kRemembered_s = 3;   ///< of what is out of view
@@ -51,9 +51,10 @@ std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, doubl
     const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
     const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
     const double misread = kMisread * trunk.trunk.radius();
-    near.push_back({trunk.id, is_confirmed, xy, trunk.trunk.radius(),
-                    across * n * n.transpose() + along * u * u.transpose() + misread * misread * Eigen::Matrix2d::Identity(),
-                    evidence});
+    near.push_back(
+        {trunk.id, is_confirmed, xy, trunk.trunk.radius(),
+         across * n * n.transpose() + along * u * u.transpose() + misread * misread * Eigen::Matrix2d::Identity(),
+         evidence});
   }
   return near;
 }
@@ -66,7 +67,8 @@ void NearPoints::see(const std::vector<Eigen::Vector3d> &points, const Pose &wMb
   for (const Eigen::Vector3d &point : points) {
     if (point.z() < wMb.t.z() - kLow || point.z() > wMb.t.z() + kHigh)
       continue;
-    Column &column = m_columns[{static_cast<int>(std::floor(point.x() / kWidth)), static_cast<int>(std::floor(point.y() / kWidth))}];
+    Column &column =
+        m_columns[{static_cast<int>(std::floor(point.x() / kWidth)), static_cast<int>(std::floor(point.y() / kWidth))}];
     column.sum += point.head<2>();
     ++column.count;
     column.low = std::min(column.low, point.z());

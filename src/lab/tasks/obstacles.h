@@ -20,10 +20,10 @@ struct Obstacle
 {
   int id = 0;
   bool is_confirmed = false;
-  Eigen::Vector2d xy = Eigen::Vector2d::Zero(); ///< [m], world
-  double radius = 0;                            ///< [m]
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();         ///< [m], world
+  double radius = 0;                                    ///< [m]
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero(); ///< [m^2], world axes
-  double evidence = 0;                          ///< log odds to be a trunk (TrunkMap::evidence)
+  double evidence = 0;                                  ///< log odds to be a trunk (TrunkMap::evidence)
 
   /// Distance of \p p to the bark less \p sigmas standard deviations in that direction [m].
   double clearance(const Eigen::Vector2d &p, double sigmas) const;
@@ -34,9 +34,9 @@ struct Obstacle
 /// below -2, looked through, or where the drone is.
 std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
 
-/// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it, has
-/// bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are forgotten
-/// after some seconds.
+/// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it,
+/// has bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are
+/// forgotten after some seconds.
 class NearPoints
 {
 public:
@@ -56,8 +56,9 @@ private:
   std::map<std::pair<int, int>, Column> m_columns;
 };
 
-/// Where the camera has seen that nothing stands: what it sees a point through is free. What it has not seen through may
-/// hold anything: dark bark has no corners and may have but one border in the image, and beside the image nothing is seen.
+/// Where the camera has seen that nothing stands: what it sees a point through is free. What it has not seen through
+/// may hold anything: dark bark has no corners and may have but one border in the image, and beside the image nothing
+/// is seen.
 class SeenSpace
 {
 public:
@@ -80,9 +81,9 @@ private:
   double m_time_s = 0;
 };
 
-/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed that
-/// dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no trunk
-/// must not drive the drone into one.
+/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed
+/// that dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no
+/// trunk must not drive the drone into one.
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
                           double body_radius, double evidence);
 } // namespace bole

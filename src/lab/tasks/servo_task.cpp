@@ -11,18 +11,22 @@ namespace bole
 {
 namespace
 {
-constexpr double kPlaceGain = 0.7;  ///< [1/s]
-constexpr double kTurnGain = 1.0;   ///< [1/s]
+constexpr double kPlaceGain = 0.7;   ///< [1/s]
+constexpr double kTurnGain = 1.0;    ///< [1/s]
 constexpr double kLargestTurn = 0.6; ///< [rad/s]
 } // namespace
 
 const char *toString(TaskPhase phase)
 {
   switch (phase) {
-  case TaskPhase::searching: return "searching";
-  case TaskPhase::servoing: return "servoing";
-  case TaskPhase::done: return "done";
-  case TaskPhase::failed: return "failed";
+  case TaskPhase::searching:
+    return "searching";
+  case TaskPhase::servoing:
+    return "servoing";
+  case TaskPhase::done:
+    return "done";
+  case TaskPhase::failed:
+    return "failed";
   }
   return "?";
 }

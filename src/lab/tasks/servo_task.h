@@ -6,7 +6,8 @@
 /// Idea: a task sees only FrameResult and Pipeline, never a robot, so the same task flies vpRobotArDrone and
 /// vpSimulatorArDrone. What every task shares is when *not* to act: step() commands a hover at once where a frame is
 /// not ok, and where what the task hangs on was not found for lost_frames; it goes on after sure_frames in which it
-/// was, and looks for another after patience_frames in which it was not. A drone that hovers holds its place by its floor camera and its height by its sonar, without this one.
+/// was, and looks for another after patience_frames in which it was not. A drone that hovers holds its place by its
+/// floor camera and its height by its sonar, without this one.
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
@@ -36,8 +37,8 @@ struct TaskCommand
 
 struct SafetyOptions
 {
-  int lost_frames = 5; ///< frames without what the task hangs on before it hovers, 1 to 100
-  int sure_frames = 3; ///< frames with it before it goes on, 1 to 100
+  int lost_frames = 5;      ///< frames without what the task hangs on before it hovers, 1 to 100
+  int sure_frames = 3;      ///< frames with it before it goes on, 1 to 100
   int patience_frames = 40; ///< good frames without it before it looks for another, 1 to 10000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range

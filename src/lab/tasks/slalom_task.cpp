@@ -14,22 +14,22 @@ namespace bole
 {
 namespace
 {
-constexpr double kStep_s = 0.1;        ///< of the flight in thought
-constexpr double kOffsetStep = 0.25;   ///< [m]
-constexpr double kOffsetGain = 1.0;    ///< sideways velocity over offset [1/s]
-constexpr double kOffLine = 0.12;      ///< cost a metre off the line
-constexpr double kChange = 0.08;       ///< cost a metre of a change of mind
-constexpr double kUnseen = 8;          ///< cost a second of a hull in what was not seen through
-constexpr double kUnseenTo = 1.8;      ///< as far ahead as it must have been [m]
-constexpr double kRound = 0.12;        ///< and round the hull [m]
-constexpr double kSlow = 1.5;          ///< cost of standing still against full speed
-constexpr double kNear = 12;           ///< cost a square metre inside the margin and a second
-constexpr double kContact = 100;       ///< cost of a contact, and as much again a metre deep and a second early
-constexpr double kLook = 0.6;          ///< share of the direction of flight that the heading takes
-constexpr double kSwingOn = 0.6;       ///< the swing goes on as if flying at [m/s], at the least
-constexpr double kLookAside = 0.6;      ///< amplitude of the sidestep before it leaves [m]
-constexpr double kNearRange = 2.5;     ///< points beyond this do not matter yet [m]
-constexpr double kRange = 9;           ///< trunks farther do not matter yet [m]
+constexpr double kStep_s = 0.1;      ///< of the flight in thought
+constexpr double kOffsetStep = 0.25; ///< [m]
+constexpr double kOffsetGain = 1.0;  ///< sideways velocity over offset [1/s]
+constexpr double kOffLine = 0.12;    ///< cost a metre off the line
+constexpr double kChange = 0.08;     ///< cost a metre of a change of mind
+constexpr double kUnseen = 8;        ///< cost a second of a hull in what was not seen through
+constexpr double kUnseenTo = 1.8;    ///< as far ahead as it must have been [m]
+constexpr double kRound = 0.12;      ///< and round the hull [m]
+constexpr double kSlow = 1.5;        ///< cost of standing still against full speed
+constexpr double kNear = 12;         ///< cost a square metre inside the margin and a second
+constexpr double kContact = 100;     ///< cost of a contact, and as much again a metre deep and a second early
+constexpr double kLook = 0.6;        ///< share of the direction of flight that the heading takes
+constexpr double kSwingOn = 0.6;     ///< the swing goes on as if flying at [m/s], at the least
+constexpr double kLookAside = 0.6;   ///< amplitude of the sidestep before it leaves [m]
+constexpr double kNearRange = 2.5;   ///< points beyond this do not matter yet [m]
+constexpr double kRange = 9;         ///< trunks farther do not matter yet [m]
 
 double line(double x, const SlalomTaskOptions &options)
 {
@@ -69,7 +69,8 @@ double unseenShare(const SlalomState &at, const Ring &ring, const IsSeen &is_see
   return static_cast<double>(unseen) / static_cast<double>(ring.size());
 }
 
-/// Flies \p way in thought and fills its clearance and cost. \p allowed: of each trunk, what is nearer is a contact [m].
+/// Flies \p way in thought and fills its clearance and cost. \p allowed: of each trunk, what is nearer is a contact
+/// [m].
 void tryOut(SlalomWay &way, const std::vector<Obstacle> &trunks, const std::vector<double> &allowed, SlalomState state,
             const SlalomTaskOptions &options, const Ring &ring, const IsSeen &is_seen)
 {
@@ -124,7 +125,7 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
   best.cost = std::numeric_limits<double>::infinity();
   const Ring ring = ringRound(options);
   const double wanted = line(state.x + state.lead + options.speed, options); // a second ahead
-  std::vector<double> allowed; // who stands too near already may leave
+  std::vector<double> allowed;                                               // who stands too near already may leave
   allowed.reserve(trunks.size());
   for (const Obstacle &trunk : trunks)
     allowed.push_back(std::min(0.0, clearanceOf(trunk, state, options)));
@@ -144,14 +145,16 @@ SlalomWay chooseWay(const std::vector<Obstacle> &trunks, const SlalomState &stat
 }
 
 SlalomTask::SlalomTask(const SlalomTaskOptions &options)
-  : ServoTask(options.safety), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
+    : ServoTask(options.safety), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
   m_options.validate();
 }
 
 ServoTask::Values SlalomTask::errors() const
 {
-  return {{"along [m]", m_state.x}, {"across [m]", m_state.y}, {"clearance by the map [m]", std::min(m_way.clearance, 9.0)}};
+  return {{"along [m]", m_state.x},
+          {"across [m]", m_state.y},
+          {"clearance by the map [m]", std::min(m_way.clearance, 9.0)}};
 }
 
 void SlalomTask::locate(const FrameResult &result)
@@ -197,7 +200,9 @@ TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
   };
   m_way = chooseWay(trunks, m_state, m_way.offset, m_options, is_seen);
   const Eigen::Vector2d velocity(m_way.speed, sidewaysTo(m_way.offset, m_state.y, m_options));
-  const double heading = yawOf(m_start) + kLook * std::atan2(velocity.y(), std::max(velocity.x(), 0.5 * m_options.speed));
-  return {false, towards(result.wMb, axes.transpose() * velocity, heading), m_way.speed < m_options.speed ? "slows" : "flies"};
+  const double heading =
+      yawOf(m_start) + kLook * std::atan2(velocity.y(), std::max(velocity.x(), 0.5 * m_options.speed));
+  return {false, towards(result.wMb, axes.transpose() * velocity, heading),
+          m_way.speed < m_options.speed ? "slows" : "flies"};
 }
 } // namespace bole

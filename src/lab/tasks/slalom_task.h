@@ -48,8 +48,8 @@ struct SlalomWay
   double cost = 0;
 };
 
-/// Where the drone is on its line: x along, y across (left), [m]; \p vy [m/s]; \p lead: by how much the swing of the line
-/// is ahead of x [m], since it goes on where the drone does not.
+/// Where the drone is on its line: x along, y across (left), [m]; \p vy [m/s]; \p lead: by how much the swing of the
+/// line is ahead of x [m], since it goes on where the drone does not.
 struct SlalomState
 {
   double x = 0, y = 0, vy = 0, lead = 0;

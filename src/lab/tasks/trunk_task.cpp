@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/require_range.h"
 #include "lab/tasks/trunk_task.h"
+#include "geometry/require_range.h"
 
 #include <Eigen/Geometry>
 
@@ -11,19 +11,19 @@ namespace bole
 {
 namespace
 {
-constexpr double kSweep_s = 9;          ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
-constexpr double kPause_s = 0.25;       ///< without a command it hovered: what was sent before is over
-constexpr double kFirstDrift = 0.3;     ///< standard deviation of the velocity nobody ordered, at first [m/s]
-constexpr double kLargestDrift = 0.5;   ///< that is fed forward [m/s]
-constexpr double kSameTrunk = 0.5;      ///< a trunk that took the target's place stands this near [m]
-constexpr double kRadiusWeight = 0.1;   ///< of a new image in the radius as seen from where it is
-constexpr double kMisread = 0.12;       ///< a jump of log r/d that no motion explains: other edges than the trunk's
-constexpr int kBelieved = 15;           ///< frames in a row after which it is believed all the same
-constexpr double kRetreat = 0.3;        ///< backs off no faster: nothing looks behind [m/s]
-constexpr int kPatience = 10;           ///< frames that the way round is blocked before it goes round the other way
-constexpr double kClearRange = 3;       ///< of trunks to keep clear of, or that stand in the way round [m]
-constexpr double kSureTrunk = 0;        ///< log odds from which on a trunk is kept clear of
-constexpr double kLargestTurn = 0.8;    ///< [rad/s]
+constexpr double kSweep_s = 9; ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
+constexpr double kPause_s = 0.25;     ///< without a command it hovered: what was sent before is over
+constexpr double kFirstDrift = 0.3;   ///< standard deviation of the velocity nobody ordered, at first [m/s]
+constexpr double kLargestDrift = 0.5; ///< that is fed forward [m/s]
+constexpr double kSameTrunk = 0.5;    ///< a trunk that took the target's place stands this near [m]
+constexpr double kRadiusWeight = 0.1; ///< of a new image in the radius as seen from where it is
+constexpr double kMisread = 0.12;     ///< a jump of log r/d that no motion explains: other edges than the trunk's
+constexpr int kBelieved = 15;         ///< frames in a row after which it is believed all the same
+constexpr double kRetreat = 0.3;      ///< backs off no faster: nothing looks behind [m/s]
+constexpr int kPatience = 10;         ///< frames that the way round is blocked before it goes round the other way
+constexpr double kClearRange = 3;     ///< of trunks to keep clear of, or that stand in the way round [m]
+constexpr double kSureTrunk = 0;      ///< log odds from which on a trunk is kept clear of
+constexpr double kLargestTurn = 0.8;  ///< [rad/s]
 } // namespace
 
 void TrunkTaskOptions::validate() const
@@ -52,8 +52,7 @@ void TrunkTaskOptions::validate() const
 }
 
 TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
-  : ServoTask(options.safety), m_bMc(bMc), m_options(options), m_sidestep(0.7, kSweep_s),
-    m_response(options.response)
+    : ServoTask(options.safety), m_bMc(bMc), m_options(options), m_sidestep(0.7, kSweep_s), m_response(options.response)
 {
   m_options.validate();
   m_servo.setServo(vpServo::EYEINHAND_L_cVe_eJe);

@@ -11,17 +11,17 @@
 /// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
 /// has none: it drifts by several per cent in half a minute, since it takes what is wrong in how the trunk looks from
 /// one side for a distance. So `hold` by distance sways sideways, features held. The way is a slant: the drone's height
-/// has no error of scale as its steps have, and the points tell the direction of flight, so that the metre of the height
-/// becomes the map's. The distance is the map's: pose and map rest on all images, while the borders that one image shows
-/// wander with light and background.
+/// has no error of scale as its steps have, and the points tell the direction of flight, so that the metre of the
+/// height becomes the map's. The distance is the map's: pose and map rest on all images, while the borders that one
+/// image shows wander with light and background.
 ///
-/// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand when
-/// the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an exponential
-/// decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is told) shows as a
-/// drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
+/// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand
+/// when the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an
+/// exponential decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is
+/// told) shows as a drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
 ///
-/// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed for
-/// a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
+/// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed
+/// for a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
 
 #include "lab/tasks/drone_response.h"
 #include "lab/tasks/feature_filter.h"
@@ -35,25 +35,25 @@ namespace bole
 {
 struct TrunkTaskOptions
 {
-  double ratio = 0;            ///< r/d to be kept, 0 (by distance) to 0.5
-  double distance = 3;         ///< camera to axis, where no ratio is given [m], 0.5 to 20
-  double bearing = 0;          ///< to be kept, positive right [rad], -0.5 to 0.5
-  double speed = 0;            ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
-  double gain = 2;             ///< of vpServo [1/s], 0.05 to 3
+  double ratio = 0;              ///< r/d to be kept, 0 (by distance) to 0.5
+  double distance = 3;           ///< camera to axis, where no ratio is given [m], 0.5 to 20
+  double bearing = 0;            ///< to be kept, positive right [rad], -0.5 to 0.5
+  double speed = 0;              ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
+  double gain = 2;               ///< of vpServo [1/s], 0.05 to 3
   double bearing_noise = 0.0015; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
-  double ratio_noise = 0.025;  ///< of its log r/d, 1e-5 to 0.5
-  double unrest = 0.15;        ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
-  double largest_speed = 0.9;  ///< [m/s], 0.05 to 3
-  double sway = 0.8;           ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
-  double sway_climb = 0.4;     ///< largest rate of climb meanwhile [m/s], 0 to 1
-  double sway_period = 6;      ///< [s], 1 to 60
-  double body_radius = 0.28;   ///< of the drone with its hull [m], 0.05 to 2
-  double free_way = 0.5;       ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
-  double choice_angle = 0.35;  ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
-  double choice_range = 7;     ///< nor those beyond this [m], 1 to 20
-  double choice_evidence = 2;  ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
-  int choice_views = 25;       ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
-  double search_s = 40;        ///< gives up after [s], 1 to 600
+  double ratio_noise = 0.025;    ///< of its log r/d, 1e-5 to 0.5
+  double unrest = 0.15; ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
+  double largest_speed = 0.9; ///< [m/s], 0.05 to 3
+  double sway = 0.8;          ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
+  double sway_climb = 0.4;    ///< largest rate of climb meanwhile [m/s], 0 to 1
+  double sway_period = 6;     ///< [s], 1 to 60
+  double body_radius = 0.28;  ///< of the drone with its hull [m], 0.05 to 2
+  double free_way = 0.5;      ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
+  double choice_angle = 0.35; ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
+  double choice_range = 7;    ///< nor those beyond this [m], 1 to 20
+  double choice_evidence = 2; ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
+  int choice_views = 25;      ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
+  double search_s = 40;       ///< gives up after [s], 1 to 600
   ResponseOptions response;
   SafetyOptions safety;
 
@@ -68,7 +68,7 @@ public:
   TrunkTask(const Pose &bMc, const TrunkTaskOptions &options);
   ~TrunkTask() override;
 
-  int target() const { return m_target; } ///< id in the map, -1 while searching
+  int target() const { return m_target; }         ///< id in the map, -1 while searching
   double desiredRatio() const { return m_ratio; } ///< r/d to be kept, by the radius as it is known now
   const TrunkTaskOptions &options() const { return m_options; }
   Values errors() const override;
@@ -105,8 +105,8 @@ private:
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
   double m_time_s = 0, m_ratio = 0;
-  double m_log_radius = 0; ///< as seen from here: of distance by the map times r/d in the image, over a second
-  int m_misread = 0;       ///< frames in a row
+  double m_log_radius = 0;    ///< as seen from here: of distance by the map times r/d in the image, over a second
+  int m_misread = 0;          ///< frames in a row
   double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;          ///< frames in a row
   double m_sway_start_s = -1; ///< -1: has not begun

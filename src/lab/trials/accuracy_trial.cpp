@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/trials/accuracy_trial.h"
 #include "geometry/median.h"
 #include "lab/simulation/h264_link.h"
-#include "lab/trials/accuracy_trial.h"
 
 #include <chrono>
 #include <cmath>
@@ -27,7 +27,7 @@ class SceneFrames
 {
 public:
   SceneFrames(const SceneOptions &scene, const FlightPath &path, const Forest &forest)
-    : m_scene(scene), m_path(path), m_renderer(forest, scene.renderer), m_filter(scene.sensors), m_imu(scene.sensors)
+      : m_scene(scene), m_path(path), m_renderer(forest, scene.renderer), m_filter(scene.sensors), m_imu(scene.sensors)
   {
     const PinholeCamera &camera = scene.renderer.camera.pinhole;
     if (scene.h264_kbps > 0)
@@ -97,7 +97,8 @@ std::vector<TruthTrunk> truthOf(const Forest &forest)
 {
   std::vector<TruthTrunk> truth;
   for (const SimulatedTrunk &trunk : forest.trunks) // where and as thick as they are at breast height
-    truth.push_back({trunk.id, trunk.axisAt(kBreastHeight).head<2>(), trunk.radiusAt(kBreastHeight), std::atan(trunk.lean.norm())});
+    truth.push_back(
+        {trunk.id, trunk.axisAt(kBreastHeight).head<2>(), trunk.radiusAt(kBreastHeight), std::atan(trunk.lean.norm())});
   for (const SimulatedTrunk &trunk : forest.far_trunks)
     truth.push_back({trunk.id, trunk.axisAt(kBreastHeight).head<2>(), 0, 0});
   return truth;
@@ -128,7 +129,8 @@ AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, cons
     frame.wMb_truth.reset();
     const auto start = std::chrono::steady_clock::now();
     pipeline.process(frame);
-    recorded.frame_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    recorded.frame_ms.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
   }
   AccuracyTrialResult result;
   if (recorded.truth.size() < 2)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/image_health.h"
-#include "geometry/require_range.h"
 #include "lab/trials/closed_loop.h"
+#include "geometry/require_range.h"
+#include "input/image_health.h"
 
 #include <algorithm>
 #include <ctime>

@@ -6,9 +6,9 @@
 /// Idea: the task gets what the pipeline makes of rendered images and nothing else. The truth goes into the record
 /// only, through a judge that is asked after the command has been given.
 
+#include "lab/simulation/vpSimulatorArDrone.h"
 #include "lab/tasks/servo_task.h"
 #include "lab/trials/injected_fault.h"
-#include "lab/simulation/vpSimulatorArDrone.h"
 
 #include <functional>
 
@@ -21,20 +21,20 @@ struct LoopSample
   TaskPhase phase = TaskPhase::searching;
   bool is_lost = false, is_hovering = false, is_spoilt = false;
   FrameStatus frame_status = FrameStatus::ok;
-  Pose truth, estimate;                               ///< wMb at the frame
-  Eigen::Vector4d command = Eigen::Vector4d::Zero();  ///< of the body
-  double speed = 0;                                   ///< true, horizontal [m/s]
-  double clearance = 0;                               ///< true, body's origin to bark [m]
-  double loop_ms = 0;                                 ///< of processor time: tracker, health of the image and task
-  ServoTask::Values believed, real;                   ///< errors by the task, by the truth
+  Pose truth, estimate;                              ///< wMb at the frame
+  Eigen::Vector4d command = Eigen::Vector4d::Zero(); ///< of the body
+  double speed = 0;                                  ///< true, horizontal [m/s]
+  double clearance = 0;                              ///< true, body's origin to bark [m]
+  double loop_ms = 0;                                ///< of processor time: tracker, health of the image and task
+  ServoTask::Values believed, real;                  ///< errors by the task, by the truth
   std::string reason;
 };
 
 struct LoopOptions
 {
-  double duration_s = 40;      ///< of servoing, at most, 1 to 3600
-  double search_most_s = 60;   ///< before it, at most, 1 to 3600
-  double contact = 0.28;       ///< body's origin to bark that is a contact: ends the flight [m], 0.05 to 2
+  double duration_s = 40;       ///< of servoing, at most, 1 to 3600
+  double search_most_s = 60;    ///< before it, at most, 1 to 3600
+  double contact = 0.28;        ///< body's origin to bark that is a contact: ends the flight [m], 0.05 to 2
   double translation_max = 1.5; ///< given to the robot [m/s], 0.05 to 5
   double rotation_max = 1;      ///< [rad/s], 0.05 to 5
   FaultOptions fault;

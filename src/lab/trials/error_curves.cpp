@@ -105,8 +105,8 @@ std::string axes(const Panel &panel, const std::string &name)
                         panel.y(v) + 4, std::abs(v) < 1e-9 ? 0 : v);
   const double step_s = tickStep(panel.t_max);
   for (double t = 0; t <= panel.t_max; t += step_s)
-    text += fmt::format("<text x=\"{:.1f}\" y=\"{:.0f}\" text-anchor=\"middle\" fill=\"#555\">{:g} s</text>\n", panel.x(t),
-                        panel.y0 + kHeight + 15, t);
+    text += fmt::format("<text x=\"{:.1f}\" y=\"{:.0f}\" text-anchor=\"middle\" fill=\"#555\">{:g} s</text>\n",
+                        panel.x(t), panel.y0 + kHeight + 15, t);
   return text + fmt::format("<text x=\"{}\" y=\"{:.0f}\" font-weight=\"bold\">{}</text>\n", kLeft, panel.y0 - 5, name);
 }
 } // namespace
@@ -121,7 +121,8 @@ std::string errorCurves(const LoopRecord &record, const std::string &title)
                                 height, kLeft, title);
   Panel panel{record.samples.empty() ? 1 : std::max(1.0, record.samples.back().time_s), 0, 1, kTop};
   for (const std::string &name : names) {
-    const Points believed = pointsOf(record, name, &LoopSample::believed), real = pointsOf(record, name, &LoopSample::real);
+    const Points believed = pointsOf(record, name, &LoopSample::believed),
+                 real = pointsOf(record, name, &LoopSample::real);
     fit(panel, believed, real);
     svg += bands(panel, record) + axes(panel, name);
     svg += line(panel, believed, "stroke=\"#4a7ab5\" stroke-width=\"0.8\"");
@@ -134,8 +135,9 @@ std::string errorCurves(const LoopRecord &record, const std::string &title)
 std::string samplesCsv(const LoopRecord &record)
 {
   const std::vector<std::string> names = namesIn(record);
-  std::string text = "time [s],phase,lost,hovering,frame,true x [m],true y [m],true z [m],x [m],y [m],z [m],vx [m/s],vy [m/s],"
-                     "wz [rad/s],speed [m/s],least clearance [m],loop [ms]";
+  std::string text =
+      "time [s],phase,lost,hovering,frame,true x [m],true y [m],true z [m],x [m],y [m],z [m],vx [m/s],vy [m/s],"
+      "wz [rad/s],speed [m/s],least clearance [m],loop [ms]";
   for (const std::string &name : names)
     text += ",believed " + name + ",true " + name;
   text += "\n";
@@ -146,10 +148,11 @@ std::string samplesCsv(const LoopRecord &record)
     return std::string();
   };
   for (const LoopSample &s : record.samples) {
-    text += fmt::format("{:.2f},{},{:d},{:d},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f}",
-                        s.time_s, toString(s.phase), s.is_lost, s.is_hovering, toString(s.frame_status), s.truth.t.x(),
-                        s.truth.t.y(), s.truth.t.z(), s.estimate.t.x(), s.estimate.t.y(), s.estimate.t.z(), s.command(0),
-                        s.command(1), s.command(3), s.speed, s.clearance, s.loop_ms);
+    text += fmt::format(
+        "{:.2f},{},{:d},{:d},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f}",
+        s.time_s, toString(s.phase), s.is_lost, s.is_hovering, toString(s.frame_status), s.truth.t.x(), s.truth.t.y(),
+        s.truth.t.z(), s.estimate.t.x(), s.estimate.t.y(), s.estimate.t.z(), s.command(0), s.command(1), s.command(3),
+        s.speed, s.clearance, s.loop_ms);
     for (const std::string &name : names)
       text += "," + value(s.believed, name) + "," + value(s.real, name);
     text += "\n";

@@ -10,10 +10,14 @@ namespace bole
 const char *toString(FaultKind kind)
 {
   switch (kind) {
-  case FaultKind::none: return "none";
-  case FaultKind::black: return "black";
-  case FaultKind::freeze: return "freeze";
-  case FaultKind::noise: return "noise";
+  case FaultKind::none:
+    return "none";
+  case FaultKind::black:
+    return "black";
+  case FaultKind::freeze:
+    return "freeze";
+  case FaultKind::noise:
+    return "noise";
   }
   return "?";
 }
@@ -46,13 +50,18 @@ bool FaultInjector::apply(Frame &frame, double servoing_s)
     return false;
   }
   switch (m_options.kind) {
-  case FaultKind::black: frame.image = 0; break;
-  case FaultKind::freeze: frame.image = m_last; break;
+  case FaultKind::black:
+    frame.image = 0;
+    break;
+  case FaultKind::freeze:
+    frame.image = m_last;
+    break;
   case FaultKind::noise:
     for (unsigned i = 0; i < frame.image.getSize(); ++i)
       frame.image.bitmap[i] = static_cast<unsigned char>(m_random.next() >> 56);
     break;
-  case FaultKind::none: break;
+  case FaultKind::none:
+    break;
   }
   return true;
 }

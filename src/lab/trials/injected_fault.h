@@ -3,8 +3,8 @@
 /// \file
 /// Faults of a camera and its link, put into frames on purpose.
 
-#include <bole/frame.h>
 #include "lab/simulation/random.h"
+#include <bole/frame.h>
 
 #include <string>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/random.h"
 #include "lab/trials/median_interval.h"
+#include "lab/simulation/random.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/random.h"
-#include "geometry/require_range.h"
 #include "lab/trials/scenario.h"
+#include "geometry/require_range.h"
+#include "lab/simulation/random.h"
 
 #include <cmath>
 
@@ -108,10 +108,14 @@ Scenario stand(const ScenarioOptions &options, ForestOptions forest)
 const char *toString(ServoKind kind)
 {
   switch (kind) {
-  case ServoKind::hold: return "hold";
-  case ServoKind::circle: return "circle";
-  case ServoKind::gap: return "gap";
-  case ServoKind::slalom: return "slalom";
+  case ServoKind::hold:
+    return "hold";
+  case ServoKind::circle:
+    return "circle";
+  case ServoKind::gap:
+    return "gap";
+  case ServoKind::slalom:
+    return "slalom";
   }
   return "?";
 }
@@ -132,7 +136,10 @@ Scenario makeScenario(const ScenarioOptions &options)
   forest.light = random.uniform() < 0.5 ? Light::sun : Light::overcast;
   forest.bark = Bark::mixed;
   const bool is_slalom = options.kind == ServoKind::slalom;
-  forest.density = options.density > 0 ? options.density : is_slalom ? 0.05 : options.kind == ServoKind::gap ? 0.04 : 0.03;
+  forest.density = options.density > 0              ? options.density
+                   : is_slalom                      ? 0.05
+                   : options.kind == ServoKind::gap ? 0.04
+                                                    : 0.03;
   if (is_slalom)
     return stand(options, forest);
   return options.kind == ServoKind::gap ? twoTrunks(forest, random) : oneTrunk(options, forest, random);

@@ -21,10 +21,10 @@ const char *toString(ServoKind kind);
 struct ScenarioOptions
 {
   ServoKind kind = ServoKind::hold;
-  std::uint64_t seed = 1;     ///< same seed, same scenario
-  double density = 0;         ///< trunks a m^2; 0: 0.03 for hold and circle, 0.04 for gap, 0.05 for slalom
-  double ratio = 0.07;        ///< circle: r/d of the ring round the trunk that is kept clear, 0.01 to 0.5
-  double length = 40;         ///< slalom [m], 1 to 1000
+  std::uint64_t seed = 1; ///< same seed, same scenario
+  double density = 0;     ///< trunks a m^2; 0: 0.03 for hold and circle, 0.04 for gap, 0.05 for slalom
+  double ratio = 0.07;    ///< circle: r/d of the ring round the trunk that is kept clear, 0.01 to 0.5
+  double length = 40;     ///< slalom [m], 1 to 1000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -38,8 +38,8 @@ struct Scenario
 {
   Forest forest;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();
-  double heading = 0; ///< [rad]
-  int target = -1;    ///< id of the trunk meant (hold, circle)
+  double heading = 0;        ///< [rad]
+  int target = -1;           ///< id of the trunk meant (hold, circle)
   int left = -1, right = -1; ///< ids of the gap's trunks
   double gap_width = 0;      ///< bark to bark at flight height [m]
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/trials/servo_trial.h"
 #include "lab/tasks/gap_task.h"
 #include "lab/tasks/slalom_task.h"
 #include "lab/tasks/trunk_task.h"
-#include "lab/trials/servo_trial.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,10 +15,10 @@ namespace bole
 namespace
 {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kFinal_s = 5;        ///< final errors are those of the last seconds
+constexpr double kFinal_s = 5; ///< final errors are those of the last seconds
 constexpr double kBearing_deg = 0.5, kDistance = 0.03;
-constexpr double kLeastGap = 1.2;     ///< true free width that another gap than the one set up must have [m]
-constexpr double kSameTrunk = 0.6;    ///< a trunk of the map this near to one of the truth is that one [m]
+constexpr double kLeastGap = 1.2;  ///< true free width that another gap than the one set up must have [m]
+constexpr double kSameTrunk = 0.6; ///< a trunk of the map this near to one of the truth is that one [m]
 
 /// The trunk of the truth that stands where the map has the trunk \p id, both seen from the drone; -1: none.
 int trueTrunk(const Forest &forest, const Pipeline &pipeline, int id, const Pose &truth, const Pose &estimate)
@@ -44,7 +44,7 @@ class TrunkJudge
 {
 public:
   TrunkJudge(const Scenario &scenario, const TrunkTask &task, const Pipeline &pipeline, const Pose &bMc)
-    : m_scenario(scenario), m_task(task), m_pipeline(pipeline), m_bMc(bMc)
+      : m_scenario(scenario), m_task(task), m_pipeline(pipeline), m_bMc(bMc)
   {
   }
 
@@ -87,7 +87,7 @@ class GapJudge
 {
 public:
   GapJudge(const Scenario &scenario, const GapTask &task, const Pipeline &pipeline)
-    : m_scenario(scenario), m_task(task), m_pipeline(pipeline)
+      : m_scenario(scenario), m_task(task), m_pipeline(pipeline)
   {
   }
 
@@ -197,7 +197,8 @@ double turnedRound(const LoopRecord &record, const SimulatedTrunk &trunk)
 
 void judgeTrunk(ServoTrialResult &result, const ServoTrialOptions &options, const Scenario &scenario, int trunk)
 {
-  const Moments bearing = finalError(result.record, "bearing [deg]"), distance = finalError(result.record, "distance [%]");
+  const Moments bearing = finalError(result.record, "bearing [deg]"),
+                distance = finalError(result.record, "distance [%]");
   result.bearing_rms_deg = bearing.rms;
   result.distance_rms = distance.rms / 100;
   result.distance_mean = distance.mean / 100;
@@ -221,7 +222,8 @@ bool passedBetween(const LoopRecord &record, const SimulatedTrunk &left, const S
 {
   for (std::size_t k = 1; k < record.samples.size(); ++k) {
     const Eigen::Vector3d a = record.samples[k - 1].truth.t, b = record.samples[k].truth.t;
-    const Eigen::Vector2d l = left.axisAt(b.z() - left.foot.z()).head<2>(), r = right.axisAt(b.z() - right.foot.z()).head<2>();
+    const Eigen::Vector2d l = left.axisAt(b.z() - left.foot.z()).head<2>(),
+                          r = right.axisAt(b.z() - right.foot.z()).head<2>();
     const Eigen::Vector2d across = r - l, normal(-across.y(), across.x());
     const double side_a = normal.dot(a.head<2>() - l), side_b = normal.dot(b.head<2>() - l);
     const double place = across.dot(b.head<2>() - l) / across.squaredNorm();
@@ -290,8 +292,16 @@ void judgeFault(ServoTrialResult &result)
 } // namespace
 
 ServoTrialResult::ServoTrialResult()
-  : bearing_rms_deg(kNaN), distance_rms(kNaN), distance_mean(kNaN), ratio_rms(kNaN), turned_deg(kNaN), gap_width(kNaN),
-    progress(kNaN), mean_speed(kNaN), hover_after_s(kNaN), drift(kNaN)
+    : bearing_rms_deg(kNaN),
+      distance_rms(kNaN),
+      distance_mean(kNaN),
+      ratio_rms(kNaN),
+      turned_deg(kNaN),
+      gap_width(kNaN),
+      progress(kNaN),
+      mean_speed(kNaN),
+      hover_after_s(kNaN),
+      drift(kNaN)
 {
 }
 

@@ -10,20 +10,20 @@ namespace bole
 {
 struct ServoTrialOptions
 {
-  ScenarioOptions scenario;    ///< with the task and the seed
-  double distance = 3;         ///< hold [m], 0.5 to 20
-  double ratio = 0;            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
-  double speed = 0;            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
+  ScenarioOptions scenario;                                    ///< with the task and the seed
+  double distance = 3;                                         ///< hold [m], 0.5 to 20
+  double ratio = 0;                                            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
+  double speed = 0;                                            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
   PipelineOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
   /// vpSimulatorArDrone's defaults with a stiffer velocity loop (gain 0.6) and 2 samples a pixel.
   static vpSimulatorArDrone::Options defaultRobot();
-  /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by one
-  /// trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from one
-  /// place would make each frame dearer than the last. That counts but once, and where it goes round trunks (all but
-  /// hold) their borders may turn over.
+  /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by
+  /// one trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from
+  /// one place would make each frame dearer than the last. That counts but once, and where it goes round trunks (all
+  /// but hold) their borders may turn over.
   static PipelineOptions defaultPipeline(ServoKind kind);
 };
 
@@ -43,14 +43,14 @@ struct ServoTrialResult
   bool is_other_gap = false;            ///< gap: not the one that the scenario has set up
   double progress, mean_speed;          ///< slalom [m], [m/s]
   double median_loop_ms = 0, p95_loop_ms = 0;
-  double hover_after_s, drift;          ///< fault: until it hovered [s]; how far it moved while it lasted [m]
+  double hover_after_s, drift; ///< fault: until it hovered [s]; how far it moved while it lasted [m]
   LoopRecord record;
 
   ServoTrialResult();
 };
 
 /// Flies it. Success: hold and circle: right trunk, rms of the true bearing within 0.5 degrees and of the distance
-/// within 3 % over the last 5 s (circle: once round too); gap: through one that is wide enough; slalom: to the end of the line; all without
-/// touching a trunk.
+/// within 3 % over the last 5 s (circle: once round too); gap: through one that is wide enough; slalom: to the end of
+/// the line; all without touching a trunk.
 ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatcher &watcher = {});
 } // namespace bole

@@ -79,7 +79,8 @@ TEST(TestFlightOdometry, PredictsTheStepOnTheGivenPoseAndItsOwnHeightAndTilt)
 TEST(TestFlightOdometry, TurnsTheStepWithTheYawOfTheGivenPose)
 {
   const TestFlight flight = drawnFlight(3);
-  const Pose turned = (Pose(expSo3({0, 0, M_PI / 2}), Eigen::Vector3d::Zero()) * flight.frames[1].cMo.inverse()).inverse();
+  const Pose turned =
+      (Pose(expSo3({0, 0, M_PI / 2}), Eigen::Vector3d::Zero()) * flight.frames[1].cMo.inverse()).inverse();
   const Eigen::Vector3d step = flight.frames[2].cMo.inverse().t - flight.frames[1].cMo.inverse().t;
   const Eigen::Vector3d predicted = flight.predicted(2, turned).inverse().t - turned.inverse().t;
   EXPECT_NEAR(predicted.x(), -step.y(), 1e-9);
@@ -132,7 +133,7 @@ TEST_F(Comparison, AWrongPoseWithoutComplaintIsASilentFailure)
   EXPECT_EQ(score.until_loss, 4);
   EXPECT_EQ(score.tracked, 4);
   EXPECT_EQ(score.silent_failures, 3);
-  EXPECT_LT(score.position_rmse_m, 0.05);     // until the loss
+  EXPECT_LT(score.position_rmse_m, 0.05); // until the loss
   EXPECT_GT(score.all_position_rmse_m, 0.5);
 }
 

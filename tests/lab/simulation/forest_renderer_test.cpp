@@ -67,8 +67,8 @@ TEST(ForestRenderer, BordersOfAStraightTrunkAreThoseOfTheRelativeTrunk)
       const Eigen::Vector2d b = camera.project(relative.borderDirection(border, 0.4));
       return a.x() + (b.x() - a.x()) * (row - a.y()) / (b.y() - a.y());
     };
-    const int row = static_cast<int>(
-        std::lround(camera.project(relative.borderDirection(Border::left, elevation)).y()));
+    const int row =
+        static_cast<int>(std::lround(camera.project(relative.borderDirection(Border::left, elevation)).y()));
     const auto [first, last] = columnsOfTrunk(frame, row);
     left_error += first - 0.5 - columnAt(Border::left, row);
     right_error += last + 0.5 - columnAt(Border::right, row);
@@ -115,8 +115,7 @@ TEST(ForestRenderer, MotionBlursWhatAStillCameraSeesSharp)
   ForestRenderer renderer(forest, options);
   RenderedFrame still, moving;
   renderer.render(cameraAt({0, 0, 1.2}), still);
-  renderer.render(cameraAt({0, 0, 1.2}, {0, 0, -0.03}), cameraAt({0, 0, 1.2}, {0, 0, 0.03}),
-                  moving);
+  renderer.render(cameraAt({0, 0, 1.2}, {0, 0, -0.03}), cameraAt({0, 0, 1.2}, {0, 0, 0.03}), moving);
   const auto steepest = [](const vpImage<unsigned char> &image) {
     int most = 0;
     for (unsigned column = 90; column < 230; ++column) {
@@ -134,10 +133,8 @@ TEST(ForestRenderer, SunCastsTheShadowOfATrunk)
   const Forest forest = singlePole(Light::sun);
   ForestRenderer renderer(forest, options);
   // Straight down on the shadow, 1.5 m beside the foot, away from the sun.
-  const Eigen::Vector3d away =
-      Eigen::Vector3d(-forest.to_sun.x(), -forest.to_sun.y(), 0).normalized();
-  const Eigen::Vector3d above =
-      forest.trunks.front().foot + 1.5 * away + Eigen::Vector3d(0, 0, 1.2);
+  const Eigen::Vector3d away = Eigen::Vector3d(-forest.to_sun.x(), -forest.to_sun.y(), 0).normalized();
+  const Eigen::Vector3d above = forest.trunks.front().foot + 1.5 * away + Eigen::Vector3d(0, 0, 1.2);
   Eigen::Matrix3d down;
   down << 0, -1, 0, -1, 0, 0, 0, 0, -1;
   RenderedFrame frame;

@@ -47,8 +47,7 @@ TEST(Random, NormalNumbersHaveMeanZeroAndVarianceOne)
 TEST(Forest, SameSeedSameForest)
 {
   ForestOptions options;
-  const Forest a = Forest::plant(options, straightPath(10)),
-               b = Forest::plant(options, straightPath(10));
+  const Forest a = Forest::plant(options, straightPath(10)), b = Forest::plant(options, straightPath(10));
   ASSERT_EQ(a.trunks.size(), b.trunks.size());
   for (std::size_t k = 0; k < a.trunks.size(); ++k) {
     EXPECT_EQ(a.trunks[k].foot, b.trunks[k].foot);
@@ -100,8 +99,7 @@ TEST(Forest, RefusesADensityOutOfRange)
     FAIL() << "accepted";
   }
   catch (const vpException &error) {
-    EXPECT_NE(std::string(error.what()).find("density = -1, must be 0 to 0.3"), std::string::npos)
-        << error.what();
+    EXPECT_NE(std::string(error.what()).find("density = -1, must be 0 to 0.3"), std::string::npos) << error.what();
   }
 }
 

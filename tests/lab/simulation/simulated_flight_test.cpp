@@ -68,7 +68,8 @@ TEST_F(SimulatedFlight, SameSceneSameBytes)
 
 TEST_F(SimulatedFlight, ItsCameraFileIsReadForEveryLens)
 {
-  for (const Distortion distortion : {Distortion::none, Distortion::radial_tangential, Distortion::equidistant, Distortion::fov}) {
+  for (const Distortion distortion :
+       {Distortion::none, Distortion::radial_tangential, Distortion::equidistant, Distortion::fov}) {
     SceneOptions scene;
     scene.renderer.camera.distortion = distortion;
     scene.renderer.camera.coefficients = {{0.1, 0, 0, 0}};
@@ -186,8 +187,7 @@ TEST(SimulatedImu, FeelsGravityAtRestAndTurnsWithTheBody)
   SensorOptions options;
   options.gyro_bias = options.gyro_noise = options.accelerometer_noise = 0;
   SimulatedImu imu(options);
-  const ImuSample sample =
-      imu.measure(expSo3({0.1, 0, 0}), {0.2, 0, -0.3}, Eigen::Vector3d::Zero());
+  const ImuSample sample = imu.measure(expSo3({0.1, 0, 0}), {0.2, 0, -0.3}, Eigen::Vector3d::Zero());
   EXPECT_EQ(sample.gyro, Eigen::Vector3d(0.2, 0, -0.3));
   EXPECT_NEAR(sample.accelerometer.y(), 9.81 * std::sin(0.1), 1e-12);
   EXPECT_NEAR(sample.accelerometer.z(), 9.81 * std::cos(0.1), 1e-12);

@@ -34,7 +34,11 @@ TEST(NearPoints, WhatStandsUprightCountsAndWhatLiesLowDoesNot)
   const Pose wMb(Eigen::Matrix3d::Identity(), {0, 0, 1.2});
   NearPoints near;
   for (int k = 0; k < 4; ++k) // in a frame each: bark, a bush, a crown over the drone
-    near.see({{1.03, 0.02, 0.6 + 0.3 * k}, {1.03, 0.02, 1.2}, {1.03, 1.02, 0.5 + 0.02 * k}, {1.03, 1.02, 0.5}, {1.03, -1.02, 3.0}},
+    near.see({{1.03, 0.02, 0.6 + 0.3 * k},
+              {1.03, 0.02, 1.2},
+              {1.03, 1.02, 0.5 + 0.02 * k},
+              {1.03, 1.02, 0.5},
+              {1.03, -1.02, 3.0}},
              wMb, 0.1 * k);
   std::vector<Obstacle> found;
   near.addTo(found, wMb, 2);

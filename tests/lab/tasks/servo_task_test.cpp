@@ -42,7 +42,8 @@ protected:
 
 TEST_F(Safety, HoversAtOnceWhereAFrameIsNotOk)
 {
-  for (const FrameStatus status : {FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized}) {
+  for (const FrameStatus status :
+       {FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized}) {
     Ahead task;
     for (int k = 0; k < 5; ++k)
       ASSERT_FALSE(hovers(task));

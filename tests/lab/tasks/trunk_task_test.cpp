@@ -128,7 +128,9 @@ struct SlowFlight : Flight
   ResponseOptions response;
   DroneResponse drone;
 
-  SlowFlight(const Flight &flight, const ResponseOptions &options) : Flight(flight), response(options), drone(options) {}
+  SlowFlight(const Flight &flight, const ResponseOptions &options) : Flight(flight), response(options), drone(options)
+  {
+  }
 
   /// \p obeyed: share of the velocity that is flown; the rest is drag.
   void fly(TrunkTask &task, double radius, double from_s, double to_s, double obeyed = 1)

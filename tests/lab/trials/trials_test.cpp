@@ -174,7 +174,8 @@ TEST(ClosedLoop, HoversInTheFrameOfEachFaultAndFliesOnAfterIt)
     double speed_at_end_of_fault = 1;
     for (const LoopSample &sample : record.samples) {
       spoilt += sample.is_spoilt;
-      EXPECT_TRUE(!sample.is_spoilt || (sample.is_hovering && sample.frame_status != FrameStatus::ok)) << toString(fault);
+      EXPECT_TRUE(!sample.is_spoilt || (sample.is_hovering && sample.frame_status != FrameStatus::ok))
+          << toString(fault);
       if (sample.is_spoilt)
         speed_at_end_of_fault = sample.speed;
       after += spoilt == 15 && !sample.is_spoilt && !sample.is_hovering;
