@@ -70,9 +70,9 @@ bool isCompressed(const FrameSource &source)
          dynamic_cast<const VideoSource *>(&source) != nullptr;
 }
 
-PipelineOptions readOptions(const Arguments &arguments, bool is_compressed)
+StageOptions readOptions(const Arguments &arguments, bool is_compressed)
 {
-  PipelineOptions options = is_compressed ? forCompressedVideo() : PipelineOptions();
+  StageOptions options = is_compressed ? forCompressedVideo() : StageOptions();
   if (!arguments.config.empty())
     readConfig(arguments.config, options);
   for (const std::string &setting : arguments.settings)
@@ -148,7 +148,7 @@ void track(const Arguments &arguments)
   readOptions(arguments, false); // a mistake in them is said before the input is waited for
   std::string note;
   const auto source = openInput(arguments, note);
-  PipelineOptions options = readOptions(arguments, isCompressed(*source));
+  StageOptions options = readOptions(arguments, isCompressed(*source));
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   options.visual.focal_known = options.visual.focal_known && source->isCameraKnown();
   if (!note.empty())

@@ -172,7 +172,7 @@ void report(const Arguments &arguments, const std::vector<Flight> &flights)
 
 void run(const Arguments &arguments)
 {
-  PipelineOptions options;
+  StageOptions options;
   if (!arguments.config.empty())
     readConfig(arguments.config, options);
   for (const std::string &setting : arguments.settings)

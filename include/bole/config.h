@@ -9,7 +9,7 @@
 ///
 /// Laws (each a test): config/default.yaml gives the defaults of the code; readConfig(toYaml(x)) == x.
 
-#include <bole/options.h>
+#include "pipeline/stage_options.h"
 
 #include <string>
 #include <variant>
@@ -25,15 +25,15 @@ struct OptionEntry
 };
 
 /// Every option of \p options, in the order of the stages. Points into \p options.
-std::vector<OptionEntry> optionEntries(PipelineOptions &options);
+std::vector<OptionEntry> optionEntries(StageOptions &options);
 
 /// Reads \p path over \p options and validates the result.
 /// \throw vpException "file:line: key = value, must be ..."; \p options is then unchanged.
-void readConfig(const std::string &path, PipelineOptions &options);
+void readConfig(const std::string &path, StageOptions &options);
 
 /// Sets one option from "stage.name=value". \throw vpException naming it.
-void setOption(const std::string &assignment, PipelineOptions &options);
+void setOption(const std::string &assignment, StageOptions &options);
 
 /// All options as YAML.
-std::string toYaml(const PipelineOptions &options);
+std::string toYaml(const StageOptions &options);
 } // namespace bole

@@ -1,84 +1,92 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// All options of the pipeline: one aggregate a stage.
-
-#include "detection/line_detector.h"
-#include "gradient/gradient.h"
-#include "map/trunk_map.h"
-#include "motion/point_motion.h"
-#include "pipeline/motion_model.h"
-#include "pipeline/visual_odometry.h"
-#include "saliency/saliency_options.h"
-#include "tracking/trunk_tracker.h"
-#include <bole/smoother.h>
+/// What a user may ask of the pipeline. Lengths [m], angles [rad], times [s]; `bole options` prints every key with its
+/// unit, range, default and effect.
+///
+/// What is not here is a constant of the stage that uses it. Thresholds on the picture are held for a camera with a
+/// focal length of 200 px and follow the focal length of the camera in use.
 
 namespace bole
 {
-/// Points for the smoother, which has the pose filter already: it must not count twice.
-inline PointMotionOptions withoutOdometry()
+struct Options
 {
-  PointMotionOptions options;
-  options.use_odometry = false;
-  return options;
-}
+  struct Camera
+  {
+    double height = 0;       ///< over the ground [m]; 0: not known. Gives a video without odometry its scale
+    bool focal_known = true; ///< false: the focal length is a guess
+    double rate = 10;        ///< frames a second
+    bool compressed = false; ///< the pictures went through a lossy codec
+  } camera;
 
-/// More iterations a frame than the smoother takes by itself: what the detector and the map choose rests on where the
-/// trunks stand now, and a flight has few poses against those the smoother is made for.
-inline SmootherOptions closeToTheOptimum()
-{
-  SmootherOptions options;
-  options.max_iterations = 4;
-  return options;
-}
+  struct Stages
+  {
+    bool points = true;          ///< relative poses from point features
+    bool saliency = true;        ///< motion saliency: off leaves detection ungated
+    bool window_detector = true; ///< new trunks from a window of frames
+    bool line_detector = false;  ///< new trunks from one frame; always on where no range is known
+    bool servoing = false;       ///< the camera is steered by what is tracked, and may rest or circle a trunk
+  } stages;
 
-/// What belongs to no single stage.
-struct FlowOptions
-{
-  bool use_points = true;       ///< relative poses from point features
-  bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
-  bool detect_lines = false;    ///< the one-frame detector too; always on where no odometry gives a range
-  bool detect_window = true;    ///< the detector that asks a window of frames
-  int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
-  int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
-                                ///< time and, while it is wrong, pulls on the trajectory
-  double view_spacing = 0.06;   ///< least move between two views of the detector's window [m], 0 to 1
-  double trunk_low = 0.25;      ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
-  double trunk_high = 2.6;      ///< ... to [m]; its middle is near breast height, where radii are told
-  double track_range = 12;      ///< known trunks farther than this are not tracked [m], 1 to 100
-  double gate = 9.2;            ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
-  double contrast_noise = 0.02; ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
-  double gate_sigma_px = 1.0;   ///< of a border beside the prediction [px], 0.1 to 10
-  double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
-                                ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
-  double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
-                                ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
-  int turned_frames = 0; ///< borders whose sign turned over are believed when found where they are expected in so
-                         ///< many frames in a row: seen from its other side, what was brighter than the background
-                         ///< is darker; 0 (never) to 1000
+  struct Trunks
+  {
+    double radius = 0.15;      ///< median of the prior [m]
+    double radius_sigma = 0.5; ///< standard deviation of its logarithm
+    double radius_min = 0.06;  ///< thinner trunks are not looked for [m]
+    double radius_max = 0.38;  ///< thicker trunks are not looked for [m]
+    double lean = 0.035;       ///< standard deviation of the lean [tan]; 0.0001: upright
+    double low = 0.25;         ///< lower end of the part that is tracked, over the ground [m]
+    double high = 2.6;         ///< upper end [m]
+  } trunks;
 
-  void validate() const; ///< \throw vpException naming the option, its value and the range
+  struct Range ///< all [m]
+  {
+    double track = 12;        ///< known trunks farther than this are not tracked
+    double detect_min = 1.5;  ///< of a new trunk
+    double detect_max = 10.5; ///< of a new trunk
+    double near = 6;          ///< nearer than this is foreground for the saliency; 0: saliency is not asked of a trunk
+    double through = 9;       ///< whether points are seen through a trunk is asked nearer than this; 0: never
+  } range;
+
+  struct Detection
+  {
+    int window = 18;              ///< frames looked at together
+    double elevation_low = -0.17; ///< lower end of the part of a trunk that is looked for [tan]
+    double elevation_high = 0.45; ///< upper end [tan]
+  } detection;
+
+  struct Map
+  {
+    double confirm_probability = 0.6225; ///< that a candidate is a trunk, at which it is confirmed
+    double confirm_sigma = 0.4;          ///< standard deviation of its place at which it may be confirmed [m]
+    double merge_distance = 0.3;         ///< trunks with less than this between their bark are one [m]
+    double candidate_memory = 5;         ///< a candidate not seen for longer is no longer looked for [s]
+    double lag = 0;                      ///< poses older than this are marginalised [s]; 0: all stay open
+  } map;
+
+  struct Odometry ///< noise of the pose filter, a step: between two frames
+  {
+    double step = 0.012;         ///< horizontal noise of a step [m]
+    double step_vertical = 0.03; ///< vertical noise of a step [m]
+    double scale = 0.03;         ///< error in proportion to the path
+    double height = 0.02;        ///< of the height about the truth [m]
+    double tilt = 0.005;         ///< of roll and pitch about the truth [rad]
+    double turn = 0.006;         ///< of the rotation of a step, used where there is no gyro [rad]
+  } odometry;
+
+  struct Gyro
+  {
+    double noise = 8e-4; ///< white noise of the rate [rad/s/sqrt(Hz)]
+    double bias = 0.008; ///< standard deviation of the bias at the start [rad/s]
+  } gyro;
+
+  struct Paper ///< the method as printed in the paper, for comparison
+  {
+    bool energy = false;   ///< Eq. 3: dark trunks, blurred parts, minimised from the prediction
+    double alpha = 1000;   ///< its weight
+    bool saliency = false; ///< Eq. 10 to 17
+  } paper;
+
+  void validate() const; ///< \throw vpException "key = value, must be ..."
 };
-
-struct PipelineOptions
-{
-  FlowOptions flow;
-  MotionModelOptions motion;
-  PointMotionOptions points = withoutOdometry();
-  VisualOdometryOptions visual;
-  GradientOptions gradient;
-  SaliencyOptions saliency;
-  DetectorOptions detection;
-  LineDetectorOptions lines;
-  TrackingOptions tracking;
-  SmootherOptions smoothing = closeToTheOptimum();
-  MapOptions map;
-
-  void validate() const;
-};
-
-/// The defaults for images that went through a lossy video codec (a drone's or phone's H.264): where it leaves texture
-/// standing, corners seem to stand too, an error that many share and that their residuals do not show. So corners are
-/// believed to 0.2 px at best. The same stands in config/compressed.yaml.
-PipelineOptions forCompressedVideo();
 } // namespace bole

@@ -9,7 +9,7 @@
 ///
 /// \code
 /// bole::AslSource source("data/park-forward");
-/// bole::Pipeline pipeline(source.camera(), source.bMc(), bole::PipelineOptions());
+/// bole::Pipeline pipeline(source.camera(), source.bMc(), bole::Options());
 /// bole::Frame frame;
 /// while (source.next(frame)) {
 ///   const bole::FrameResult result = pipeline.process(frame);
@@ -21,6 +21,7 @@
 /// Memory: the window of the detector and the graph of the smoother; no image is kept beyond the window.
 /// Not thread-safe; no globals.
 
+#include "pipeline/stage_options.h"
 #include "saliency/saliency.h"
 #include <bole/options.h>
 #include <bole/world_reference.h>
@@ -59,7 +60,8 @@ struct FrameResult
 class Pipeline
 {
 public:
-  Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineOptions &options = {});
+  Pipeline(const PinholeCamera &camera, const Pose &bMc, const Options &options = {});
+  Pipeline(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options); ///< for tests and the ablation
 
   /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted.
   FrameResult process(const Frame &frame);
@@ -152,7 +154,7 @@ private:
 
   PinholeCamera m_camera;
   Pose m_bMc;
-  PipelineOptions m_options;
+  StageOptions m_options;
   MotionModel m_motion;
   PointMotion m_points;
   std::optional<VisualOdometry> m_visual; ///< of a plain video: one that starts without odometry

@@ -322,7 +322,7 @@ std::string locate(const std::string &path, const YAML::Node &root, const std::s
 }
 } // namespace
 
-std::vector<OptionEntry> optionEntries(PipelineOptions &options)
+std::vector<OptionEntry> optionEntries(StageOptions &options)
 {
   std::vector<OptionEntry> entries;
   addFlow(entries, options.flow);
@@ -341,7 +341,7 @@ std::vector<OptionEntry> optionEntries(PipelineOptions &options)
   return entries;
 }
 
-void readConfig(const std::string &path, PipelineOptions &options)
+void readConfig(const std::string &path, StageOptions &options)
 {
   YAML::Node root;
   try {
@@ -353,7 +353,7 @@ void readConfig(const std::string &path, PipelineOptions &options)
   catch (const YAML::Exception &error) {
     fail(fmt::format("{}: {}", where(path, error.mark), error.msg));
   }
-  PipelineOptions changed = options;
+  StageOptions changed = options;
   const auto entries = optionEntries(changed);
   if (!root.IsNull() && !root.IsMap())
     fail(fmt::format("{}: must be a map of stages", path));
@@ -376,11 +376,11 @@ void readConfig(const std::string &path, PipelineOptions &options)
   options = changed;
 }
 
-void setOption(const std::string &assignment, PipelineOptions &options)
+void setOption(const std::string &assignment, StageOptions &options)
 {
   const auto equals = assignment.find('=');
   const std::string name = assignment.substr(0, equals);
-  PipelineOptions changed = options;
+  StageOptions changed = options;
   for (const OptionEntry &entry : optionEntries(changed)) {
     if (entry.name != name)
       continue;
@@ -396,9 +396,9 @@ void setOption(const std::string &assignment, PipelineOptions &options)
   fail(fmt::format("--set {}: {} is no option", assignment, name));
 }
 
-std::string toYaml(const PipelineOptions &options)
+std::string toYaml(const StageOptions &options)
 {
-  PipelineOptions copy = options;
+  StageOptions copy = options;
   std::string text, stage;
   for (const OptionEntry &entry : optionEntries(copy)) {
     if (stageOf(entry.name) != stage) {

@@ -30,7 +30,12 @@ SmootherOptions withCamera(SmootherOptions options, const Pose &bMc)
 }
 } // namespace
 
-Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const PipelineOptions &options)
+Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const Options &options)
+    : Pipeline(camera, bMc, stageOptions(options, camera))
+{
+}
+
+Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options)
     : m_camera(camera),
       m_bMc(bMc),
       m_options(options),

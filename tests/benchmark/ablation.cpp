@@ -50,7 +50,7 @@ const std::vector<Step> kSteps = {
 
 Evaluation fly(const std::string &sequence, const Step &step)
 {
-  PipelineOptions options;
+  StageOptions options;
   for (const std::string &setting : step.settings)
     setOption(setting, options);
   AslSource source(sequence);

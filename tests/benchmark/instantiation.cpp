@@ -47,7 +47,7 @@ std::vector<Life> fly(const std::string &sequence)
   const std::vector<TruthTrunk> trees = readTruthTrunks(sequence);
   std::vector<Life> lives(trees.size());
   std::vector<Pose> truth;
-  Pipeline pipeline(source.camera(), source.bMc(), PipelineOptions());
+  Pipeline pipeline(source.camera(), source.bMc(), Options());
   for (std::size_t k = 0;; ++k) {
     Frame frame;
     if (!source.next(frame))

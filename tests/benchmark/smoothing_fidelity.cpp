@@ -30,7 +30,7 @@ struct ImageView
 
 struct Flight
 {
-  PipelineOptions options;
+  StageOptions options;
   PinholeCamera camera;
   Graph graph;                     ///< at the optimum of its summary factors
   std::vector<Gradient> gradients; ///< of each pose

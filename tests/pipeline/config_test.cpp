@@ -18,7 +18,7 @@ std::string messageOf(const std::string &yaml)
 {
   const std::string path = testing::TempDir() + "config_test.yaml";
   std::ofstream(path) << yaml;
-  PipelineOptions options;
+  StageOptions options;
   try {
     readConfig(path, options);
   }
@@ -35,12 +35,12 @@ TEST(Config, DefaultPresetIsWhatTheCodeHas)
   for (std::string line; std::getline(file, line);)
     if (line.empty() || line[0] != '#')
       text << line << "\n";
-  EXPECT_EQ(text.str(), toYaml(PipelineOptions()));
+  EXPECT_EQ(text.str(), toYaml(StageOptions()));
 }
 
 TEST(Config, PaperPresetIsRead)
 {
-  PipelineOptions options;
+  StageOptions options;
   readConfig(BOLE_SOURCE_DIR "/config/paper.yaml", options);
   EXPECT_EQ(options.tracking.energy.form, EnergyForm::paper);
   EXPECT_FALSE(options.flow.use_points);
@@ -49,12 +49,12 @@ TEST(Config, PaperPresetIsRead)
 /// Every file of config/ is a preset, and the cameras of the drones stand beside theirs.
 TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
 {
-  const std::string defaults = toYaml(PipelineOptions());
+  const std::string defaults = toYaml(StageOptions());
   std::vector<std::string> names;
   for (const auto &entry : std::filesystem::directory_iterator(BOLE_SOURCE_DIR "/config")) {
     if (!entry.is_regular_file())
       continue;
-    PipelineOptions options;
+    StageOptions options;
     EXPECT_NO_THROW(readConfig(entry.path().string(), options)) << entry.path();
     names.push_back(entry.path().stem().string());
     EXPECT_EQ(toYaml(options) == defaults, names.back() == "default") << names.back();
@@ -66,20 +66,20 @@ TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
 
 TEST(Config, CompressedPresetIsWhatTheCodeHas)
 {
-  PipelineOptions options;
+  StageOptions options;
   readConfig(BOLE_SOURCE_DIR "/config/compressed.yaml", options);
   EXPECT_EQ(toYaml(options), toYaml(forCompressedVideo()));
-  EXPECT_NE(toYaml(options), toYaml(PipelineOptions()));
+  EXPECT_NE(toYaml(options), toYaml(StageOptions()));
 }
 
 TEST(Config, ReadingWhatWasWrittenChangesNothing)
 {
-  PipelineOptions options;
+  StageOptions options;
   setOption("detection.window=31", options);
   setOption("points.frames_back=[1, 2, 5]", options);
   const std::string path = testing::TempDir() + "config_round.yaml";
   std::ofstream(path) << toYaml(options);
-  PipelineOptions read;
+  StageOptions read;
   readConfig(path, read);
   EXPECT_EQ(toYaml(read), toYaml(options));
   EXPECT_EQ(read.detection.window, 31);
@@ -97,7 +97,7 @@ TEST(Config, MistakesAreNamedWithTheirLine)
 
 TEST(Config, AMistakeLeavesTheOptionsAsTheyWere)
 {
-  PipelineOptions options;
+  StageOptions options;
   const std::string before = toYaml(options);
   EXPECT_THROW(setOption("detection.window=1000", options), vpException);
   EXPECT_THROW(setOption("detection.nothing=1", options), vpException);

@@ -33,7 +33,7 @@ Frame frameAt(int k)
 /// Confirmed trunks tracked in each of 60 frames.
 std::vector<int> trackedWith(int turned_frames)
 {
-  PipelineOptions options;
+  StageOptions options;
   options.flow.turned_frames = turned_frames;
   Pipeline pipeline(kCamera, kMount, options);
   std::vector<int> tracked;
@@ -66,7 +66,7 @@ TEST(TurnedTrunk, IsAnotherEdgeWhereNobodyAsksForIt)
 /// Standard deviation of log r of the nearest trunk after 30 frames to and fro and \p rest frames at rest.
 double radiusSigmaAfter(int rest, double view_correlation)
 {
-  PipelineOptions options;
+  StageOptions options;
   options.flow.view_correlation = view_correlation;
   Pipeline pipeline(kCamera, kMount, options);
   for (int k = 0; k < 30 + rest; ++k) {

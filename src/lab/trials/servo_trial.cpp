@@ -313,9 +313,9 @@ vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
   return robot;
 }
 
-PipelineOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
+StageOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
 {
-  PipelineOptions pipeline;
+  StageOptions pipeline;
   pipeline.flow.search_px = 1;
   pipeline.flow.view_correlation = 0.05;
   pipeline.flow.turned_frames = kind == ServoKind::hold ? 0 : 3;

@@ -14,7 +14,7 @@ struct ServoTrialOptions
   double distance = 3;                                         ///< hold [m], 0.5 to 20
   double ratio = 0;                                            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
   double speed = 0;                                            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
-  PipelineOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
+  StageOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
@@ -24,7 +24,7 @@ struct ServoTrialOptions
   /// one trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from
   /// one place would make each frame dearer than the last. That counts but once, and where it goes round trunks (all
   /// but hold) their borders may turn over.
-  static PipelineOptions defaultPipeline(ServoKind kind);
+  static StageOptions defaultPipeline(ServoKind kind);
 };
 
 /// What came of it. Figures that a task does not have are NaN.

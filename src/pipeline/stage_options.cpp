@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/stage_options.h"
+
+#include "geometry/require_range.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+constexpr double kCompressedSigma_px = 0.2; ///< of a corner in pictures that went through a lossy codec, at best
+}
+
+void FlowOptions::validate() const
+{
+  requireRange("flow.adopt_most", adopt_most, 1, 100);
+  requireRange("flow.detect_every", detect_every, 1, 100);
+  requireRange("flow.view_spacing", view_spacing, 0, 1);
+  requireRange("flow.trunk_low", trunk_low, 0, 5);
+  requireRange("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
+  requireRange("flow.track_range", track_range, 1, 100);
+  requireRange("flow.gate", gate, 1, 100);
+  requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
+  requireRange("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
+  requireRange("flow.search_px", search_px, 0, 5);
+  requireRange("flow.view_correlation", view_correlation, 0, 1);
+  requireRange("flow.turned_frames", turned_frames, 0, 1000);
+}
+
+void StageOptions::validate() const
+{
+  flow.validate();
+  motion.validate();
+  points.validate();
+  visual.validate();
+  gradient.validate();
+  saliency.validate();
+  detection.validate();
+  lines.validate();
+  tracking.validate();
+  smoothing.validate();
+  map.validate();
+}
+
+namespace
+{
+/// What the thresholds on the picture are held for.
+constexpr double kFocal_px = 200, kRate_hz = 10;
+
+int oddNear(double value, int most) { return std::min(2 * static_cast<int>(std::lround((value - 1) / 2)) + 1, most); }
+
+/// Thresholds on the picture for a camera whose focal length is \p s times 200 px.
+void scaleToCamera(StageOptions &o, double s)
+{
+  /// Half of a border's error is the roughness of the bark, an angle; half is blur and noise of the picture, in pixels.
+  const double place = (1 + s) / 2;
+  /// A narrow view shows a border softer: the bark's edge is wider than a pixel.
+  const double blur = std::sqrt(std::max(s, 1.0));
+  o.gradient.sigma_px *= blur;
+  o.detection.profile.contrast_min /= blur;
+  o.tracking.contrast_min /= blur;
+  o.flow.gate_sigma_px *= place;
+  o.flow.search_px *= place;
+  o.detection.inlier_px *= place;
+  o.detection.rms_max_px *= place;
+  o.tracking.scan_min_px *= place;
+  o.tracking.scan_max_px *= place;
+  o.tracking.polish_max_px *= place;
+  o.map.innovation_unit_px *= place;
+  o.lines.width_min_px *= s;
+  o.lines.width_max_px *= s;
+  o.lines.inhibition_px *= s;
+  o.saliency.window_width_px = oddNear(o.saliency.window_width_px * s, 31);
+  o.saliency.window_height_px = oddNear(o.saliency.window_height_px * s, 31);
+}
+
+/// What is counted in frames, for \p k times 10 frames a second.
+void scaleToRate(StageOptions &o, double k)
+{
+  const int shorter = std::max(1, static_cast<int>(1 * k));
+  o.points.frames_back = {shorter, std::max(shorter + 1, static_cast<int>(3 * k))};
+  o.saliency.max_frames_apart = std::clamp(static_cast<int>(std::lround(o.saliency.max_frames_apart * k)), 1, 20);
+}
+
+void setTrunks(StageOptions &o, const Options::Trunks &trunks)
+{
+  o.smoothing.prior_radius = o.map.usual_radius = trunks.radius;
+  o.smoothing.prior_log_radius_sigma = trunks.radius_sigma;
+  o.smoothing.prior_lean_sigma = trunks.lean;
+  o.detection.radius_min = trunks.radius_min;
+  o.detection.radius_max = trunks.radius_max;
+  /// A trunk that was found may prove thinner or thicker by these factors than what is looked for.
+  constexpr double kThinner = 1.2, kThicker = 1.58;
+  o.map.radius_min = trunks.radius_min / kThinner;
+  o.map.radius_max = trunks.radius_max * kThicker;
+  o.flow.trunk_low = trunks.low;
+  o.flow.trunk_high = trunks.high;
+}
+
+void setRange(StageOptions &o, const Options::Range &range)
+{
+  o.flow.track_range = range.track;
+  o.detection.range_min = range.detect_min;
+  o.detection.range_max = range.detect_max;
+  constexpr double kParallax = 0.04; // rad: least that two views of the window differ by at the nearest trunk
+  o.flow.view_spacing = kParallax * range.detect_min;
+  o.smoothing.relinearise_position *= range.detect_min / Options::Range().detect_min;
+  if (range.near > 0)
+    o.saliency.near_range = range.near;
+  constexpr double kInside = 0.5; // m: at near itself the labels are undecided
+  o.detection.near_range = o.map.near_range = std::max(0.0, range.near - kInside);
+  o.map.through_range = range.through;
+}
+
+void setMap(StageOptions &o, const Options &options)
+{
+  const Options::Map &map = options.map;
+  o.map.confirm_evidence = std::log(map.confirm_probability / (1 - map.confirm_probability));
+  o.map.confirm_position_sigma = map.confirm_sigma;
+  o.map.merge_distance = map.merge_distance;
+  o.map.candidate_memory_s = map.candidate_memory;
+  const auto poses = static_cast<int>(std::lround(map.lag * options.camera.rate));
+  o.smoothing.fixed_lag = map.lag > 0 ? std::max(2, poses) : 0;
+}
+
+void setSensors(StageOptions &o, const Options &options)
+{
+  const Options::Odometry &odometry = options.odometry;
+  o.motion.step_sigma = odometry.step;
+  o.motion.step_sigma_vertical = odometry.step_vertical;
+  o.motion.scale_sigma = o.motion.step_scale_sigma = odometry.scale;
+  o.motion.height_sigma = odometry.height;
+  o.motion.tilt_sigma = odometry.tilt;
+  o.motion.turn_sigma = odometry.turn;
+  o.points.gyro.noise_density = options.gyro.noise;
+  o.points.gyro.bias_sigma = options.gyro.bias;
+}
+
+/// A camera that is steered by what it tracks rests before one trunk or goes round it.
+void setServoing(StageOptions &o)
+{
+  o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
+  o.flow.view_correlation = 0.05; // m: what it sees from one place counts but once
+  o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
+}
+} // namespace
+
+StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
+{
+  options.validate();
+  StageOptions o;
+  o.flow.use_points = options.stages.points;
+  o.flow.use_saliency = options.stages.saliency;
+  o.flow.detect_window = options.stages.window_detector;
+  o.flow.detect_lines = options.stages.line_detector;
+  if (options.stages.servoing)
+    setServoing(o);
+  o.visual.camera_height = options.camera.height;
+  o.visual.focal_known = options.camera.focal_known;
+  if (options.camera.compressed)
+    o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
+  if (options.paper.saliency)
+    o.saliency = SaliencyOptions::paper();
+  else
+    scaleToRate(o, options.camera.rate / kRate_hz);
+  setTrunks(o, options.trunks);
+  setRange(o, options.range);
+  o.detection.window = options.detection.window;
+  o.detection.profile.range = {options.detection.elevation_low, options.detection.elevation_high};
+  setMap(o, options);
+  setSensors(o, options);
+  o.tracking.energy.paper_alpha = options.paper.alpha;
+  if (options.paper.energy) {
+    o.tracking.energy.form = EnergyForm::paper;
+    o.tracking.scan = false;
+    o.gradient.split = true;
+    o.lines.either_polarity = false;
+  }
+  constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
+  scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
+  o.validate();
+  return o;
+}
+
+/// Where a codec leaves blocks standing corners stand too, an error that many share and that their residuals do not
+/// show: so corners are believed to 0.2 px at best.
+StageOptions forCompressedVideo()
+{
+  StageOptions options;
+  options.points.relative_pose.min_sigma_px = kCompressedSigma_px;
+  return options;
+}
+
+void Options::validate() const {}
+} // namespace bole

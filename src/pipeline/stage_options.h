@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the stages are told: one aggregate a stage, made from Options by stageOptions(). Tests and the ablation set
+/// them one by one.
+
+#include "detection/line_detector.h"
+#include "gradient/gradient.h"
+#include "map/trunk_map.h"
+#include "motion/point_motion.h"
+#include "pipeline/motion_model.h"
+#include "pipeline/visual_odometry.h"
+#include "saliency/saliency_options.h"
+#include "tracking/trunk_tracker.h"
+#include <bole/camera.h>
+#include <bole/options.h>
+#include <bole/smoother.h>
+
+namespace bole
+{
+/// Points for the smoother, which has the pose filter already: it must not count twice.
+inline PointMotionOptions withoutOdometry()
+{
+  PointMotionOptions options;
+  options.use_odometry = false;
+  return options;
+}
+
+/// More iterations a frame than the smoother takes by itself: what the detector and the map choose rests on where the
+/// trunks stand now, and a flight has few poses against those the smoother is made for.
+inline SmootherOptions closeToTheOptimum()
+{
+  SmootherOptions options;
+  options.max_iterations = 4;
+  return options;
+}
+
+/// What belongs to no single stage.
+struct FlowOptions
+{
+  bool use_points = true;       ///< relative poses from point features
+  bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
+  bool detect_lines = false;    ///< the one-frame detector too; always on where no odometry gives a range
+  bool detect_window = true;    ///< the detector that asks a window of frames
+  int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
+  int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
+                                ///< time and, while it is wrong, pulls on the trajectory
+  double view_spacing = 0.06;   ///< least move between two views of the detector's window [m], 0 to 1
+  double trunk_low = 0.25;      ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
+  double trunk_high = 2.6;      ///< ... to [m]; its middle is near breast height, where radii are told
+  double track_range = 12;      ///< known trunks farther than this are not tracked [m], 1 to 100
+  double gate = 9.2;            ///< chi square (2) of bearing and log r/d against the prediction, 1 to 100
+  double contrast_noise = 0.02; ///< contrast at which noise moves a border as much as its roughness does, 0 to 0.5
+  double gate_sigma_px = 1.0;   ///< of a border beside the prediction [px], 0.1 to 10
+  double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
+                                ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
+  double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
+                                ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
+  int turned_frames = 0; ///< borders whose sign turned over are believed when found where they are expected in so
+                         ///< many frames in a row: seen from its other side, what was brighter than the background
+                         ///< is darker; 0 (never) to 1000
+
+  void validate() const; ///< \throw vpException naming the option, its value and the range
+};
+
+struct StageOptions
+{
+  FlowOptions flow;
+  MotionModelOptions motion;
+  PointMotionOptions points = withoutOdometry();
+  VisualOdometryOptions visual;
+  GradientOptions gradient;
+  SaliencyOptions saliency;
+  DetectorOptions detection;
+  LineDetectorOptions lines;
+  TrackingOptions tracking;
+  SmootherOptions smoothing = closeToTheOptimum();
+  MapOptions map;
+
+  void validate() const;
+};
+
+/// The stages' options for a user's, with thresholds in the pixels of \p camera.
+/// \throw vpException naming the option, its value and the range.
+StageOptions stageOptions(const Options &options, const PinholeCamera &camera);
+
+/// The defaults for images that went through a lossy video codec (a drone's or phone's H.264): where it leaves texture
+/// standing, corners seem to stand too, an error that many share and that their residuals do not show. So corners are
+/// believed to 0.2 px at best. The same stands in config/compressed.yaml.
+StageOptions forCompressedVideo();
+} // namespace bole
