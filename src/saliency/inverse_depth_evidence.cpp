@@ -247,27 +247,22 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   }
 }
 
-InverseDepthPosterior InverseDepthEvidence::posterior() const
+vpImage<float> InverseDepthEvidence::logOddsNear() const
 {
-  InverseDepthPosterior result;
-  result.log_odds_near.resize(static_cast<unsigned>(m_rows), static_cast<unsigned>(m_camera.width));
-  result.inverse_depth.resize(static_cast<unsigned>(m_rows), static_cast<unsigned>(m_camera.width));
+  vpImage<float> log_odds(static_cast<unsigned>(m_rows), static_cast<unsigned>(m_camera.width));
   const std::size_t count = m_rho.size();
   std::vector<float> weight(count);
-  for (unsigned p = 0; p < result.log_odds_near.getSize(); ++p) {
+  for (unsigned p = 0; p < log_odds.getSize(); ++p) {
     const float *e = &m_evidence[p * count];
     const float best = *std::max_element(e, e + count);
     for (std::size_t k = 0; k < count; ++k)
       weight[k] = fastExp(e[k] - best + m_log_prior[k]);
-    float far = 1e-20f, near = 1e-20f, weighted = 0;
-    for (std::size_t k = 0; k < count; ++k) {
+    float far = 1e-20f, near = 1e-20f;
+    for (std::size_t k = 0; k < count; ++k)
       (k < m_first_near ? far : near) += weight[k];
-      weighted += weight[k] * m_rho[k];
-    }
-    result.log_odds_near.bitmap[p] = fastLog(near / far);
-    result.inverse_depth.bitmap[p] = weighted / (near + far);
+    log_odds.bitmap[p] = fastLog(near / far);
   }
-  return result;
+  return log_odds;
 }
 
 double medianParallax(const PinholeCamera &camera, const Pose &oMc, double range)

@@ -29,14 +29,6 @@ struct MotionNoise
   double translation = 0.01; ///< an axis [m]
 };
 
-/// One value a pixel of the working level, but only each kRowStep-th row: trunks are upright, and windows taller than
-/// wide.
-struct InverseDepthPosterior
-{
-  vpImage<float> log_odds_near; ///< log p(nearer than near_range) - log p(farther)
-  vpImage<float> inverse_depth; ///< mean [1/m]
-};
-
 class InverseDepthEvidence
 {
 public:
@@ -50,7 +42,9 @@ public:
   void predict(const Pose &pMc);
   /// Adds what \p older says about \p current, both at the working level; \p oMc is the current camera in the older.
   void add(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc, const MotionNoise &noise);
-  InverseDepthPosterior posterior() const;
+  /// log p(nearer than near_range) - log p(farther), one value a pixel of the working level, but only each kRowStep-th
+  /// row: trunks are upright, and windows taller than wide.
+  vpImage<float> logOddsNear() const;
   /// log odds before any evidence.
   float priorLogOdds() const { return m_prior_log_odds; }
   const std::vector<float> &inverseDepths() const { return m_rho; }

@@ -253,10 +253,8 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
     break;
   }
   result.asks_for_range = true;
-  const InverseDepthPosterior posterior = m_evidence.posterior();
   constexpr int step = InverseDepthEvidence::kRowStep;
-  result.inverse_depth = enlarged(posterior.inverse_depth, level, m_camera, step);
-  fill(enlarged(posterior.log_odds_near, level, m_camera, step), m_evidence.priorLogOdds(), result);
+  fill(enlarged(m_evidence.logOddsNear(), level, m_camera, step), m_evidence.priorLogOdds(), result);
 }
 
 void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &result) const

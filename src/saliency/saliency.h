@@ -51,7 +51,6 @@ struct Saliency
   SaliencyStatus status = SaliencyStatus::first_frame;
   vpImage<float> p_background;                              ///< lambda = 1 means background
   vpImage<float> confidence;                                ///< |change of the log odds| by the images; small = unknown
-  vpImage<float> inverse_depth;                             ///< [1/m], empty without translation
   Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity();        ///< refined rotation from the image before
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< right perturbation of pRc [rad^2]
   bool asks_for_range = false; ///< labels mean "nearer than near_range"; else "moves unlike the background"

@@ -192,7 +192,6 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
       return finish(TrackingStatus::no_border);
     pair = pairPeaks(left_peaks, right_peaks, {S, prediction.left_contrast, prediction.right_contrast}, 1).front();
     start = startFrom(pair, left, right, prediction.relative);
-    result.scan_cost = pair.cost;
   }
   else {
     pair.left.contrast = meanAlongOnly(gradient.signed_x, left.line);

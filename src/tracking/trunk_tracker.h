@@ -62,7 +62,6 @@ struct TrackingResult
   double left_contrast = 0, right_contrast = 0; ///< signed; 0 where the border was not used
   bool left_used = false, right_used = false;
   double evenness = 0;  ///< mean of evennessAlong() over the borders used, 0 to 1
-  double scan_cost = 0; ///< of the chosen pair
 };
 
 /// Cost: 30 to 150 us a trunk with the scan. Thread-safe.
