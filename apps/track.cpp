@@ -121,8 +121,8 @@ public:
 private:
   void process(const Frame &frame)
   {
-    const FrameResult result = m_pipeline.process(frame);
-    m_window.show(m_output.add(frame, result, ageOf(frame)));
+    const FrameReport report = m_pipeline.process(frame);
+    m_window.show(m_output.add(frame, report, ageOf(frame)));
   }
 
   Pipeline &m_pipeline;

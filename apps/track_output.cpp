@@ -19,15 +19,7 @@ namespace bole::apps
 {
 namespace
 {
-Trajectory toTrajectory(const std::vector<Pipeline::StampedPose> &poses)
-{
-  Trajectory trajectory;
-  for (const auto &pose : poses)
-    trajectory.push_back({pose.stamp_ns, pose.wMb});
-  return trajectory;
-}
-
-vpImage<float> foregroundOf(const Saliency &saliency)
+vpImage<float> foregroundOf(const SaliencyField &saliency)
 {
   vpImage<float> foreground(saliency.p_background.getHeight(), saliency.p_background.getWidth());
   for (unsigned int i = 0; i < foreground.getSize(); ++i)
@@ -70,14 +62,14 @@ TrackOutput::TrackOutput(const std::string &run, const std::string &input, const
   }
 }
 
-vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, std::optional<double> age_ms)
+vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms)
 {
   ++m_summary.frames[frame.status];
   FrameTiming timing;
   timing.index = frame.index;
   timing.stamp_ns = frame.stamp_ns;
   timing.age_ms = age_ms;
-  for (const auto &[stage, ms] : result.timing_ms) {
+  for (const auto &[stage, ms] : report.timing_ms) {
     if (timing.stages_ms.size() >= m_summary.timing.stages.size())
       m_summary.timing.stages.emplace_back(stage);
     timing.stages_ms.push_back(ms);
@@ -90,18 +82,13 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, 
     m_picture.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
 
   Overlay overlay;
-  for (const TrackedTrunk &trunk : result.trunks) {
-    if (trunk.map_status == TrunkStatus::merged || trunk.status == TrackingStatus::not_visible)
-      continue;
-    overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high,
-                              trunk.map_status, trunk.status == TrackingStatus::tracked});
-  }
-  m_in_view =
-      static_cast<std::size_t>(std::count_if(result.trunks.begin(), result.trunks.end(), [](const TrackedTrunk &trunk) {
-        return trunk.status == TrackingStatus::tracked;
-      }));
-  if (result.saliency)
-    overlay.foreground = foregroundOf(*result.saliency);
+  for (const TrunkInView &trunk : report.trunks)
+    overlay.trunks.push_back(
+        {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
+  m_in_view = static_cast<std::size_t>(std::count_if(report.trunks.begin(), report.trunks.end(),
+                                                     [](const TrunkInView &trunk) { return trunk.is_tracked; }));
+  if (report.saliency)
+    overlay.foreground = foregroundOf(*report.saliency);
   overlay.is_warning = frame.status != FrameStatus::ok;
   overlay.text = fmt::format("{:.1f} s  {} trunks  {}", 1e-9 * static_cast<double>(frame.stamp_ns), m_in_view,
                              overlay.is_warning ? toString(frame.status) : "");
@@ -110,7 +97,7 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameResult &result, 
   const vpImage<vpRGBa> picture = drawOverlay(frame.image, m_camera, overlay);
   if (m_overlay)
     m_overlay->write(picture, frame.stamp_ns);
-  if (m_saliency && result.saliency)
+  if (m_saliency && report.saliency)
     m_saliency->write(drawSaliency(frame.image, m_camera, overlay.foreground, overlay.text), frame.stamp_ns);
   return picture;
 }
@@ -135,8 +122,8 @@ void TrackOutput::setLink(const LinkCounters &link)
 
 void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
 {
-  m_picture.smoothed = toTrajectory(pipeline.smoothedTrajectory());
-  m_picture.online = toTrajectory(pipeline.onlineTrajectory());
+  m_picture.smoothed = pipeline.smoothedTrajectory();
+  m_picture.online = pipeline.onlineTrajectory();
   m_picture.trunks = pipeline.map();
   m_summary.trunks = m_picture.trunks;
   m_summary.reference = pipeline.reference();

@@ -24,7 +24,7 @@ public:
 
   /// Takes in a frame and returns its overlay (empty for a frame without an image). \p age_ms: of a live frame when
   /// \p result was there.
-  vpImage<vpRGBa> add(const Frame &frame, const FrameResult &result, std::optional<double> age_ms = {});
+  vpImage<vpRGBa> add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms = {});
   /// Counts \p frames missing ones at the end of the flight, of which nothing is known.
   void addSilence(std::size_t frames);
   /// What came of the drone's packets.

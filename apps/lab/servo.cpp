@@ -56,14 +56,13 @@ const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::ser
                                       {"hover after fault [s]", &ServoTrialResult::hover_after_s},
                                       {"drift in fault [m]", &ServoTrialResult::drift}};
 
-vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameResult &result, const LoopSample &sample,
+vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameReport &report, const LoopSample &sample,
                           const PinholeCamera &camera)
 {
   Overlay overlay;
-  for (const TrackedTrunk &trunk : result.trunks)
-    if (trunk.map_status != TrunkStatus::merged && trunk.status != TrackingStatus::not_visible)
-      overlay.trunks.push_back({trunk.id, trunk.relative, trunk.distance, trunk.range.low, trunk.range.high,
-                                trunk.map_status, trunk.status == TrackingStatus::tracked});
+  for (const TrunkInView &trunk : report.trunks)
+    overlay.trunks.push_back(
+        {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
   overlay.is_warning = sample.is_lost;
   overlay.text = fmt::format("{:.1f} s  {}", sample.time_s, sample.reason);
   for (const auto &[name, value] : sample.real)
@@ -198,9 +197,9 @@ ServoTrialResult fly(const Arguments &arguments, ServoTrialOptions trial, std::u
   if (arguments.has_video && !folder.empty())
     video = std::make_unique<VideoWriter>(folder + "/overlay.mp4");
   const PinholeCamera camera = trial.robot.renderer.camera.pinhole;
-  const auto watcher = [&](const Frame &frame, const FrameResult &result, const LoopSample &sample) {
+  const auto watcher = [&](const Frame &frame, const FrameReport &report, const LoopSample &sample) {
     if (video || arguments.is_shown) {
-      const vpImage<vpRGBa> picture = pictureOf(frame, result, sample, camera);
+      const vpImage<vpRGBa> picture = pictureOf(frame, report, sample, camera);
       if (video)
         video->write(picture, frame.stamp_ns);
       window.show(picture);

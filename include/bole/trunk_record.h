@@ -15,7 +15,7 @@ enum class TrunkStatus
 {
   candidate, ///< seen too little to be relied on
   confirmed, ///< part of the map
-  lost,      ///< a candidate that could not be followed long enough to be confirmed
+  lost,      ///< given up: see TrunkFate
   merged     ///< a duplicate, now part of another trunk
 };
 
@@ -30,6 +30,42 @@ inline const char *toString(TrunkStatus status)
     return "lost";
   case TrunkStatus::merged:
     return "merged";
+  }
+  return "unknown";
+}
+
+/// Why what was found is no trunk of the map.
+enum class TrunkFate
+{
+  none,      ///< it is one
+  undecided, ///< the flight ended before enough was seen of it
+  unseen,    ///< found once and never again
+  missed,    ///< too often not found where it was predicted
+  doubted,   ///< its log-odds to be a trunk fell too low
+  outdone,   ///< another hypothesis for the same place was better
+  duplicate, ///< the same trunk as another, which has its views now
+  unranged   ///< found before the camera had moved, at a range that was a guess
+};
+
+inline const char *toString(TrunkFate fate)
+{
+  switch (fate) {
+  case TrunkFate::none:
+    return "none";
+  case TrunkFate::undecided:
+    return "undecided";
+  case TrunkFate::unseen:
+    return "unseen";
+  case TrunkFate::missed:
+    return "missed";
+  case TrunkFate::doubted:
+    return "doubted";
+  case TrunkFate::outdone:
+    return "outdone";
+  case TrunkFate::duplicate:
+    return "duplicate";
+  case TrunkFate::unranged:
+    return "unranged";
   }
   return "unknown";
 }
@@ -50,5 +86,6 @@ struct TrunkRecord
   int observations = 0;                                        ///< frames with a summary factor
   double first_seen_s = 0, last_seen_s = 0;
   TrunkStatus status = TrunkStatus::candidate;
+  TrunkFate fate = TrunkFate::none; ///< of what is not confirmed
 };
 } // namespace bole

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// A trajectory: poses of the body in the world with their timestamps, and the files they come in.
+/// The files that trajectories come in, and poses between those of a trajectory.
 
-#include <bole/pose.h>
+#include <bole/trajectory.h>
 
 #include <cstdint>
 #include <optional>
@@ -12,15 +12,6 @@
 
 namespace bole
 {
-struct StampedPose
-{
-  std::int64_t stamp_ns = 0;
-  Pose wMb;
-};
-
-/// Poses with strictly rising stamps.
-using Trajectory = std::vector<StampedPose>;
-
 /// Pose at \p stamp_ns: that of the sample itself, or between its two neighbours on SE(3)
 /// (translation linear, rotation along the geodesic). Nothing outside the range of the trajectory
 /// and nothing between neighbours more than \p max_gap_ns apart. Cost: log2 of the number of poses.

@@ -22,7 +22,7 @@ constexpr double kForeground = 1.91;    ///< moved like something near, 0 to 1
 constexpr double kLookedThrough = -0.8; ///< log of 1 + MapTrunk::lookedThrough
 constexpr double kLogParallax = 0.69;
 constexpr double kLogContrast = 0.49;
-constexpr double kFoundAgain = 0.54; ///< log of 1 + times the detector came to the same reading
+constexpr double kFoundAgain = 0.54; ///< log of 1 + times the detector came to the same hypothesis
 constexpr double kLogPositionSigma = -0.73;
 } // namespace
 

@@ -3,12 +3,13 @@
 /// \file
 /// The map of trunks and the life cycle of each: candidate, confirmed, lost, merged.
 ///
-/// Idea: a trunk enters as a candidate and must earn its place: enough views, enough parallax, and the odds that it is
-/// one, learnt from flights with known trunks. Several readings of the same lines may compete as candidates (the
-/// silhouette, the edge of a shadow on the bark, a gap between two trunks); the one with the best odds is confirmed,
-/// and the others merge into it, since two trunks cannot stand in the same place (paper, Section 7, which leaves
-/// duplicates in the map). A trunk that is predicted in view and not found for long is lost, and comes back under its
-/// id when it is found again under its prediction.
+/// Idea: a trunk enters as a candidate and must earn its place: enough views, enough parallax, and log-odds to be a
+/// trunk, learnt from flights with known trunks. Several hypotheses for the same lines may compete as candidates (the
+/// silhouette, the edge of a shadow on the bark, a gap between two trunks). The one with the best log-odds is
+/// confirmed and the others go, since two trunks cannot stand in the same place (paper, Section 7, which leaves
+/// duplicates in the map). A trunk that comes back as a duplicate hands its views to the one that was there before:
+/// they tie the two visits together. A confirmed trunk that is predicted in view and not found for long is lost from
+/// sight; it stays in the map and comes back under its id.
 
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
@@ -50,19 +51,20 @@ struct MapOptions
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
-/// A trunk of the map with its history.
+/// A trunk of the map with its history. Only the map writes it.
 struct MapTrunk
 {
   int id = 0;
   std::size_t smoother_id = 0;
   TrunkStatus status = TrunkStatus::candidate;
+  TrunkFate fate = TrunkFate::undecided;
   Trunk trunk; ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
   int observations = 0;                     ///< summary factors
   std::optional<Eigen::Vector3d> seen_from; ///< the camera's place at its last view [m]
-  int turned_in_a_row = 0;                  ///< frames in which its borders had the other sign where they were expected
+  int flipped_in_a_row = 0;                 ///< frames in which its borders had the other sign where they were expected
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
-  int found_again = 0;                           ///< times the detector came to the same reading later
+  int found_again = 0;                           ///< times the detector came to the same hypothesis later
   double contrast = 0;                           ///< running mean of the weaker border's
   double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
@@ -72,14 +74,18 @@ struct MapTrunk
   double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
-  int points_on = 0, points_behind = 0; ///< of the scene, seen inside its borders, over all frames
-  bool removed = false;                 ///< out of the smoother (merged, or a candidate given up)
+  int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
+  bool removed = false;                 ///< out of the smoother
+  bool inactive = false;                ///< a candidate that is not looked for any more
 
   double parallax() const { return bearing_high - bearing_low; }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
-  /// Points behind it for each on its bark; 0 up to 3 points, which a slipped track or two may be.
+  /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
   double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
 };
+
+/// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.
+void blendContrast(std::optional<double> &mean, double now);
 
 /// What one view of a trunk adds to its history.
 struct TrunkView
@@ -88,11 +94,55 @@ struct TrunkView
   double bearing = 0;                           ///< of the trunk from the camera, world [rad]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
   double evenness = 0;                          ///< of the borders along their length, 0 to 1
-  double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], less the
-                          ///< wider the trunk stands in the image (its borders are rougher)
+  double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], divided by
+                          ///< what a wide trunk with rough borders is allowed
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero(); ///< place of the camera [m]
 };
 
-/// What review() decided.
+/// What one frame shows of a known trunk that was looked for.
+struct Sighting
+{
+  enum class Kind
+  {
+    seen,
+    missed,
+    hidden ///< by nearer trunks: nothing is learnt
+  };
+  int id = 0;
+  Kind kind = Kind::missed;
+  TrunkView view;                   ///< where it was seen
+  bool is_flipped = false;          ///< borders of the other sign stand where it was expected
+  double range = 0;                 ///< [m]
+  std::optional<double> foreground; ///< mean of 1 - p(background) inside it
+};
+
+/// Points of the scene that one frame shows inside the borders of a trunk.
+struct PointCount
+{
+  int id = 0;
+  int on = 0, behind = 0; ///< at its range, and beyond it
+};
+
+/// What the detector found, with the views that it was seen in.
+struct NewTrunk
+{
+  std::size_t smoother_id = 0;
+  Trunk trunk;
+  Matrix5d covariance = Matrix5d::Identity();
+  std::vector<TrunkView> views; ///< in the order of time
+  double innovation2 = 0;       ///< mean over the views, of the trunk fitted to them
+  double found_s = 0;           ///< when [s]
+};
+
+/// What the smoother knows of a trunk now.
+struct TrunkEstimate
+{
+  int id = 0;
+  Trunk trunk;
+  std::optional<Matrix5d> covariance; ///< where it was asked for
+};
+
+/// A change of the status of one trunk.
 struct MapChange
 {
   int id = 0;
@@ -100,47 +150,64 @@ struct MapChange
   TrunkStatus from = TrunkStatus::candidate, to = TrunkStatus::candidate;
 };
 
+/// What review() decided, and what the smoother has to do for it.
+struct MapUpdate
+{
+  struct Merge
+  {
+    std::size_t keep = 0, gone = 0;
+  };
+  std::vector<MapChange> changes;
+  std::vector<Merge> merged;        ///< ids of the smoother: the views of the one become the other's
+  std::vector<std::size_t> removed; ///< ids of the smoother: to be forgotten with all their views
+};
+
+/// Writes every field of its trunks; sightings, points and estimates come in, a MapUpdate goes out.
 class TrunkMap
 {
 public:
   explicit TrunkMap(const MapOptions &options = {});
+  /// Goes on with \p trunks; their ids are their places.
+  TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks);
 
-  MapTrunk &add(std::size_t smoother_id, const Trunk &trunk);
-  std::vector<MapTrunk> &trunks() { return m_trunks; }
+  /// Options with lengths in another unit.
+  void setOptions(const MapOptions &options);
+
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
-  /// Places in trunks() of those that are neither removed nor left behind: what a frame has to look at, however long
-  /// the flight.
+  const MapTrunk &trunk(int id) const { return m_trunks[static_cast<std::size_t>(id)]; }
+  /// Places in trunks() of those that are neither removed nor inactive: what a frame has to look at, however long the
+  /// flight.
   const std::vector<std::size_t> &active() const { return m_active; }
   int count(TrunkStatus status) const;
 
-  /// True where a candidate or a confirmed trunk stands that is \p trunk in place and radius: it was found again.
-  bool holds(const Trunk &trunk);
+  /// A candidate. The views in which it was found are no test of it: none of them counts as a hit. Returns its id.
+  int add(const NewTrunk &found);
+  /// Whether a candidate or a confirmed trunk stands where \p found does, so that it is not to be added; one of the
+  /// same place and radius counts as found again.
+  bool recognise(const Trunk &found);
+  void record(const Sighting &sighting);
+  void record(const PointCount &points);
+  void refresh(const TrunkEstimate &estimate);
 
-  void recordView(MapTrunk &trunk, const TrunkView &view) const;
-  void recordMiss(MapTrunk &trunk) const;
-  /// Saliency inside a trunk \p range away; said nothing of it beyond near_range.
-  void recordForeground(MapTrunk &trunk, double range, double foreground) const;
+  /// Promotes, loses and merges by what is known at \p now_s. Candidates that were not seen for long become inactive:
+  /// they keep their views and their place in records(), but those of which nothing was ever seen are removed, since a
+  /// drone at rest is offered the same wrong ones in every frame.
+  /// \p has_ranges: false while the camera has only rotated, so that a trunk earns its place by its borders alone.
+  MapUpdate review(double now_s, bool has_ranges = true);
+  /// The same for the end of a flight: inactive candidates take part again.
+  MapUpdate reviewAll(bool has_ranges = true);
+  /// Gives up all that is active: their ranges were guesses.
+  MapUpdate forgetUnranged();
 
-  /// Promotes, loses and merges by what is known now. The caller carries the changes to the smoother.
-  /// \p has_ranges: false while the camera has only turned, so that a trunk earns its place by its bearing and width.
-  std::vector<MapChange> review(bool has_ranges = true);
-
-  /// Candidates that were left behind before they could be confirmed, and are not active any more. What was seen of
-  /// them stands: they stay in the smoother and in records(). Those of which nothing was ever seen are removed; returns
-  /// their ids: a drone that rests is offered the same wrong ones in every frame.
-  std::vector<int> leaveBehind(double now_s);
-
-  /// Gives up all that is active. Returns their ids.
-  std::vector<int> removeAll();
-
-  /// Log odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
+  /// Log-odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
   /// often it was missed, how it moved against the background, whether points behind it were seen through it, its
   /// contrast, its radius and how well its place is known. A logistic regression on simulated flights: see
   /// trunk_evidence.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
 
-  /// \p ground_z: height of the ground in the world [m], over which breast height counts.
-  std::vector<TrunkRecord> records(double ground_z = 0) const;
+  /// A trunk that was confirmed and is out of sight stays confirmed here.
+  /// \p breast_z: breast height in the world, where places are told [m].
+  std::vector<TrunkRecord> records(double breast_z = kBreastHeight) const;
 
 private:
   bool isDisproved(const MapTrunk &trunk, bool has_ranges) const;
@@ -149,6 +216,11 @@ private:
   double advantage(const MapTrunk &trunk, const MapTrunk &rival) const;
   bool hasBetterRival(const MapTrunk &trunk, double margin) const;
   MapTrunk *chooseRedundant(MapTrunk &a, MapTrunk &b) const;
+  void addView(MapTrunk &trunk, const TrunkView &view) const;
+  void reviewEach(MapUpdate &update, bool has_ranges);
+  void reviewPairs(MapUpdate &update);
+  void deactivate(MapUpdate &update, double now_s);
+  void keepActive();
 
   MapOptions m_options;
   std::vector<MapTrunk> m_trunks;

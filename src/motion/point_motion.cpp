@@ -27,14 +27,14 @@ PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc, const Poi
   m_bias = GyroBias::unknown(options.gyro);
 }
 
-std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
+void PointMotion::track(const Frame &frame)
 {
+  const std::size_t number = m_frames++;
   if (m_options.use_gyro) {
     m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
   }
-  std::vector<RelativeMotion> motions;
   if (frame.status != FrameStatus::ok) {
-    return motions;
+    return;
   }
   Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
   if (!m_seen.empty()) {
@@ -43,7 +43,7 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
     }
   }
   m_tracker.track(frame.image, expected);
-  m_seen.push_back({frame.stamp_ns, frame.index, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
+  m_seen.push_back({frame.stamp_ns, number, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
   if (m_seen.size() > static_cast<std::size_t>(m_options.points.history)) {
     m_seen.pop_front();
   }
@@ -52,6 +52,15 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
   });
   if (recent - m_gyro.begin() > 1) { // one sample before the oldest frame helps its rate
     m_gyro.erase(m_gyro.begin(), recent - 1);
+  }
+}
+
+std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
+{
+  track(frame);
+  std::vector<RelativeMotion> motions;
+  if (frame.status != FrameStatus::ok) {
+    return motions;
   }
   for (int back : m_options.frames_back) {
     if (static_cast<std::size_t>(back) < m_seen.size()) {

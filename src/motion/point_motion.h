@@ -54,7 +54,7 @@ struct RelativeMotion
 {
   int frames_back = 1; ///< counted in frames that were processed
   std::int64_t a_ns = 0, b_ns = 0;
-  std::size_t a_index = 0, b_index = 0; ///< Frame::index
+  std::size_t a_index = 0, b_index = 0; ///< numbers of the two frames, as they came: 0, 1, ...
   RelativePoseEstimate estimate;
   std::optional<GyroRotation> gyro;        ///< of the body, the prior that was used
   std::optional<Eigen::Vector3d> odometry; ///< aMb's translation by the pose filter, camera axes [m]
@@ -69,8 +69,11 @@ public:
   /// ok are passed over: the next one is tracked from the last good one.
   std::vector<RelativeMotion> process(const Frame &frame);
 
+  /// Follows the points alone, where nobody asks for a motion.
+  void track(const Frame &frame);
+
   const PointTracker &tracker() const { return m_tracker; }
-  /// How many frames back it remembers, and Frame::index of the one \p back frames before the current one.
+  /// How many good frames back it remembers, and the number of the one \p back good frames before the current one.
   int framesBack() const { return static_cast<int>(m_seen.size()) - 1; }
   std::size_t frameIndex(int back) const { return (m_seen.rbegin() + back)->index; }
   const GyroBias &gyroBias() const { return m_bias; }
@@ -93,6 +96,7 @@ private:
   GyroBias m_bias;
   std::deque<Seen> m_seen;          ///< oldest first, the current frame last
   std::vector<GyroSample> m_gyro;   ///< since the oldest frame of m_seen
+  std::size_t m_frames = 0;         ///< that came, good or not
   std::int64_t m_bias_until_ns = 0; ///< end of the last interval that taught the bias
 };
 } // namespace bole

@@ -8,8 +8,8 @@
 #include "gradient/gradient.h"
 #include "map/trunk_map.h"
 #include "motion/point_motion.h"
+#include "pipeline/monocular_options.h"
 #include "pipeline/motion_model.h"
-#include "pipeline/visual_odometry.h"
 #include "saliency/saliency_options.h"
 #include "tracking/trunk_tracker.h"
 #include <bole/camera.h>

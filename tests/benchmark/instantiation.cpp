@@ -8,7 +8,7 @@
 #include "geometry/median.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include <bole/pipeline.h>
+#include "pipeline/engine.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -47,7 +47,7 @@ std::vector<Life> fly(const std::string &sequence)
   const std::vector<TruthTrunk> trees = readTruthTrunks(sequence);
   std::vector<Life> lives(trees.size());
   std::vector<Pose> truth;
-  Pipeline pipeline(source.camera(), source.bMc(), Options());
+  Engine pipeline(source.camera(), source.bMc(), stageOptions({}, source.camera()));
   for (std::size_t k = 0;; ++k) {
     Frame frame;
     if (!source.next(frame))
@@ -58,7 +58,7 @@ std::vector<Life> fly(const std::string &sequence)
     for (std::size_t i = 0; i < trees.size(); ++i) {
       if (visible[i].is_expected)
         note(lives[i].suffices, k);
-      for (const MapTrunk &trunk : pipeline.mapTrunks()) {
+      for (const MapTrunk &trunk : pipeline.trunks().trunks()) {
         if (trunk.removed || (placeOf(trunk.trunk, estimate, truth.back()) - trees[i].xy).norm() > kMatch)
           continue;
         note(lives[i].candidate, k);

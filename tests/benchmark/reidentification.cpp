@@ -91,10 +91,10 @@ Flight fly(const std::string &sequence, const std::optional<Curtain> &curtain)
     if (curtain && frame.index >= curtain->first && frame.index < curtain->end && frame.wMb_truth)
       if (const auto u = columns(curtain->truth, *frame.wMb_truth, source.bMc(), source.camera()))
         paintOver(frame.image, u->first, u->second);
-    const FrameResult result = pipeline.process(frame);
+    const FrameReport report = pipeline.process(frame);
     std::map<int, Seen> seen;
-    for (const TrackedTrunk &trunk : result.trunks)
-      seen[trunk.id] = {trunk.status == TrackingStatus::tracked, trunk.map_status == TrunkStatus::confirmed};
+    for (const TrunkInView &trunk : report.trunks)
+      seen[trunk.id] = {trunk.is_tracked, trunk.status == TrunkStatus::confirmed};
     flight.frames.push_back(std::move(seen));
     flight.time_s.push_back(1e-9 * static_cast<double>(frame.stamp_ns));
   }

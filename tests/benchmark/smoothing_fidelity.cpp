@@ -9,7 +9,7 @@
 #include "evaluation/trajectory_metrics.h"
 #include "input/truth.h"
 #include <bole/open_source.h>
-#include <bole/pipeline.h>
+#include "pipeline/engine.h"
 
 #include <algorithm>
 #include <chrono>
@@ -82,7 +82,7 @@ Flight fly(const std::string &sequence)
   Flight flight;
   const auto source = openSource(sequence);
   flight.camera = source->camera();
-  Pipeline pipeline(source->camera(), source->bMc(), flight.options);
+  Engine pipeline(source->camera(), source->bMc(), flight.options);
   while (true) {
     Frame frame;
     if (!source->next(frame))
@@ -94,7 +94,7 @@ Flight fly(const std::string &sequence)
   flight.graph = pipeline.graph();
   for (const auto &edge : flight.graph.observations)
     flight.views.push_back(viewOf(flight, edge));
-  for (const MapTrunk &trunk : pipeline.mapTrunks())
+  for (const MapTrunk &trunk : pipeline.trunks().trunks())
     if (!trunk.removed && trunk.status == TrunkStatus::confirmed)
       flight.confirmed.push_back(static_cast<std::int64_t>(flight.graph.poses.size() + trunk.smoother_id));
   for (const auto &pose : pipeline.smoothedTrajectory())

@@ -24,32 +24,67 @@ Trunk trunkAt(double x, double y, double radius = 0.15)
 class Life : public testing::Test
 {
 protected:
-  MapTrunk &add(const Trunk &trunk)
+  int add(const Trunk &trunk)
   {
-    m_map.trunks().reserve(64); // references stay good
-    MapTrunk &added = m_map.add(m_next++, trunk);
-    added.covariance = 1e-4 * Matrix5d::Identity();
-    return added;
+    NewTrunk found;
+    found.smoother_id = m_next++;
+    found.trunk = trunk;
+    found.covariance = 1e-4 * Matrix5d::Identity();
+    found.found_s = m_time_s;
+    return m_map.add(found);
+  }
+  const MapTrunk &at(int id) const { return m_map.trunk(id); }
+  double evidence(int id) const { return m_map.evidence(at(id)); }
+  void see(int id, const TrunkView &view, std::optional<double> foreground = {}, double range = 0)
+  {
+    Sighting sighting;
+    sighting.id = id;
+    sighting.kind = Sighting::Kind::seen;
+    sighting.view = view;
+    sighting.range = range;
+    sighting.foreground = foreground;
+    m_map.record(sighting);
   }
   /// \p views more views, the bearing sweeping \p parallax in all of them.
-  void see(MapTrunk &trunk, int views, double parallax = 0.2, double innovation2 = 0.1)
+  void see(int id, int views, double parallax = 0.2, double innovation2 = 0.1)
   {
     for (int i = 0; i < views; ++i, m_time_s += 0.1)
-      m_map.recordView(trunk, {m_time_s, 0.5 + parallax * i / std::max(1, views - 1), -0.1, 0.1, 0.9, innovation2});
+      see(id, viewAt(m_time_s, 0.5 + parallax * i / std::max(1, views - 1), -0.1, 0.1, 0.9, innovation2));
   }
-  void miss(MapTrunk &trunk, int frames)
+  static TrunkView viewAt(double time_s, double bearing, double left, double right, double evenness, double innovation2)
   {
+    TrunkView view;
+    view.time_s = time_s;
+    view.bearing = bearing;
+    view.left_contrast = left;
+    view.right_contrast = right;
+    view.evenness = evenness;
+    view.innovation2 = innovation2;
+    return view;
+  }
+  void miss(int id, int frames)
+  {
+    Sighting sighting;
+    sighting.id = id;
     for (int i = 0; i < frames; ++i)
-      m_map.recordMiss(trunk);
+      m_map.record(sighting);
   }
-  MapTrunk &confirmed(const Trunk &at, int views = 20)
+  int confirmed(const Trunk &place, int views = 20)
   {
-    MapTrunk &trunk = add(at);
+    const int trunk = add(place);
     see(trunk, views);
-    m_map.review();
-    EXPECT_EQ(trunk.status, TrunkStatus::confirmed);
+    review();
+    EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
     return trunk;
   }
+  /// As if its history had been another.
+  void change(int id, const std::function<void(MapTrunk &)> &spoil)
+  {
+    std::vector<MapTrunk> trunks = m_map.trunks();
+    spoil(trunks[static_cast<std::size_t>(id)]);
+    m_map = TrunkMap(m_options, trunks);
+  }
+  MapUpdate review(bool has_ranges = true) { return m_map.review(0, has_ranges); } // nothing becomes inactive
 
   MapOptions m_options;
   TrunkMap m_map{m_options};
@@ -58,56 +93,59 @@ protected:
 };
 } // namespace
 
-TEST_F(Life, AReadingThatCouldNotBeConfirmedItselfKeepsNoOtherBack)
+TEST_F(Life, AHypothesisThatCouldNotBeConfirmedItselfKeepsNoOtherBack)
 {
-  const auto seenWith = [this](MapTrunk &trunk, double least) { // the worst innovation that leaves so much evidence
+  const auto seenWith = [this](int trunk, double least) { // the worst innovation that leaves so much evidence
     see(trunk, 20);
-    for (trunk.innovation2 = 9; m_map.evidence(trunk) < least && trunk.innovation2 > 0;)
-      trunk.innovation2 -= 0.005;
-    EXPECT_GT(trunk.innovation2, 0);
+    change(trunk, [&](MapTrunk &t) {
+      for (t.innovation2 = 9; m_map.evidence(t) < least && t.innovation2 > 0;)
+        t.innovation2 -= 0.005;
+      EXPECT_GT(t.innovation2, 0);
+    });
   };
-  MapTrunk &narrow = add(trunkAt(3, 1, 0.15)), &wide = add(trunkAt(3, 1, 0.22));
+  const int narrow = add(trunkAt(3, 1, 0.15)), wide = add(trunkAt(3, 1, 0.22));
   seenWith(narrow, m_options.confirm_evidence + 0.2);
   seenWith(wide, m_options.confirm_evidence - 0.2); // and holds the other, which speaks for it by 1
-  m_map.review();
-  EXPECT_EQ(narrow.status, TrunkStatus::confirmed);
-  EXPECT_NE(wide.status, TrunkStatus::confirmed);
+  review();
+  EXPECT_EQ(at(narrow).status, TrunkStatus::confirmed);
+  EXPECT_NE(at(wide).status, TrunkStatus::confirmed);
 }
 
 TEST_F(Life, WithoutParallaxATrunkEarnsItsPlaceByEvenBordersAlone)
 {
-  MapTrunk &even = add(trunkAt(5, 0)), &uneven = add(trunkAt(5, 3)), &faint = add(trunkAt(5, -3));
+  const int even = add(trunkAt(5, 0)), uneven = add(trunkAt(5, 3)), faint = add(trunkAt(5, -3));
   for (int i = 0; i < 20; ++i) {
-    m_map.recordView(even, {0.1 * i, 0.5, -0.05, 0.05, 0.6, 0.1});
-    m_map.recordView(uneven, {0.1 * i, 1.5, -0.05, 0.05, 0.2, 0.1});
-    m_map.recordView(faint, {0.1 * i, 2.5, -0.003, 0.05, 0.6, 0.1});
+    see(even, viewAt(0.1 * i, 0.5, -0.05, 0.05, 0.6, 0.1));
+    see(uneven, viewAt(0.1 * i, 1.5, -0.05, 0.05, 0.2, 0.1));
+    see(faint, viewAt(0.1 * i, 2.5, -0.003, 0.05, 0.6, 0.1));
   }
-  m_map.review(false);
-  EXPECT_EQ(even.status, TrunkStatus::confirmed);
-  EXPECT_NE(uneven.status, TrunkStatus::confirmed);
-  EXPECT_NE(faint.status, TrunkStatus::confirmed);
-  EXPECT_EQ(m_map.removeAll().size(), m_map.trunks().size() - 2); // those two were given up before
+  review(false);
+  EXPECT_EQ(at(even).status, TrunkStatus::confirmed);
+  EXPECT_NE(at(uneven).status, TrunkStatus::confirmed);
+  EXPECT_NE(at(faint).status, TrunkStatus::confirmed);
+  EXPECT_EQ(m_map.forgetUnranged().removed.size(), m_map.trunks().size() - 2); // those two were given up before
+  EXPECT_EQ(at(even).fate, TrunkFate::unranged);
   EXPECT_TRUE(m_map.active().empty());
 }
 
 TEST_F(Life, StartsAsACandidate)
 {
-  MapTrunk &trunk = add(trunkAt(3, 1));
+  const int trunk = add(trunkAt(3, 1));
   see(trunk, m_options.confirm_observations - 1);
-  EXPECT_TRUE(m_map.review().empty());
-  EXPECT_EQ(trunk.status, TrunkStatus::candidate);
+  EXPECT_TRUE(review().changes.empty());
+  EXPECT_EQ(at(trunk).status, TrunkStatus::candidate);
 }
 
 TEST_F(Life, IsConfirmedByEnoughViewsThatFit)
 {
-  MapTrunk &trunk = add(trunkAt(3, 1));
+  const int trunk = add(trunkAt(3, 1));
   see(trunk, m_options.confirm_observations);
-  const auto changes = m_map.review();
+  const auto changes = review().changes;
   ASSERT_EQ(changes.size(), 1u);
-  EXPECT_EQ(changes[0].id, trunk.id);
+  EXPECT_EQ(changes[0].id, at(trunk).id);
   EXPECT_EQ(changes[0].from, TrunkStatus::candidate);
   EXPECT_EQ(changes[0].to, TrunkStatus::confirmed);
-  EXPECT_TRUE(m_map.review().empty()); // and stays so
+  EXPECT_TRUE(review().changes.empty()); // and stays so
   EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 1);
 }
 
@@ -129,41 +167,37 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
   };
   for (const Case &c : cases)
     for (const bool is_spoilt : {true, false}) { // and it was only that
-      TrunkMap map(m_options);
-      MapTrunk &trunk = map.add(0, trunkAt(3, 1));
-      trunk.covariance = 1e-4 * Matrix5d::Identity();
-      for (int i = 0; i < 20; ++i)
-        map.recordView(trunk, {0.1 * i, 0.02 * i, 0.1, -0.1, 0.9, 0.1});
+      m_map = TrunkMap(m_options);
+      const int trunk = add(trunkAt(3, 1));
+      see(trunk, 20, 0.38);
       if (is_spoilt)
-        c.spoil(trunk);
-      map.review();
-      EXPECT_EQ(trunk.status == TrunkStatus::confirmed, !is_spoilt) << c.what;
+        change(trunk, c.spoil);
+      review();
+      EXPECT_EQ(at(trunk).status == TrunkStatus::confirmed, !is_spoilt) << c.what;
     }
 }
 
 TEST_F(Life, WhatDidNotMoveLikeSomethingNearLosesOdds)
 {
-  MapTrunk &still = add(trunkAt(3, 1)), &moved = add(trunkAt(3, -4)), &far = add(trunkAt(3, -8));
-  for (MapTrunk *trunk : {&still, &moved, &far})
-    see(*trunk, 20);
-  const double unknown = m_map.evidence(far);
-  for (int i = 0; i < 5; ++i) {
-    m_map.recordForeground(still, m_options.near_range - 0.1, 0.05);
-    m_map.recordForeground(moved, m_options.near_range - 0.1, 0.9);
-    m_map.recordForeground(far, m_options.near_range + 0.1, 0.05); // says nothing that far away
+  const int still = add(trunkAt(3, 1)), moved = add(trunkAt(3, -4)), far = add(trunkAt(3, -8));
+  const TrunkView view = viewAt(1, 0.6, -0.1, 0.1, 0.9, 0.1);
+  for (int i = 0; i < 20; ++i) {
+    see(still, view, 0.05, m_options.near_range - 0.1);
+    see(moved, view, 0.9, m_options.near_range - 0.1);
+    see(far, view, 0.05, m_options.near_range + 0.1); // says nothing that far away
   }
-  EXPECT_LT(m_map.evidence(still), unknown - 0.5);
-  EXPECT_GT(m_map.evidence(moved), unknown + 0.5);
-  EXPECT_EQ(m_map.evidence(far), unknown);
+  EXPECT_LT(evidence(still), evidence(far) - 0.5);
+  EXPECT_GT(evidence(moved), evidence(far) + 0.5);
+  EXPECT_EQ(at(far).foreground_count, 0);
 }
 
 TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
 {
-  MapTrunk &trunk = add(trunkAt(3, 1));
+  const int trunk = add(trunkAt(3, 1));
   see(trunk, 20);
-  const double odds = m_map.evidence(trunk);
+  const double odds = evidence(trunk);
   const auto after = [&](const std::function<void(MapTrunk &)> &change) {
-    MapTrunk changed = trunk;
+    MapTrunk changed = at(trunk);
     change(changed);
     return m_map.evidence(changed);
   };
@@ -183,137 +217,192 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
 
 TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)
 {
-  MapTrunk &trunk = add(trunkAt(3, 1));
+  const int trunk = add(trunkAt(3, 1));
   see(trunk, m_options.doubt_observations - 1, 0.2, 9);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::candidate); // too early to say
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::candidate); // too early to say
   see(trunk, 1, 0, 9);
   miss(trunk, m_options.lost_misses - 1);
-  ASSERT_LT(m_map.evidence(trunk), m_options.doubt_candidate);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::lost);
-  EXPECT_TRUE(trunk.removed);
+  ASSERT_LT(evidence(trunk), m_options.doubt_candidate);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_TRUE(at(trunk).removed);
 }
 
 TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
 {
-  MapTrunk &trunk = confirmed(trunkAt(3, 1));
-  trunk.innovation2 = 9;
-  ASSERT_LT(m_map.evidence(trunk), m_options.doubt_confirmed);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::lost);
-  EXPECT_TRUE(trunk.removed);
+  const int trunk = confirmed(trunkAt(3, 1));
+  change(trunk, [](MapTrunk &t) { t.innovation2 = 9; });
+  ASSERT_LT(evidence(trunk), m_options.doubt_confirmed);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_TRUE(at(trunk).removed);
 }
 
 TEST_F(Life, WhatHidesALostTrunkSaysNothingMoreAgainstIt)
 {
-  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
+  const int trunk = confirmed(trunkAt(3, 1), 200);
   miss(trunk, m_options.lost_misses);
-  m_map.review();
-  ASSERT_EQ(trunk.status, TrunkStatus::lost);
-  const double odds = m_map.evidence(trunk);
+  review();
+  ASSERT_EQ(at(trunk).status, TrunkStatus::lost);
+  const double odds = evidence(trunk);
   miss(trunk, 500);
-  EXPECT_EQ(m_map.evidence(trunk), odds);
+  EXPECT_EQ(evidence(trunk), odds);
 }
 
 TEST_F(Life, ACandidateThatIsMissedForLongLeavesTheMap)
 {
-  MapTrunk &trunk = add(trunkAt(3, 1));
+  const int trunk = add(trunkAt(3, 1));
   see(trunk, 3);
   miss(trunk, m_options.lost_misses - 1);
-  EXPECT_TRUE(m_map.review().empty());
+  EXPECT_TRUE(review().changes.empty());
   miss(trunk, 1);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::lost);
-  EXPECT_TRUE(trunk.removed);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_TRUE(at(trunk).removed);
 }
 
 TEST_F(Life, AConfirmedTrunkThatIsLostKeepsItsPlaceAndComesBackUnderItsId)
 {
-  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
-  const int id = trunk.id;
+  const int trunk = confirmed(trunkAt(3, 1), 200);
+  const int id = trunk;
   miss(trunk, m_options.lost_misses);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::lost);
-  EXPECT_FALSE(trunk.removed); // still predicted, so it can be found again
-  EXPECT_TRUE(m_map.review().empty());
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_FALSE(at(trunk).removed); // still predicted, so it can be found again
+  EXPECT_TRUE(review().changes.empty());
   see(trunk, 1);
-  m_map.review();
-  EXPECT_EQ(trunk.status, TrunkStatus::confirmed);
-  EXPECT_EQ(trunk.id, id);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+  EXPECT_EQ(at(trunk).id, id);
 }
 
 TEST_F(Life, ABorderWhoseSignTurnsOverBeginsAnew)
 {
-  MapTrunk &trunk = m_map.add(0, trunkAt(3, 1));
-  m_map.recordView(trunk, {1.0, 0.3, -0.2, 0.1, 1, 0});
-  m_map.recordView(trunk, {1.1, 0.3, -0.1, 0.2, 1, 0});
-  EXPECT_NEAR(*trunk.left_contrast, -0.17, 1e-12);
+  const int trunk = add(trunkAt(3, 1));
+  see(trunk, viewAt(1.0, 0.3, -0.2, 0.1, 1, 0));
+  see(trunk, viewAt(1.1, 0.3, -0.1, 0.2, 1, 0));
+  EXPECT_NEAR(*at(trunk).left_contrast, -0.17, 1e-12);
 
-  m_map.recordView(trunk, {1.2, 0.3, 0.05, 0.2, 1, 0});
+  see(trunk, viewAt(1.2, 0.3, 0.05, 0.2, 1, 0));
 
-  EXPECT_NEAR(*trunk.left_contrast, 0.05, 1e-12);
-  EXPECT_GT(*trunk.right_contrast, 0.1);
+  EXPECT_NEAR(*at(trunk).left_contrast, 0.05, 1e-12);
+  EXPECT_GT(*at(trunk).right_contrast, 0.1);
 }
 
 TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeenOfIt)
 {
-  MapTrunk &candidate = m_map.add(0, trunkAt(3, 1));
-  m_map.recordView(candidate, {10.0, 0.3, 0.2, 0.2, 1, 0});
-  m_map.leaveBehind(10.0 + 0.99 * m_options.candidate_memory_s);
+  const int candidate = add(trunkAt(3, 1));
+  see(candidate, viewAt(10.0, 0.3, 0.2, 0.2, 1, 0));
+  m_map.review(10.0 + 0.99 * m_options.candidate_memory_s);
   EXPECT_EQ(m_map.active().size(), 1u);
 
-  m_map.leaveBehind(10.0 + 1.01 * m_options.candidate_memory_s);
+  m_map.review(10.0 + 1.01 * m_options.candidate_memory_s);
 
   EXPECT_TRUE(m_map.active().empty());
-  EXPECT_FALSE(m_map.trunks().front().removed);
-  EXPECT_EQ(m_map.records().size(), 1u);
+  EXPECT_FALSE(at(candidate).removed);
+  ASSERT_EQ(m_map.records().size(), 1u);
+  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::undecided);
 }
 
 TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
 {
-  const int never_seen = m_map.add(0, trunkAt(3, 1)).id;
-  m_map.trunks().front().last_seen_s = 10;
-  MapTrunk &seen = m_map.add(1, trunkAt(5, 1));
-  m_map.recordView(seen, {10.0, 0.3, 0.2, 0.2, 1, 0});
-  EXPECT_TRUE(m_map.leaveBehind(10.0 + 0.99 * m_options.candidate_memory_s).empty());
+  m_time_s = 10;
+  const int never_seen = add(trunkAt(3, 1)), seen = add(trunkAt(5, 1));
+  see(seen, viewAt(10.0, 0.3, 0.2, 0.2, 1, 0));
+  EXPECT_TRUE(m_map.review(10.0 + 0.99 * m_options.candidate_memory_s).removed.empty());
 
-  EXPECT_EQ(m_map.leaveBehind(10.0 + 1.01 * m_options.candidate_memory_s), std::vector<int>{never_seen});
+  const MapUpdate update = m_map.review(10.0 + 1.01 * m_options.candidate_memory_s);
 
-  EXPECT_TRUE(m_map.trunks()[0].removed);
-  EXPECT_FALSE(m_map.trunks()[1].removed);
+  EXPECT_EQ(update.removed, std::vector<std::size_t>{at(never_seen).smoother_id});
+  EXPECT_EQ(at(never_seen).fate, TrunkFate::unseen);
+  EXPECT_TRUE(at(never_seen).removed);
+  EXPECT_FALSE(at(seen).removed);
+}
+
+TEST_F(Life, ACandidateThatWasLeftBehindIsConfirmedInTheEndWhereItsEstimatesNowAllowIt)
+{
+  const int candidate = add(trunkAt(3, 1));
+  see(candidate, 20);
+  m_map.refresh({candidate, trunkAt(3, 1), 1e2 * Matrix5d::Identity()}); // its place is not known yet
+  m_map.review(100);
+  ASSERT_TRUE(at(candidate).inactive);
+
+  m_map.refresh({candidate, trunkAt(3.1, 1), 1e-4 * Matrix5d::Identity()});
+  m_map.reviewAll();
+
+  EXPECT_EQ(at(candidate).status, TrunkStatus::confirmed);
+  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::none);
 }
 
 TEST_F(Life, AConfirmedTrunkIsNeverLeftBehind)
 {
   confirmed(trunkAt(3, 1), 200);
-  m_map.leaveBehind(1e6);
+  m_map.review(1e6);
   EXPECT_EQ(m_map.active().size(), 1u);
 }
 
 TEST_F(Life, AViewEndsARowOfMisses)
 {
-  MapTrunk &trunk = confirmed(trunkAt(3, 1), 200);
+  const int trunk = confirmed(trunkAt(3, 1), 200);
   for (int i = 0; i < 5; ++i) {
     miss(trunk, m_options.lost_misses - 1);
     see(trunk, 1);
-    EXPECT_TRUE(m_map.review().empty());
+    EXPECT_TRUE(review().changes.empty());
   }
 }
 
 TEST_F(Life, TwoTrunksInOnePlaceBecomeOne)
 {
-  MapTrunk &old = confirmed(trunkAt(3, 1), 60);
-  MapTrunk &duplicate = add(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance - 0.01, 1));
+  const int old = confirmed(trunkAt(3, 1), 60);
+  const int duplicate = add(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance - 0.01, 1));
   see(duplicate, 3);
-  const auto changes = m_map.review();
+  const auto changes = review().changes;
   ASSERT_EQ(changes.size(), 1u);
-  EXPECT_EQ(changes[0].id, duplicate.id);
-  EXPECT_EQ(changes[0].into, old.id);
-  EXPECT_EQ(duplicate.status, TrunkStatus::merged);
-  EXPECT_TRUE(duplicate.removed);
-  EXPECT_FALSE(old.removed);
-  EXPECT_TRUE(m_map.review().empty()); // a merged trunk merges no more
+  EXPECT_EQ(changes[0].id, at(duplicate).id);
+  EXPECT_EQ(changes[0].into, at(old).id);
+  EXPECT_EQ(at(duplicate).status, TrunkStatus::merged);
+  EXPECT_TRUE(at(duplicate).removed);
+  EXPECT_FALSE(at(old).removed);
+  EXPECT_TRUE(review().changes.empty()); // a merged trunk merges no more
+}
+
+TEST_F(Life, ATrunkThatComesBackAsADuplicateHandsItsViewsOver)
+{
+  const int old = confirmed(trunkAt(3, 1), 60), known = at(old).observations;
+  m_time_s += 30; // another visit
+  const int duplicate = add(trunkAt(3.15, 1));
+  see(duplicate, 3);
+  const MapUpdate update = review();
+  ASSERT_EQ(update.merged.size(), 1u);
+  EXPECT_EQ(update.merged[0].keep, at(old).smoother_id);
+  EXPECT_EQ(update.merged[0].gone, at(duplicate).smoother_id);
+  EXPECT_TRUE(update.removed.empty());
+  EXPECT_EQ(at(duplicate).fate, TrunkFate::duplicate);
+  EXPECT_EQ(at(old).observations, known + 3);
+  EXPECT_EQ(at(old).last_seen_s, at(duplicate).last_seen_s);
+}
+
+TEST_F(Life, ARivalSeenAtTheSameTimeTakesItsViewsWithIt)
+{
+  confirmed(trunkAt(3, 1), 60);
+  m_time_s -= 1; // the same frames, and so the same lines of the image
+  const int rival = add(trunkAt(3.3, 1));
+  see(rival, 3);
+  const MapUpdate update = review();
+  EXPECT_TRUE(update.merged.empty());
+  EXPECT_EQ(update.removed, std::vector<std::size_t>{at(rival).smoother_id});
+  EXPECT_EQ(at(rival).fate, TrunkFate::outdone);
+}
+
+TEST_F(Life, AConfirmedTrunkOutOfSightStaysInTheRecords)
+{
+  const int trunk = confirmed(trunkAt(3, 1), 200);
+  miss(trunk, m_options.lost_misses);
+  review();
+  ASSERT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_EQ(m_map.records()[0].status, TrunkStatus::confirmed);
+  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::none);
 }
 
 TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
@@ -323,52 +412,52 @@ TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
   EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 2);
 }
 
-TEST_F(Life, ReadingsOfOnePlaceCompeteUntilOneIsConfirmed)
+TEST_F(Life, HypothesesForOnePlaceCompeteUntilOneIsConfirmed)
 {
-  MapTrunk &narrow = add(trunkAt(3, 1, 0.1)), &wide = add(trunkAt(3.05, 1, 0.2));
+  const int narrow = add(trunkAt(3, 1, 0.1)), &wide = add(trunkAt(3.05, 1, 0.2));
   see(narrow, m_options.confirm_observations - 1);
   see(wide, m_options.confirm_observations - 1);
-  EXPECT_TRUE(m_map.review().empty());
+  EXPECT_TRUE(review().changes.empty());
   EXPECT_EQ(m_map.count(TrunkStatus::candidate), 2);
   see(narrow, 1);
   see(wide, 1);
-  m_map.review(); // equally sound: the wider is the silhouette
-  EXPECT_EQ(wide.status, TrunkStatus::confirmed);
-  EXPECT_EQ(narrow.status, TrunkStatus::merged);
+  review(); // equally sound: the wider is the silhouette
+  EXPECT_EQ(at(wide).status, TrunkStatus::confirmed);
+  EXPECT_EQ(at(narrow).status, TrunkStatus::merged);
 }
 
-TEST_F(Life, AWiderReadingThatIsSoundReplacesAConfirmedEdgeOnItsBark)
+TEST_F(Life, AWiderHypothesisThatIsSoundReplacesAConfirmedEdgeOnItsBark)
 {
-  MapTrunk &edge = confirmed(trunkAt(3, 1, 0.1));
-  MapTrunk &silhouette = add(trunkAt(3.05, 1, 0.18)), &beside = add(trunkAt(3.3, 1, 0.12));
+  const int edge = confirmed(trunkAt(3, 1, 0.1));
+  const int silhouette = add(trunkAt(3.05, 1, 0.18)), &beside = add(trunkAt(3.3, 1, 0.12));
   see(silhouette, 5);
   see(beside, 5);
-  m_map.review();
-  EXPECT_EQ(silhouette.status, TrunkStatus::candidate); // may still turn out to be it
-  EXPECT_EQ(beside.status, TrunkStatus::merged);        // cannot stand there
+  review();
+  EXPECT_EQ(at(silhouette).status, TrunkStatus::candidate); // may still turn out to be it
+  EXPECT_EQ(at(beside).status, TrunkStatus::merged);        // cannot stand there
   see(silhouette, 15);
-  m_map.review();
-  EXPECT_EQ(edge.status, TrunkStatus::merged);
-  m_map.review();
-  EXPECT_EQ(silhouette.status, TrunkStatus::confirmed);
+  review();
+  EXPECT_EQ(at(edge).status, TrunkStatus::merged);
+  review();
+  EXPECT_EQ(at(silhouette).status, TrunkStatus::confirmed);
 }
 
-TEST_F(Life, TheSameReadingIsNotTakenInTwice)
+TEST_F(Life, TheSameHypothesisIsNotTakenInTwice)
 {
-  MapTrunk &candidate = add(trunkAt(3, 1));
-  EXPECT_TRUE(m_map.holds(trunkAt(3.05, 1)));
-  EXPECT_EQ(candidate.found_again, 1);
-  EXPECT_FALSE(m_map.holds(trunkAt(3.05, 1, 0.3))); // another reading
-  EXPECT_FALSE(m_map.holds(trunkAt(4, 1)));
-  EXPECT_EQ(candidate.found_again, 1);
+  const int candidate = add(trunkAt(3, 1));
+  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1)));
+  EXPECT_EQ(at(candidate).found_again, 1);
+  EXPECT_FALSE(m_map.recognise(trunkAt(3.05, 1, 0.3))); // another hypothesis
+  EXPECT_FALSE(m_map.recognise(trunkAt(4, 1)));
+  EXPECT_EQ(at(candidate).found_again, 1);
 }
 
 TEST_F(Life, ParallaxIsTheSpreadOfTheBearingsAlsoAcrossHalfATurn)
 {
-  MapTrunk &trunk = add(trunkAt(-3, 0));
+  const int trunk = add(trunkAt(-3, 0));
   for (const double bearing : {3.10, -3.10, 3.05})
-    m_map.recordView(trunk, {0, bearing, 0, 0, 0.9, 0});
-  EXPECT_NEAR(trunk.parallax(), 2 * M_PI - 6.2 + 0.05, 1e-12);
+    see(trunk, viewAt(0, bearing, 0, 0, 0.9, 0));
+  EXPECT_NEAR(at(trunk).parallax(), 2 * M_PI - 6.2 + 0.05, 1e-12);
 }
 
 TEST_F(Life, AnyHistoryKeepsItsLaws)
@@ -380,14 +469,14 @@ TEST_F(Life, AnyHistoryKeepsItsLaws)
       add(trunkAt(6 * uniform(random), 6 * uniform(random), 0.06 + 0.3 * uniform(random)));
     if (m_map.trunks().empty())
       continue;
-    MapTrunk &trunk =
-        m_map.trunks()[static_cast<std::size_t>(uniform(random) * static_cast<double>(m_map.trunks().size()))];
-    if (!trunk.removed && uniform(random) < 0.7)
-      see(trunk, 1 + static_cast<int>(4 * uniform(random)), 0.1, 2 * uniform(random));
-    else if (!trunk.removed)
-      miss(trunk, 1 + static_cast<int>(4 * uniform(random)));
+    const auto place = static_cast<std::size_t>(uniform(random) * static_cast<double>(m_map.trunks().size()));
+    const MapTrunk &picked = m_map.trunks()[place];
+    if (!picked.removed && uniform(random) < 0.7)
+      see(picked.id, 1 + static_cast<int>(4 * uniform(random)), 0.1, 2 * uniform(random));
+    else if (!picked.removed)
+      miss(picked.id, 1 + static_cast<int>(4 * uniform(random)));
     std::vector<MapTrunk> before = m_map.trunks();
-    for (const MapChange &change : m_map.review()) {
+    for (const MapChange &change : review().changes) {
       const auto id = static_cast<std::size_t>(change.id);
       EXPECT_FALSE(before[id].removed) << "what left the map stays as it was";
       EXPECT_NE(change.to, TrunkStatus::candidate) << "nothing becomes a candidate again";
@@ -410,8 +499,10 @@ TEST_F(Life, RecordsTellThePlaceAtBreastHeight)
 {
   Trunk leaning = trunkAt(3, 1);
   leaning.lean = {0.1, -0.05};
-  MapTrunk &trunk = add(leaning);
-  trunk.covariance.diagonal() << 0.01, 0.02, 0.04, 1e-3, 2e-3;
+  const int trunk = add(leaning);
+  Matrix5d covariance = Matrix5d::Zero();
+  covariance.diagonal() << 0.01, 0.02, 0.04, 1e-3, 2e-3;
+  m_map.refresh({trunk, leaning, covariance});
   see(trunk, 4);
   const TrunkRecord record = m_map.records().at(0);
   EXPECT_LT((record.xy - Eigen::Vector2d(3 + 0.13, 1 - 0.065)).norm(), 1e-12);

@@ -3,7 +3,7 @@
 // flies round it.
 #include "support/drawn_trunks.h"
 
-#include <bole/pipeline.h>
+#include "pipeline/engine.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
@@ -20,7 +20,6 @@ constexpr int kTurned = 40; ///< frame in which light and dark change places
 Frame frameAt(int k)
 {
   Frame frame;
-  frame.index = static_cast<std::size_t>(k);
   frame.stamp_ns = k * 100000000LL;
   frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0, 0.8 * std::sin(0.15 * k), 1.2});
   frame.image = test::drawTrunks(kCamera, (*frame.wMb_odometry * kMount).inverse(), test::smallWood(), unsigned(k));
@@ -39,8 +38,8 @@ std::vector<int> trackedWith(int turned_frames)
   std::vector<int> tracked;
   for (int k = 0; k < 60; ++k) {
     int count = 0;
-    for (const TrackedTrunk &trunk : pipeline.process(frameAt(k)).trunks)
-      count += trunk.id < 5 && trunk.map_status == TrunkStatus::confirmed && trunk.status == TrackingStatus::tracked;
+    for (const TrunkInView &trunk : pipeline.process(frameAt(k)).trunks)
+      count += trunk.id < 5 && trunk.status == TrunkStatus::confirmed && trunk.is_tracked;
     tracked.push_back(count);
   }
   return tracked;
@@ -68,15 +67,14 @@ double radiusSigmaAfter(int rest, double view_correlation)
 {
   StageOptions options;
   options.flow.view_correlation = view_correlation;
-  Pipeline pipeline(kCamera, kMount, options);
+  Engine pipeline(kCamera, kMount, options);
   for (int k = 0; k < 30 + rest; ++k) {
     Frame frame = frameAt(std::min(k, 30));
-    frame.index = static_cast<std::size_t>(k);
     frame.stamp_ns = k * 100000000LL;
     pipeline.process(frame);
   }
   double sigma = -1, nearest = 1e9;
-  for (const MapTrunk &trunk : pipeline.mapTrunks())
+  for (const MapTrunk &trunk : pipeline.trunks().trunks())
     if (trunk.status == TrunkStatus::confirmed && !trunk.removed && trunk.trunk.xy.norm() < nearest) {
       nearest = trunk.trunk.xy.norm();
       sigma = std::sqrt(trunk.covariance(2, 2));

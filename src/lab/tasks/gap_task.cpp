@@ -109,25 +109,25 @@ ServoTask::Values GapTask::errors() const
 }
 
 /// Before the gap at least one of its trunks is in view; in it nothing can be asked for.
-bool GapTask::sees(const FrameResult &result, const Pipeline &) const
+bool GapTask::sees(const FrameReport &report) const
 {
   if (!m_gap || m_ahead > -kInView)
     return true;
-  return trackedTrunk(result, m_gap->left) || trackedTrunk(result, m_gap->right);
+  return trackedTrunk(report, m_gap->left) || trackedTrunk(report, m_gap->right);
 }
 
-TaskCommand GapTask::search(const FrameResult &result, const Pipeline &pipeline)
+TaskCommand GapTask::search(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
-  TaskCommand command{false, m_sidestep.velocity(result.wMb, time_s), "sidesteps to find a gap"};
+  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  TaskCommand command{false, m_sidestep.velocity(report.wMb, time_s), "sidesteps to find a gap"};
   const double elapsed = m_sidestep.elapsed(time_s);
   if (elapsed > m_options.search_s) {
     enter(TaskPhase::failed);
     return {true, Eigen::Vector4d::Zero(), "no gap found"};
   }
   if (elapsed > kSweep_s)
-    m_gap = chooseGap(obstacles(pipeline, result.wMb, 12, kViews), m_sidestep.start().t.head<2>(),
-                      yawOf(m_sidestep.start()), elapsed > 2 * kSweep_s ? -100 : m_options.evidence, m_options);
+    m_gap = chooseGap(obstacles(report, 12, kViews), m_sidestep.start().t.head<2>(), yawOf(m_sidestep.start()),
+                      elapsed > 2 * kSweep_s ? -100 : m_options.evidence, m_options);
   if (m_gap)
     enter(TaskPhase::servoing);
   return command;
@@ -181,14 +181,14 @@ void GapTask::giveUpTarget()
   enter(TaskPhase::searching);
 }
 
-TaskCommand GapTask::act(const FrameResult &result, const Pipeline &pipeline)
+TaskCommand GapTask::act(const FrameReport &report)
 {
-  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, 1e-9 * static_cast<double>(result.stamp_ns));
+  m_near_points.see(placedPoints(report, kNearRange), report.wMb, 1e-9 * static_cast<double>(report.stamp_ns));
   if (!m_gap)
-    return search(result, pipeline);
-  std::vector<Obstacle> around = obstacles(pipeline, result.wMb, 20, 1);
-  refresh(around, result.wMb);
-  m_near_points.addTo(around, result.wMb, kNearRange);
-  return fly(around, result.wMb);
+    return search(report);
+  std::vector<Obstacle> around = obstacles(report, 20, 1);
+  refresh(around, report.wMb);
+  m_near_points.addTo(around, report.wMb, kNearRange);
+  return fly(around, report.wMb);
 }
 } // namespace bole

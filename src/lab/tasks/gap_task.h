@@ -59,12 +59,12 @@ public:
   Values errors() const override;
 
 protected:
-  bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
+  bool sees(const FrameReport &report) const override;
   void giveUpTarget() override;
-  TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
+  TaskCommand act(const FrameReport &report) override;
 
 private:
-  TaskCommand search(const FrameResult &result, const Pipeline &pipeline);
+  TaskCommand search(const FrameReport &report);
   void refresh(const std::vector<Obstacle> &trunks, const Pose &wMb);
   TaskCommand fly(const std::vector<Obstacle> &around, const Pose &wMb);
 

@@ -10,7 +10,7 @@ namespace
 {
 constexpr double kMisread = 0.3;      ///< of the radius: a border read inside the bark, where light and shade meet
 constexpr double kDoubted = -2;       ///< log odds below which a candidate is taken for nothing
-constexpr double kSeenThrough = 4;    ///< MapTrunk::lookedThrough from which nothing stands there
+constexpr double kSeenThrough = 4;    ///< KnownTrunk::seen_through from which nothing stands there
 constexpr double kFlownThrough = 0.1; ///< of the drone from the bark: what stands there is none [m]
 constexpr double kWidth = 0.15;       ///< of a column of points [m]
 constexpr double kRemembered_s = 3;   ///< of what is out of view
@@ -32,29 +32,26 @@ double Obstacle::clearance(const Eigen::Vector2d &p, double sigmas) const
   return distance - radius - sigmas * std::sqrt(std::max(0.0, u.dot(covariance * u)));
 }
 
-std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations)
+std::vector<Obstacle> obstacles(const FrameReport &report, double range, int observations)
 {
   std::vector<Obstacle> near;
-  for (const MapTrunk &trunk : pipeline.mapTrunks()) {
+  for (const KnownTrunk &trunk : report.map) {
     const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
     const bool counts = is_confirmed || (trunk.status == TrunkStatus::candidate && trunk.observations >= observations);
-    if (trunk.removed || !counts) // most of a long flight's
+    if (!counts || trunk.seen_through > kSeenThrough || (!is_confirmed && trunk.log_odds < kDoubted))
       continue;
-    if (trunk.lookedThrough() > kSeenThrough)
-      continue;
-    const Eigen::Vector2d xy = trunk.trunk.axisAt(wMb.t.z()).head<2>(), w = xy - wMb.t.head<2>();
+    const double radius = trunk.trunk.radius();
+    const Eigen::Vector2d xy = trunk.trunk.axisAt(report.wMb.t.z()).head<2>(), w = xy - report.wMb.t.head<2>();
     const double d = w.norm();
-    const double evidence = pipeline.evidence(trunk);
-    if (d > range || d < trunk.trunk.radius() + kFlownThrough || (!is_confirmed && evidence < kDoubted))
+    if (d > range || d < radius + kFlownThrough)
       continue;
-    const Matrix4d relative = pipeline.smoother().relativeCovariance(trunk.smoother_id);
-    const double across = d * d * relative(2, 2), along = d * d * trunk.covariance(2, 2);
+    const double across = d * d * trunk.bearing_variance, along = d * d * trunk.log_radius_variance;
     const Eigen::Vector2d u = w / d, n(-u.y(), u.x());
-    const double misread = kMisread * trunk.trunk.radius();
+    const double misread = kMisread * radius;
     near.push_back(
-        {trunk.id, is_confirmed, xy, trunk.trunk.radius(),
+        {trunk.id, is_confirmed, xy, radius,
          across * n * n.transpose() + along * u * u.transpose() + misread * misread * Eigen::Matrix2d::Identity(),
-         evidence});
+         trunk.log_odds});
   }
   return near;
 }
@@ -108,12 +105,12 @@ SeenSpace::Cell &SeenSpace::cellAt(const Eigen::Vector2d &p)
   return cell;
 }
 
-void SeenSpace::see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s)
+void SeenSpace::see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s)
 {
   constexpr double kFar = 6;      // nothing beyond matters [m]
   constexpr double kHeight = 0.5; // of a ray above or below the camera [m]
   m_time_s = time_s;
-  for (const Pipeline::Sight &sight : sights) {
+  for (const TriangulatedRay &sight : sights) {
     const double level = sight.ray.head<2>().norm();
     const double surely_free = level / (std::max(sight.inverse_distance, 0.0) + 2 * sight.sigma) - kCell;
     const double end = std::min({surely_free, kFar, kHeight * level / std::max(std::abs(sight.ray.z()), 1e-6)});

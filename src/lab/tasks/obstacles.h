@@ -3,7 +3,7 @@
 /// \file
 /// The map as something to keep away from.
 
-#include <bole/pipeline.h>
+#include <bole/report.h>
 
 #include <cstdint>
 #include <map>
@@ -29,10 +29,10 @@ struct Obstacle
   double clearance(const Eigen::Vector2d &p, double sigmas) const;
 };
 
-/// Live trunks of the map within \p range [m] of the drone at \p wMb: the confirmed, and candidates with at least
+/// Live trunks of the map within \p range [m] of the drone: the confirmed, and candidates with at least
 /// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
 /// below -2, looked through, or where the drone is.
-std::vector<Obstacle> obstacles(const Pipeline &pipeline, const Pose &wMb, double range, int observations);
+std::vector<Obstacle> obstacles(const FrameReport &report, double range, int observations);
 
 /// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it,
 /// has bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are
@@ -63,7 +63,7 @@ class SeenSpace
 {
 public:
   /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
-  void see(const std::vector<Pipeline::Sight> &sights, const Eigen::Vector3d &from, double time_s);
+  void see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s);
   /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
   bool isSeen(const Eigen::Vector2d &p) const;
 

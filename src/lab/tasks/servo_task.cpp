@@ -44,10 +44,10 @@ void SafetyOptions::validate() const
 
 ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
 
-TaskCommand ServoTask::step(const FrameResult &result, const Pipeline &pipeline)
+TaskCommand ServoTask::step(const FrameReport &report)
 {
-  const bool is_ok = result.frame_status == FrameStatus::ok;
-  const bool is_seen = is_ok && sees(result, pipeline);
+  const bool is_ok = report.frame_status == FrameStatus::ok;
+  const bool is_seen = is_ok && sees(report);
   if (is_ok)
     m_missed = is_seen ? 0 : m_missed + 1;
   if (m_missed > m_safety.patience_frames) {
@@ -66,10 +66,10 @@ TaskCommand ServoTask::step(const FrameResult &result, const Pipeline &pipeline)
     return hover;
   }
   if (m_is_lost) {
-    hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(result.frame_status) + ": hovers";
+    hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(report.frame_status) + ": hovers";
     return hover;
   }
-  return act(result, pipeline);
+  return act(report);
 }
 
 double yawOf(const Pose &wMb) { return std::atan2(wMb.R(1, 0), wMb.R(0, 0)); }
@@ -99,21 +99,5 @@ Eigen::Vector4d Sidestep::velocity(const Pose &wMb, double time_s)
   const Eigen::Vector2d left(-std::sin(heading), std::cos(heading));
   const Eigen::Vector2d place = m_start.t.head<2>() + m_amplitude * std::sin(w * t) * left;
   return towards(wMb, m_amplitude * w * std::cos(w * t) * left + kPlaceGain * (place - wMb.t.head<2>()), heading);
-}
-
-const MapTrunk *liveTrunk(const Pipeline &pipeline, int id)
-{
-  for (const MapTrunk &trunk : pipeline.mapTrunks())
-    if (trunk.id == id && !trunk.removed && trunk.status != TrunkStatus::lost)
-      return &trunk;
-  return nullptr;
-}
-
-const TrackedTrunk *trackedTrunk(const FrameResult &result, int id)
-{
-  for (const TrackedTrunk &trunk : result.trunks)
-    if (trunk.id == id && trunk.status == TrackingStatus::tracked)
-      return &trunk;
-  return nullptr;
 }
 } // namespace bole

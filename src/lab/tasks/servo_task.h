@@ -3,7 +3,7 @@
 /// \file
 /// A flying task closed over the tracker: from what the pipeline knows after a frame to a velocity of the drone.
 ///
-/// Idea: a task sees only FrameResult and Pipeline, never a robot, so the same task flies vpRobotArDrone and
+/// Idea: a task sees only the report of a frame, never a robot, so the same task flies vpRobotArDrone and
 /// vpSimulatorArDrone. What every task shares is when *not* to act: step() commands a hover at once where a frame is
 /// not ok, and where what the task hangs on was not found for lost_frames; it goes on after sure_frames in which it
 /// was, and looks for another after patience_frames in which it was not. A drone that hovers holds its place by its
@@ -11,7 +11,7 @@
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
-#include <bole/pipeline.h>
+#include <bole/report.h>
 
 #include <string>
 #include <utility>
@@ -54,8 +54,7 @@ public:
   explicit ServoTask(const SafetyOptions &safety = {});
   virtual ~ServoTask() = default;
 
-  /// \param result of this frame; \param pipeline after it.
-  TaskCommand step(const FrameResult &result, const Pipeline &pipeline);
+  TaskCommand step(const FrameReport &report);
 
   TaskPhase phase() const { return m_phase; }
   bool isLost() const { return m_is_lost; }
@@ -64,10 +63,10 @@ public:
 
 protected:
   /// Whether this (ok) frame shows what the task hangs on.
-  virtual bool sees(const FrameResult &result, const Pipeline &pipeline) const = 0;
+  virtual bool sees(const FrameReport &report) const = 0;
   /// What the task hangs on is gone for good: search anew.
   virtual void giveUpTarget() {}
-  virtual TaskCommand act(const FrameResult &result, const Pipeline &pipeline) = 0;
+  virtual TaskCommand act(const FrameReport &report) = 0;
   void enter(TaskPhase phase) { m_phase = phase; }
 
 private:
@@ -107,8 +106,4 @@ double yawOf(const Pose &wMb);
 Eigen::Vector4d towards(const Pose &wMb, const Eigen::Vector2d &velocity, double heading);
 /// \p v with its length at most \p largest.
 Eigen::Vector2d limited(const Eigen::Vector2d &v, double largest);
-/// The trunk of the map with this id; nullptr when it was merged, lost or given up.
-const MapTrunk *liveTrunk(const Pipeline &pipeline, int id);
-/// Whether the trunk was measured in this frame.
-const TrackedTrunk *trackedTrunk(const FrameResult &result, int id);
 } // namespace bole

@@ -157,15 +157,15 @@ ServoTask::Values SlalomTask::errors() const
           {"clearance by the map [m]", std::min(m_way.clearance, 9.0)}};
 }
 
-void SlalomTask::locate(const FrameResult &result)
+void SlalomTask::locate(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
+  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
   if (!m_started) {
-    m_start = {Eigen::AngleAxisd(yawOf(result.wMb), Eigen::Vector3d::UnitZ()).toRotationMatrix(), result.wMb.t};
+    m_start = {Eigen::AngleAxisd(yawOf(report.wMb), Eigen::Vector3d::UnitZ()).toRotationMatrix(), report.wMb.t};
     m_started = true;
     m_time_s = time_s;
   }
-  const Eigen::Vector3d p = m_start.inverse() * result.wMb.t;
+  const Eigen::Vector3d p = m_start.inverse() * report.wMb.t;
   const double dt = time_s - m_time_s;
   if (dt > 0)
     m_state.vy += 0.4 * (std::clamp((p.y() - m_state.y) / dt, -2.0, 2.0) - m_state.vy);
@@ -175,21 +175,21 @@ void SlalomTask::locate(const FrameResult &result)
   m_time_s = time_s;
 }
 
-TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
+TaskCommand SlalomTask::act(const FrameReport &report)
 {
-  locate(result);
-  if (!pipeline.sights().empty())
-    m_seen.see(pipeline.sights(), pipeline.cameraPose().t, m_time_s);
-  m_near_points.see(pipeline.scenePoints(kNearRange), result.wMb, m_time_s);
+  locate(report);
+  if (!report.points.empty())
+    m_seen.see(report.points, report.wMc.t, m_time_s);
+  m_near_points.see(placedPoints(report, kNearRange), report.wMb, m_time_s);
   if (phase() == TaskPhase::searching && m_sidestep.elapsed(m_time_s) < m_options.look) {
     m_state.lead = 0;
-    return {false, m_sidestep.velocity(result.wMb, m_time_s), "looks before it leaves"};
+    return {false, m_sidestep.velocity(report.wMb, m_time_s), "looks before it leaves"};
   }
   enter(m_state.x >= m_options.length ? TaskPhase::done : TaskPhase::servoing);
   if (phase() == TaskPhase::done)
     return {true, Eigen::Vector4d::Zero(), "arrived"};
-  std::vector<Obstacle> trunks = obstacles(pipeline, result.wMb, kRange, m_options.views);
-  m_near_points.addTo(trunks, result.wMb, kNearRange);
+  std::vector<Obstacle> trunks = obstacles(report, kRange, m_options.views);
+  m_near_points.addTo(trunks, report.wMb, kNearRange);
   const Eigen::Matrix2d axes = m_start.R.topLeftCorner<2, 2>().transpose();
   for (Obstacle &trunk : trunks) {
     trunk.xy = axes * (trunk.xy - m_start.t.head<2>());
@@ -202,7 +202,7 @@ TaskCommand SlalomTask::act(const FrameResult &result, const Pipeline &pipeline)
   const Eigen::Vector2d velocity(m_way.speed, sidewaysTo(m_way.offset, m_state.y, m_options));
   const double heading =
       yawOf(m_start) + kLook * std::atan2(velocity.y(), std::max(velocity.x(), 0.5 * m_options.speed));
-  return {false, towards(result.wMb, axes.transpose() * velocity, heading),
+  return {false, towards(report.wMb, axes.transpose() * velocity, heading),
           m_way.speed < m_options.speed ? "slows" : "flies"};
 }
 } // namespace bole

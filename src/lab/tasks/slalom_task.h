@@ -73,11 +73,11 @@ public:
   Values errors() const override;
 
 protected:
-  bool sees(const FrameResult &, const Pipeline &) const override { return true; }
-  TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
+  bool sees(const FrameReport &) const override { return true; }
+  TaskCommand act(const FrameReport &report) override;
 
 private:
-  void locate(const FrameResult &result);
+  void locate(const FrameReport &report);
 
   SlalomTaskOptions m_options;
   bool m_started = false;

@@ -75,28 +75,28 @@ ServoTask::Values TrunkTask::errors() const
           {"distance [%]", 100 * (m_ratio * std::exp(-m_log_ratio.value()) - 1)}};
 }
 
-bool TrunkTask::sees(const FrameResult &result, const Pipeline &) const
+bool TrunkTask::sees(const FrameReport &report) const
 {
-  return m_target < 0 || trackedTrunk(result, m_target) != nullptr;
+  return m_target < 0 || trackedTrunk(report, m_target) != nullptr;
 }
 
 /// The nearest trunk straight ahead of where the search began that is surely one; after two sweeps without such a one,
 /// the surest that is confirmed.
-int TrunkTask::choose(const Pipeline &pipeline, double elapsed_s) const
+int TrunkTask::choose(const FrameReport &report, double elapsed_s) const
 {
-  const MapTrunk *nearest = nullptr, *surest = nullptr;
+  const KnownTrunk *nearest = nullptr, *surest = nullptr;
   double least_range = m_options.choice_range;
   const double heading = yawOf(m_sidestep.start());
-  for (const MapTrunk &trunk : pipeline.mapTrunks()) {
-    if (trunk.removed || trunk.status != TrunkStatus::confirmed || trunk.observations < m_options.choice_views)
+  for (const KnownTrunk &trunk : report.map) {
+    if (trunk.status != TrunkStatus::confirmed || trunk.observations < m_options.choice_views)
       continue;
     const Pose &start = m_sidestep.start();
     const Eigen::Vector2d w = trunk.trunk.axisAt(start.t.z()).head<2>() - start.t.head<2>();
     const double angle = std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI), range = w.norm();
     if (std::abs(angle) > m_options.choice_angle || range > m_options.choice_range)
       continue;
-    const double evidence = pipeline.evidence(trunk);
-    if (!surest || evidence > pipeline.evidence(*surest))
+    const double evidence = trunk.log_odds;
+    if (!surest || evidence > surest->log_odds)
       surest = &trunk;
     if (evidence >= m_options.choice_evidence && range < least_range) {
       nearest = &trunk;
@@ -109,18 +109,18 @@ int TrunkTask::choose(const Pipeline &pipeline, double elapsed_s) const
 }
 
 /// The trunk that stands where the target stood: ids change when trunks merge.
-int TrunkTask::successor(const Pipeline &pipeline) const
+int TrunkTask::successor(const FrameReport &report) const
 {
-  for (const MapTrunk &trunk : pipeline.mapTrunks())
-    if (!trunk.removed && trunk.status != TrunkStatus::lost && (trunk.trunk.xy - m_place).norm() < kSameTrunk)
+  for (const KnownTrunk &trunk : report.map)
+    if (trunk.status != TrunkStatus::lost && (trunk.trunk.xy - m_place).norm() < kSameTrunk)
       return trunk.id;
   return -1;
 }
 
-TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipeline, double time_s)
+TaskCommand TrunkTask::search(const FrameReport &report, double time_s)
 {
   TaskCommand command;
-  command.velocity = m_sidestep.velocity(result.wMb, time_s);
+  command.velocity = m_sidestep.velocity(report.wMb, time_s);
   command.is_hovering = false;
   command.reason = "sidesteps to find a trunk";
   const double elapsed = m_sidestep.elapsed(time_s);
@@ -129,7 +129,7 @@ TaskCommand TrunkTask::search(const FrameResult &result, const Pipeline &pipelin
     return {true, Eigen::Vector4d::Zero(), "no trunk found"};
   }
   if (elapsed > kSweep_s)
-    m_target = choose(pipeline, elapsed);
+    m_target = choose(report, elapsed);
   if (m_target >= 0) {
     enter(TaskPhase::servoing);
     m_has_feature = false;
@@ -147,10 +147,10 @@ void TrunkTask::desire(double radius)
 /// what one image takes for a border wanders by a tenth of the width. A ratio that is asked for is the image's, but for
 /// misread widths; the trunk as seen from here may be wider or narrower than in the map, which has it from all sides:
 /// m_log_radius.
-RelativeTrunk TrunkTask::look(const FrameResult &result, const MapTrunk &trunk)
+RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk)
 {
-  RelativeTrunk seen = relativeTrunk(result.wMb, m_bMc, trunk.trunk);
-  const TrackedTrunk *tracked = trackedTrunk(result, m_target);
+  RelativeTrunk seen = relativeTrunk(report.wMb, m_bMc, trunk.trunk);
+  const TrunkInView *tracked = trackedTrunk(report, m_target);
   if (!tracked || !seen.isFinite() || !tracked->relative.isFinite())
     return seen;
   seen.cRt = tracked->relative.cRt;
@@ -177,30 +177,30 @@ void TrunkTask::giveUpTarget()
   enter(TaskPhase::searching);
 }
 
-TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
+TaskCommand TrunkTask::act(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(result.stamp_ns);
-  if (m_target >= 0 && !liveTrunk(pipeline, m_target))
-    m_target = successor(pipeline);
-  const MapTrunk *trunk = liveTrunk(pipeline, m_target);
-  const std::vector<Obstacle> around = obstacles(pipeline, result.wMb, kClearRange, 1);
+  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  if (m_target >= 0 && !knownTrunk(report, m_target))
+    m_target = successor(report);
+  const KnownTrunk *trunk = knownTrunk(report, m_target);
+  const std::vector<Obstacle> around = obstacles(report, kClearRange, 1);
   if (!trunk) {
     if (phase() == TaskPhase::servoing)
       giveUpTarget();
-    TaskCommand command = search(result, pipeline, time_s);
-    keepClear(command, around, result.wMb);
+    TaskCommand command = search(report, time_s);
+    keepClear(command, around, report.wMb);
     m_response.send(time_s, command.velocity);
     return command;
   }
   m_place = trunk->trunk.xy;
-  const RelativeTrunk seen = look(result, *trunk);
+  const RelativeTrunk seen = look(report, *trunk);
   if (!seen.isFinite())
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
   const double sway = swayNow(time_s);
   const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
-  const bool is_free = isFree(trunk->id, around, result.wMb, wanted);
+  const bool is_free = isFree(trunk->id, around, report.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
   if (m_blocked > kPatience) {
     m_turned_back = -m_turned_back;
@@ -209,7 +209,7 @@ TaskCommand TrunkTask::act(const FrameResult &result, const Pipeline &pipeline)
   const double round = is_free ? wanted : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
   command.velocity.z() = m_options.sway_climb * sway;
-  if (keepClear(command, around, result.wMb))
+  if (keepClear(command, around, report.wMb))
     m_response.send(time_s, command.velocity);
   if (sway != 0)
     command.reason = "holds, swaying";

@@ -78,15 +78,15 @@ public:
   Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round);
 
 protected:
-  bool sees(const FrameResult &result, const Pipeline &pipeline) const override;
+  bool sees(const FrameReport &report) const override;
   void giveUpTarget() override;
-  TaskCommand act(const FrameResult &result, const Pipeline &pipeline) override;
+  TaskCommand act(const FrameReport &report) override;
 
 private:
-  TaskCommand search(const FrameResult &result, const Pipeline &pipeline, double time_s);
-  int choose(const Pipeline &pipeline, double elapsed_s) const;
-  int successor(const Pipeline &pipeline) const;
-  RelativeTrunk look(const FrameResult &result, const MapTrunk &trunk);
+  TaskCommand search(const FrameReport &report, double time_s);
+  int choose(const FrameReport &report, double elapsed_s) const;
+  int successor(const FrameReport &report) const;
+  RelativeTrunk look(const FrameReport &report, const KnownTrunk &trunk);
   void desire(double radius);
   double swayNow(double time_s);
   bool keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const;

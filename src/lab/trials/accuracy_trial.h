@@ -6,6 +6,7 @@
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
 #include "lab/simulation/simulated_flight.h"
+#include "pipeline/stage_options.h"
 #include <bole/pipeline.h>
 
 #include <functional>

@@ -113,8 +113,8 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
 
     const double start_ms = processMs();
     markBroken(frame, health);
-    const FrameResult result = pipeline.process(frame);
-    const TaskCommand command = task.step(result, pipeline);
+    const FrameReport report = pipeline.process(frame);
+    const TaskCommand command = task.step(report);
     sample.loop_ms = processMs() - start_ms;
     give(robot, command);
 
@@ -124,14 +124,14 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
     sample.is_lost = task.isLost();
     sample.is_hovering = command.is_hovering;
     sample.frame_status = frame.status;
-    sample.estimate = result.wMb;
+    sample.estimate = report.wMb;
     sample.command = command.velocity;
     sample.speed = robot.body().velocity().head<2>().norm();
     sample.clearance = robot.leastClearance(); // least so far, of every 5 ms
     sample.believed = task.errors();
     sample.reason = command.reason;
     if (judge)
-      sample.real = judge(sample.truth, sample.estimate);
+      sample.real = judge(sample.truth, report);
     record.samples.push_back(sample);
 
     record.is_contact = robot.leastClearance() < options.contact;
@@ -139,7 +139,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
     const bool is_over = task.phase() == TaskPhase::done || task.phase() == TaskPhase::failed;
     if (is_over && rest_from_s < 0)
       rest_from_s = sample.time_s;
-    if (watcher && !watcher(frame, result, sample))
+    if (watcher && !watcher(frame, report, sample))
       break;
     if (record.is_contact || (is_over && sample.time_s > rest_from_s + kRest_s) || servoing_s > options.duration_s ||
         (record.servoing_from_s < 0 && sample.time_s > options.search_most_s))

@@ -9,6 +9,7 @@
 #include "lab/simulation/vpSimulatorArDrone.h"
 #include "lab/tasks/servo_task.h"
 #include "lab/trials/injected_fault.h"
+#include <bole/pipeline.h>
 
 #include <functional>
 
@@ -54,11 +55,11 @@ struct LoopRecord
   double percentile95Loop_ms() const;
 };
 
-/// The truth about a task's errors: \p truth and \p estimate of the body at the frame. The task is asked for what it
-/// chose, not told anything.
-using Judge = std::function<ServoTask::Values(const Pose &truth, const Pose &estimate)>;
+/// The truth about a task's errors: \p truth of the body at the frame and what the pipeline knows after it. The task is
+/// asked for what it chose, not told anything.
+using Judge = std::function<ServoTask::Values(const Pose &truth, const FrameReport &report)>;
 /// Called after each frame; false ends the flight.
-using LoopWatcher = std::function<bool(const Frame &, const FrameResult &, const LoopSample &)>;
+using LoopWatcher = std::function<bool(const Frame &, const FrameReport &, const LoopSample &)>;
 
 /// Takes off and flies. \p robot stands on the ground. Frames whose pixels cannot be believed (ImageHealth) reach the
 /// pipeline as corrupt or stale, as those of a live source do.

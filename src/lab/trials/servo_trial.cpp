@@ -21,12 +21,12 @@ constexpr double kLeastGap = 1.2;  ///< true free width that another gap than th
 constexpr double kSameTrunk = 0.6; ///< a trunk of the map this near to one of the truth is that one [m]
 
 /// The trunk of the truth that stands where the map has the trunk \p id, both seen from the drone; -1: none.
-int trueTrunk(const Forest &forest, const Pipeline &pipeline, int id, const Pose &truth, const Pose &estimate)
+int trueTrunk(const Forest &forest, const FrameReport &report, int id, const Pose &truth)
 {
-  const MapTrunk *trunk = liveTrunk(pipeline, id);
+  const KnownTrunk *trunk = knownTrunk(report, id);
   if (!trunk)
     return -1;
-  const Eigen::Vector3d seen = truth * (estimate.inverse() * trunk->trunk.axisAt(estimate.t.z()));
+  const Eigen::Vector3d seen = truth * (report.wMb.inverse() * trunk->trunk.axisAt(report.wMb.t.z()));
   double best = kSameTrunk;
   int found = -1;
   for (const SimulatedTrunk &candidate : forest.trunks) {
@@ -43,21 +43,21 @@ int trueTrunk(const Forest &forest, const Pipeline &pipeline, int id, const Pose
 class TrunkJudge
 {
 public:
-  TrunkJudge(const Scenario &scenario, const TrunkTask &task, const Pipeline &pipeline, const Pose &bMc)
-      : m_scenario(scenario), m_task(task), m_pipeline(pipeline), m_bMc(bMc)
+  TrunkJudge(const Scenario &scenario, const TrunkTask &task, const Pose &bMc)
+      : m_scenario(scenario), m_task(task), m_bMc(bMc)
   {
   }
 
   /// The trunk of the truth that stands where the task's stands, seen from the drone; -1: none.
   int trunk() const { return m_trunk; }
 
-  ServoTask::Values operator()(const Pose &truth, const Pose &estimate)
+  ServoTask::Values operator()(const Pose &truth, const FrameReport &report)
   {
     if (m_task.target() < 0)
       return {};
     if (m_task.target() != m_target || m_trunk < 0) { // the first range may be far off: asks again
       m_target = m_task.target();
-      m_trunk = trueTrunk(m_scenario.forest, m_pipeline, m_target, truth, estimate);
+      m_trunk = trueTrunk(m_scenario.forest, report, m_target, truth);
     }
     if (m_trunk < 0)
       return {};
@@ -77,7 +77,6 @@ public:
 private:
   const Scenario &m_scenario;
   const TrunkTask &m_task;
-  const Pipeline &m_pipeline;
   Pose m_bMc;
   int m_target = -1, m_trunk = -1;
 };
@@ -86,36 +85,32 @@ private:
 class GapJudge
 {
 public:
-  GapJudge(const Scenario &scenario, const GapTask &task, const Pipeline &pipeline)
-      : m_scenario(scenario), m_task(task), m_pipeline(pipeline)
-  {
-  }
+  GapJudge(const Scenario &scenario, const GapTask &task) : m_scenario(scenario), m_task(task) {}
 
   /// Of the truth; -1: what the task takes for one is none.
   int left() const { return m_left; }
   int right() const { return m_right; }
 
-  ServoTask::Values operator()(const Pose &truth, const Pose &estimate)
+  ServoTask::Values operator()(const Pose &truth, const FrameReport &report)
   {
     if (!m_task.gap())
       return {};
-    follow(m_task.gap()->left, m_left_id, m_left, truth, estimate);
-    follow(m_task.gap()->right, m_right_id, m_right, truth, estimate);
+    follow(m_task.gap()->left, m_left_id, m_left, truth, report);
+    follow(m_task.gap()->right, m_right_id, m_right, truth, report);
     return {};
   }
 
 private:
-  void follow(int id, int &last_id, int &found, const Pose &truth, const Pose &estimate)
+  void follow(int id, int &last_id, int &found, const Pose &truth, const FrameReport &report)
   {
-    const int now = trueTrunk(m_scenario.forest, m_pipeline, id, truth, estimate);
-    if (id != last_id || liveTrunk(m_pipeline, id))
+    const int now = trueTrunk(m_scenario.forest, report, id, truth);
+    if (id != last_id || knownTrunk(report, id))
       found = now;
     last_id = id;
   }
 
   const Scenario &m_scenario;
   const GapTask &m_task;
-  const Pipeline &m_pipeline;
   int m_left_id = -1, m_right_id = -1, m_left = -1, m_right = -1;
 };
 
@@ -344,12 +339,12 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
     result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
   };
   if (auto *trunk_task = dynamic_cast<TrunkTask *>(task.get())) {
-    TrunkJudge judge(scenario, *trunk_task, pipeline, robot.bMc());
+    TrunkJudge judge(scenario, *trunk_task, robot.bMc());
     fly(std::ref(judge));
     judgeTrunk(result, options, scenario, judge.trunk());
   }
   else if (const auto *gap_task = dynamic_cast<const GapTask *>(task.get())) {
-    GapJudge judge(scenario, *gap_task, pipeline);
+    GapJudge judge(scenario, *gap_task);
     fly(std::ref(judge));
     judgeGap(result, scenario, *gap_task, judge);
   }

@@ -5,6 +5,7 @@
 
 #include "lab/trials/closed_loop.h"
 #include "lab/trials/scenario.h"
+#include "pipeline/stage_options.h"
 
 namespace bole
 {

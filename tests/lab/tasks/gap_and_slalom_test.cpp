@@ -60,7 +60,7 @@ TEST(SeenSpace, IsWhatPointsWereSeenThroughAndNotWhatHidesThem)
     const double a = degrees * M_PI / 180;
     return Eigen::Vector3d(std::cos(a), std::sin(a), slope).normalized();
   };
-  std::vector<Pipeline::Sight> sights;
+  std::vector<TriangulatedRay> sights;
   for (double degrees = -30; degrees <= 30; degrees += 0.25)
     sights.push_back({ray(degrees, 0), std::abs(degrees) < 8 ? 1 / 1.5 : 1 / 9.0, 0.01}); // a wide thing 1.5 m ahead
   SeenSpace space;
@@ -80,7 +80,7 @@ TEST(SeenSpace, IsWhatPointsWereSeenThroughAndNotWhatHidesThem)
 
 TEST(SeenSpace, RaysToTheGroundTellOfTheHeightOfTheDroneOnly)
 {
-  std::vector<Pipeline::Sight> sights;
+  std::vector<TriangulatedRay> sights;
   for (int k = 0; k < 200; ++k)
     sights.push_back({Eigen::Vector3d(1, 0, -0.5).normalized(), 1 / 6.0, 0.01});
   SeenSpace space;
@@ -263,19 +263,18 @@ TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
   SlalomTaskOptions options;
   options.look = 4;
   SlalomTask task(options);
-  const Pipeline pipeline(PinholeCamera(), SmootherOptions::forwardCamera());
-  FrameResult result; // of a drone that obeys at once
+  FrameReport report; // of a drone that obeys at once
   double left = 0, right = 0;
   for (int k = 0; k < 60; ++k) {
     const double t = 0.1 * k;
-    result.stamp_ns = k * 100000000LL;
-    const TaskCommand command = task.step(result, pipeline);
+    report.stamp_ns = k * 100000000LL;
+    const TaskCommand command = task.step(report);
     ASSERT_FALSE(command.is_hovering);
     EXPECT_EQ(task.phase(), t < 4 ? TaskPhase::searching : TaskPhase::servoing) << t;
     EXPECT_EQ(command.velocity.x() > 0.3, t >= 4) << t;
-    result.wMb.t += 0.1 * command.velocity.head<3>();
-    left = std::max(left, t < 4 ? result.wMb.t.y() : 0);
-    right = std::min(right, t < 4 ? result.wMb.t.y() : 0);
+    report.wMb.t += 0.1 * command.velocity.head<3>();
+    left = std::max(left, t < 4 ? report.wMb.t.y() : 0);
+    right = std::min(right, t < 4 ? report.wMb.t.y() : 0);
   }
   EXPECT_GT(left, 0.4);
   EXPECT_LT(right, -0.4);

@@ -22,8 +22,8 @@ public:
 
 protected:
   void giveUpTarget() override { ++given_up; }
-  bool sees(const FrameResult &, const Pipeline &) const override { return is_in_view; }
-  TaskCommand act(const FrameResult &, const Pipeline &) override { return {false, {1, 0, 0, 0}, "ahead"}; }
+  bool sees(const FrameReport &) const override { return is_in_view; }
+  TaskCommand act(const FrameReport &) override { return {false, {1, 0, 0, 0}, "ahead"}; }
 };
 
 const PinholeCamera kCamera{200, 200, 160, 120, 320, 240};
@@ -33,11 +33,10 @@ class Safety : public testing::Test
 protected:
   bool hovers(Ahead &task, FrameStatus status = FrameStatus::ok)
   {
-    FrameResult result;
-    result.frame_status = status;
-    return task.step(result, m_pipeline).is_hovering;
+    FrameReport report;
+    report.frame_status = status;
+    return task.step(report).is_hovering;
   }
-  Pipeline m_pipeline{kCamera, forwardCamera()};
 };
 
 TEST_F(Safety, HoversAtOnceWhereAFrameIsNotOk)

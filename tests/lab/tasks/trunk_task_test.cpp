@@ -5,6 +5,7 @@
 #include "geometry/so3.h"
 #include "input/camera_file.h"
 #include "lab/tasks/trunk_task.h"
+#include <bole/pipeline.h>
 
 #include <Eigen/Geometry>
 
@@ -243,8 +244,7 @@ TEST(TrunkTask, GoesRoundTheOtherWayWhereATrunkStandsInItsWay)
     frame.stamp_ns = k * 100000000LL;
     frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0, 0.4 * std::sin(0.15 * k), 1.2});
     frame.image = test::drawTrunks(camera, (*frame.wMb_odometry * forwardCamera()).inverse(), wood, unsigned(k));
-    const FrameResult result = pipeline.process(frame);
-    const TaskCommand command = task.step(result, pipeline);
+    const TaskCommand command = task.step(pipeline.process(frame));
     waited += command.reason == "way blocked: waits";
     if (command.reason == "circles")
       ++(command.velocity.y() > 0 ? left : right);

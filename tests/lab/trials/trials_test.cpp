@@ -147,8 +147,8 @@ TEST(Scenario, TrunksStandOnTheSlalomsLineToo)
 class Leftward : public ServoTask
 {
 protected:
-  bool sees(const FrameResult &, const Pipeline &) const override { return true; }
-  TaskCommand act(const FrameResult &, const Pipeline &) override
+  bool sees(const FrameReport &) const override { return true; }
+  TaskCommand act(const FrameReport &) override
   {
     enter(TaskPhase::servoing);
     return {false, {0, 0.4, 0, 0}, "left"};

@@ -3,7 +3,7 @@
 #include "motion/rendered_walls.h"
 
 #include "geometry/so3.h"
-#include <bole/pipeline.h>
+#include "pipeline/engine.h"
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,6 @@ const Pose kMount = SmootherOptions::forwardCamera();
 Frame frameAt(int k, const Pose &wMc)
 {
   Frame frame;
-  frame.index = static_cast<std::size_t>(k);
   frame.stamp_ns = k * 100000000LL;
   frame.image = test::drawWalls(kCamera, wMc);
   return frame;
@@ -73,7 +72,7 @@ TEST(PlainVideo, NoStepStaysLooseOnceTheUnitIsKnown)
 TEST(PlainVideo, ACameraThatOnlyTurnsHasNoRangesAndSaysSo)
 {
   Pipeline pipeline(kCamera, kMount);
-  FrameResult last;
+  FrameReport last;
   for (int k = 0; k < 20; ++k)
     last = pipeline.process(frameAt(k, {expSo3({0, 0.01 * k, 0}), {0, 0, 0}}));
   const Pose turned = pipeline.smoothedTrajectory().front().wMb.inverse() * last.wMb;
@@ -109,14 +108,14 @@ TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
     frame.wMb_odometry = bodyAt(sideways(k));
     if (k >= 12)
       frame.image = vpImage<unsigned char>(240, 320, 250);
-    const FrameResult result = pipeline.process(frame);
+    const FrameReport report = pipeline.process(frame);
     if (k >= 12) {
       const auto path = pipeline.smoothedTrajectory(); // what was learnt of the frame before is no part of the step
       const Pose step = path[path.size() - 2].wMb.inverse() * path.back().wMb;
       const Pose filter = filter_before.inverse() * *frame.wMb_odometry;
       EXPECT_LT(step.minus(filter).head<3>().norm(), 2e-3) << k;
       EXPECT_LT(step.minus(filter).tail<3>().norm(), 2e-3) << k;
-      EXPECT_TRUE(result.step_from_odometry) << k;
+      EXPECT_TRUE(report.is_translation_seen) << k;
     }
     filter_before = *frame.wMb_odometry;
   }
@@ -124,13 +123,14 @@ TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
 TEST(ScenePoints, LieOnTheWallsAsFarAsAsked)
 {
   Pipeline pipeline(kCamera, kMount);
+  FrameReport report;
   for (int k = 0; k < 12; ++k) {
     Frame frame = frameAt(k, sideways(k));
     frame.wMb_odometry = bodyAt(sideways(k));
-    pipeline.process(frame);
-    EXPECT_TRUE(k > 1 || pipeline.scenePoints(20).empty()); // of no age, without parallax
+    report = pipeline.process(frame);
+    EXPECT_TRUE(k > 1 || placedPoints(report, 20).empty()); // of no age, without parallax
   }
-  const auto all = pipeline.scenePoints(10), near = pipeline.scenePoints(6);
+  const auto all = placedPoints(report, 10), near = placedPoints(report, 6);
   EXPECT_GT(all.size(), 20u);
   EXPECT_GT(near.size(), 5u);
   EXPECT_LT(near.size(), all.size());
@@ -160,7 +160,7 @@ vpImage<unsigned char> drawSlabs(const Pose &wMc)
 
 TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
 {
-  Pipeline pipeline(kCamera, kMount);
+  Engine pipeline(kCamera, kMount, StageOptions());
   for (int k = 0; k < 30; ++k) {
     const Pose wMc(Eigen::Matrix3d::Identity(), {0.08 * k - 1.2, 0, 0});
     Frame frame = frameAt(k, wMc);
@@ -169,7 +169,7 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
     pipeline.process(frame);
   }
   const auto standsAt = [&](double x) -> const MapTrunk * {
-    for (const MapTrunk &trunk : pipeline.mapTrunks())
+    for (const MapTrunk &trunk : pipeline.trunks().trunks())
       if (!trunk.removed && (trunk.trunk.xy - Eigen::Vector2d(4, -x)).norm() < 0.15)
         return &trunk;
     return nullptr;

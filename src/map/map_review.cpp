@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What becomes of a trunk: confirmed, lost, merged with another.
+#include "map/trunk_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
+{
+  if (trunk.observations < m_options.doubt_observations)
+    return false;
+  if (!has_ranges)
+    return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
+  if (trunk.status == TrunkStatus::confirmed)
+    return evidence(trunk) < m_options.doubt_confirmed;
+  return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
+}
+
+bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
+{
+  if (!has_ranges)
+    return trunk.observations >= m_options.confirm_observations && trunk.hits >= 3 * trunk.misses &&
+           trunk.evenness >= m_options.turning_evenness && trunk.contrast >= m_options.turning_contrast;
+  const double r = trunk.trunk.radius();
+  return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
+         trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
+         trunk.positionSigma() <= m_options.confirm_position_sigma && evidence(trunk) >= m_options.confirm_evidence;
+}
+
+namespace
+{
+double distanceBetween(const Trunk &a, const Trunk &b)
+{
+  return (a.axisAt(kBreastHeight) - b.axisAt(kBreastHeight)).head<2>().norm();
+}
+
+/// Two trunks of one place and one radius: the same hypothesis about the same lines.
+bool isSameHypothesis(const Trunk &a, const Trunk &b)
+{
+  return distanceBetween(a, b) < 0.15 && std::abs(a.log_radius - b.log_radius) < 0.25;
+}
+/// A narrower hypothesis within a wider one: if both are sound, the wider is the silhouette and the narrower the edge
+/// of a shadow on its bark.
+bool isInside(const Trunk &narrow, const Trunk &wide)
+{
+  return narrow.radius() < 0.8 * wide.radius() &&
+         distanceBetween(narrow, wide) + narrow.radius() < wide.radius() + 0.05;
+}
+
+/// The same trunk at two visits: alike in place and radius, and seen at different times. What is seen at the same time
+/// shares its views' image lines, which must not count twice.
+bool isAnotherVisit(const MapTrunk &a, const MapTrunk &b)
+{
+  constexpr double kPlace = 0.15, kLogRadius = 0.25; // by which one trunk differs from itself [m], [1]
+  const bool are_apart = a.first_seen_s > b.last_seen_s || b.first_seen_s > a.last_seen_s;
+  const double drift = 3 * std::hypot(a.positionSigma(), b.positionSigma());
+  return are_apart && distanceBetween(a.trunk, b.trunk) < kPlace + drift &&
+         std::abs(a.trunk.log_radius - b.trunk.log_radius) < kLogRadius;
+}
+
+/// What was seen of \p gone was seen of \p keep.
+void absorb(MapTrunk &keep, const MapTrunk &gone)
+{
+  const double apart = std::remainder(gone.bearing_first - keep.bearing_first, 2 * M_PI);
+  keep.bearing_low = std::min(keep.bearing_low, apart + gone.bearing_low);
+  keep.bearing_high = std::max(keep.bearing_high, apart + gone.bearing_high);
+  if (gone.last_seen_s > keep.last_seen_s) {
+    keep.misses_in_a_row = gone.misses_in_a_row;
+    keep.left_contrast = gone.left_contrast;
+    keep.right_contrast = gone.right_contrast;
+    keep.seen_from = gone.seen_from;
+  }
+  keep.first_seen_s = std::min(keep.first_seen_s, gone.first_seen_s);
+  keep.last_seen_s = std::max(keep.last_seen_s, gone.last_seen_s);
+  keep.observations += gone.observations;
+  keep.hits += gone.hits;
+  keep.misses += gone.misses;
+}
+} // namespace
+
+bool TrunkMap::recognise(const Trunk &found)
+{
+  bool is_known = false;
+  for (const std::size_t i : m_active) {
+    MapTrunk &known = m_trunks[i];
+    if (known.status == TrunkStatus::lost)
+      continue;
+    if (isSameHypothesis(known.trunk, found)) {
+      ++known.found_again;
+      is_known = true;
+    }
+    else if (known.status == TrunkStatus::confirmed && !isInside(known.trunk, found))
+      is_known = is_known || areTooNear(known.trunk, found);
+  }
+  return is_known;
+}
+
+/// Two trunks cannot stand in one place.
+bool TrunkMap::areTooNear(const Trunk &a, const Trunk &b) const
+{
+  return distanceBetween(a, b) < a.radius() + b.radius() + m_options.merge_distance;
+}
+
+/// By how much the log-odds speak for \p trunk against another hypothesis for the same place.
+double TrunkMap::advantage(const MapTrunk &trunk, const MapTrunk &rival) const
+{
+  constexpr double kSilhouette = 1; // log-odds that go to the wider of two sound hypotheses
+  double gain = evidence(trunk) - evidence(rival);
+  if (isInside(rival.trunk, trunk.trunk))
+    gain += kSilhouette;
+  else if (isInside(trunk.trunk, rival.trunk))
+    gain -= kSilhouette;
+  return gain;
+}
+
+/// Another candidate for the same place has log-odds better by more than \p margin.
+bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
+{
+  return std::any_of(m_active.begin(), m_active.end(), [&](std::size_t i) {
+    const MapTrunk &rival = m_trunks[i];
+    return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
+           rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
+           (margin > 0 || evidence(rival) >= m_options.confirm_evidence) && advantage(rival, trunk) > margin;
+  });
+}
+
+/// Which of two trunks in one place is to go; nullptr while hypotheses compete.
+MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
+{
+  if (!areTooNear(a.trunk, b.trunk))
+    return nullptr;
+  const bool is_a_candidate = a.status == TrunkStatus::candidate, is_b_candidate = b.status == TrunkStatus::candidate;
+  if (is_a_candidate != is_b_candidate) {
+    MapTrunk &candidate = is_a_candidate ? a : b, &known = is_a_candidate ? b : a;
+    return isInside(known.trunk, candidate.trunk) ? nullptr : &candidate; // what holds it may still turn out to be it
+  }
+  if (!is_a_candidate || isSameHypothesis(a.trunk, b.trunk))
+    return advantage(a, b) >= 0 ? &b : &a;
+  return nullptr;
+}
+
+namespace
+{
+void change(MapUpdate &update, MapTrunk &trunk, TrunkStatus to, TrunkFate fate, int into = -1)
+{
+  update.changes.push_back({trunk.id, into, trunk.status, to});
+  trunk.status = to;
+  trunk.fate = fate;
+}
+
+/// Out of the map and of the smoother.
+void remove(MapUpdate &update, MapTrunk &trunk, TrunkFate fate)
+{
+  trunk.removed = true;
+  update.removed.push_back(trunk.smoother_id);
+  change(update, trunk, TrunkStatus::lost, fate);
+}
+
+/// Log-odds that fell, or a rival: which of the two \p evidence below \p least tells.
+TrunkFate fateOfDisproved(double evidence, double least)
+{
+  return evidence < least ? TrunkFate::doubted : TrunkFate::outdone;
+}
+} // namespace
+
+void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
+{
+  for (const std::size_t i : m_active) {
+    MapTrunk &trunk = m_trunks[i];
+    const bool is_candidate = trunk.status == TrunkStatus::candidate;
+    const double least = is_candidate ? m_options.doubt_candidate : m_options.doubt_confirmed;
+    if (is_candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
+      change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
+    else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0)
+      change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
+    else if (trunk.status == TrunkStatus::lost)
+      continue;
+    else if (isDisproved(trunk, has_ranges))
+      remove(update, trunk, has_ranges ? fateOfDisproved(evidence(trunk), least) : TrunkFate::doubted);
+    else if (trunk.misses_in_a_row >= m_options.lost_misses && is_candidate)
+      remove(update, trunk, TrunkFate::missed);
+    else if (trunk.misses_in_a_row >= m_options.lost_misses) // out of sight, and still a trunk of the map
+      change(update, trunk, TrunkStatus::lost, TrunkFate::none);
+  }
+}
+
+void TrunkMap::reviewPairs(MapUpdate &update)
+{
+  for (const std::size_t i : m_active)
+    for (const std::size_t j : m_active) {
+      MapTrunk &a = m_trunks[i], &b = m_trunks[j];
+      if (a.id >= b.id || a.removed || b.removed)
+        continue;
+      MapTrunk *gone = chooseRedundant(a, b);
+      if (!gone)
+        continue;
+      MapTrunk &keep = gone == &a ? b : a;
+      const bool is_duplicate = isAnotherVisit(a, b);
+      gone->removed = true;
+      change(update, *gone, TrunkStatus::merged, is_duplicate ? TrunkFate::duplicate : TrunkFate::outdone, keep.id);
+      if (is_duplicate) {
+        absorb(keep, *gone);
+        update.merged.push_back({keep.smoother_id, gone->smoother_id});
+      }
+      else
+        update.removed.push_back(gone->smoother_id);
+    }
+}
+
+/// Candidates that were not seen for long are not looked for any more.
+void TrunkMap::deactivate(MapUpdate &update, double now_s)
+{
+  for (const std::size_t i : m_active) {
+    MapTrunk &trunk = m_trunks[i];
+    if (trunk.removed || trunk.status != TrunkStatus::candidate ||
+        now_s - trunk.last_seen_s <= m_options.candidate_memory_s)
+      continue;
+    trunk.inactive = true;
+    if (trunk.observations == 0)
+      remove(update, trunk, TrunkFate::unseen);
+  }
+}
+
+void TrunkMap::keepActive()
+{
+  m_active.clear();
+  for (std::size_t i = 0; i < m_trunks.size(); ++i)
+    if (!m_trunks[i].removed && !m_trunks[i].inactive)
+      m_active.push_back(i);
+}
+
+MapUpdate TrunkMap::review(double now_s, bool has_ranges)
+{
+  MapUpdate update;
+  reviewEach(update, has_ranges);
+  reviewPairs(update);
+  deactivate(update, now_s);
+  m_active.erase(std::remove_if(m_active.begin(), m_active.end(),
+                                [this](std::size_t i) { return m_trunks[i].removed || m_trunks[i].inactive; }),
+                 m_active.end());
+  return update;
+}
+
+MapUpdate TrunkMap::reviewAll(bool has_ranges)
+{
+  for (MapTrunk &trunk : m_trunks)
+    trunk.inactive = false;
+  keepActive();
+  MapUpdate update;
+  reviewEach(update, has_ranges);
+  reviewPairs(update);
+  keepActive();
+  return update;
+}
+
+MapUpdate TrunkMap::forgetUnranged()
+{
+  MapUpdate update;
+  for (const std::size_t i : m_active)
+    remove(update, m_trunks[i], TrunkFate::unranged);
+  m_active.clear();
+  return update;
+}
+} // namespace bole

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/adoption.h"
+
+#include "smoothing/factors.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include <cmath>
+
+namespace bole
+{
+void DetectionWindow::push(Gradient gradient, std::size_t pose, const Viewpoint &at, const Smoother &smoother,
+                           const StageOptions &options)
+{
+  WindowView view;
+  view.profile = computeLevelProfile(gradient.signed_x, at.camera, at.wMc.R, options.detection.profile);
+  view.gradient = std::move(gradient);
+  view.pose = pose;
+  view.time_s = at.time_s;
+  const Pose &bMc = smoother.options().bMc;
+  const auto cameraAt = [&](const WindowView &frame) { return (smoother.pose(frame.pose) * bMc).t; };
+  if (m_views.size() >= 2) { // the newest stays when the camera has moved on from the one before it
+    const double moved = (cameraAt(m_views.back()) - cameraAt(m_views[m_views.size() - 2])).norm();
+    if (moved < options.flow.view_spacing)
+      m_views.pop_back();
+  }
+  m_views.push_back(std::move(view));
+  const auto lag = static_cast<std::size_t>(options.smoothing.fixed_lag);
+  const auto isMarginalised = [&] { return lag > 0 && m_views.front().pose + lag <= pose + 1; };
+  while (static_cast<int>(m_views.size()) > options.detection.window || isMarginalised())
+    m_views.pop_front();
+}
+
+std::vector<Detection> detectInWindow(const DetectionWindow &window, const Smoother &smoother, const TrunkMap &map,
+                                      const Viewpoint &view, const vpImage<float> *p_background,
+                                      const StageOptions &options)
+{
+  std::vector<DetectorView> views;
+  for (const WindowView &frame : window.views())
+    views.push_back({&frame.profile, smoother.pose(frame.pose) * options.smoothing.bMc});
+  return detectTrunks(views, view.camera, inhibitedRanges(map, view, false), p_background, options.detection);
+}
+
+std::vector<LineDetection> detectInFrame(const WindowView &frame, const TrunkMap &map, const Viewpoint &view,
+                                         const vpImage<float> *p_background, const StageOptions &options)
+{
+  ProfileOptions profile = options.detection.profile;
+  LineDetectorOptions lines = options.lines;
+  if (!view.has_ranges) { // without parallax, what stands upright and stays where it is must do
+    p_background = nullptr;
+    profile.range = kUnrangedPart;
+    lines.threshold = lines.turning_threshold;
+    lines.either_polarity = false; // a bright gap between trunks looks like one
+  }
+  return detectLines(frame.gradient, p_background, view.camera, view.wMc.R, inhibitedRanges(map, view, true), profile,
+                     lines);
+}
+
+TrunkPrior priorOf(const Trunk &guess, const SmootherOptions &options)
+{
+  TrunkPrior prior;
+  prior.mean.xy = guess.xy;
+  prior.mean.log_radius = std::log(options.prior_radius);
+  prior.sigma << options.prior_position_sigma, options.prior_position_sigma, options.prior_log_radius_sigma,
+      options.prior_lean_sigma, options.prior_lean_sigma;
+  return prior;
+}
+
+Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const SmootherOptions &options,
+               Matrix5d *information)
+{
+  constexpr int kIterations = 4; // from a detection's guess it has settled after two or three
+  const TrunkPrior prior = priorOf(guess, options);
+  const double robust = options.summary_loss.width;
+  Trunk trunk = guess;
+  for (int i = 0; i < kIterations; ++i) {
+    Matrix5d H = prior.sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+    Vector5d g = H * trunk.minus(prior.mean);
+    for (const AdoptedView &view : views) {
+      SquareRootSummary root;
+      if (squareRoot(view.summary, root) == SummaryStatus::indefinite)
+        continue;
+      Matrix45d J;
+      const Vector4d r = residual(root, options.bMc, view.wMb, trunk, nullptr, &J);
+      const double weight = r.norm() > robust ? robust / r.norm() : 1;
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * r;
+    }
+    trunk = trunk.plus(-H.ldlt().solve(g));
+    if (information)
+      *information = H;
+  }
+  return trunk;
+}
+
+namespace
+{
+/// Fits the trunk to its views, and takes down how well they fit.
+void fit(Adoption &adoption, const std::vector<TrackingResult> &results, const Viewpoint &view,
+         const StageOptions &options)
+{
+  constexpr double kUnseen = 9; // [px^2]: nothing was seen of it
+  const SmootherOptions &smoothing = options.smoothing;
+  adoption.trunk.found_s = view.time_s;
+  adoption.trunk.innovation2 = kUnseen;
+  if (adoption.views.empty())
+    return;
+  Matrix5d information;
+  adoption.trunk.trunk = fitTrunk(adoption.trunk.trunk, adoption.views, smoothing, &information);
+  adoption.trunk.covariance = information.inverse();
+  double sum = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const RelativeTrunk expected = relativeTrunk(adoption.views[i].wMb, smoothing.bMc, adoption.trunk.trunk);
+    sum += misfit(results[i], expected, view.camera.fx, options.flow);
+  }
+  adoption.trunk.innovation2 = sum / static_cast<double>(results.size());
+}
+} // namespace
+
+Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
+                             const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
+{
+  constexpr double kTilt = 0.01;   // standard deviation of the two angles that one view hardly knows [rad]
+  constexpr double kBorder_px = 1; // and of bearing and half width
+  Adoption adoption;
+  adoption.trunk.trunk = detection.trunk;
+  adoption.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
+  std::vector<TrackingResult> results;
+  std::optional<Eigen::Vector3d> before;
+  std::optional<double> left_contrast, right_contrast;
+  Viewpoint at = view;
+  for (const WindowView &frame : window.views()) {
+    const Pose wMb = smoother.pose(frame.pose);
+    at.wMc = wMb * options.smoothing.bMc;
+    at.time_s = frame.time_s;
+    const RelativeTrunk relative = relativeTrunk(at.wMc, Pose(), detection.trunk);
+    if (!relative.isFinite() || relative.cRt(2, 0) <= 0)
+      continue;
+    TrackingPrediction prediction;
+    prediction.relative = relative;
+    const double sigma = kBorder_px / view.camera.fx;
+    prediction.covariance =
+        Vector4d(kTilt, kTilt, sigma, sigma / relative.ratio()).cwiseAbs2().asDiagonal().toDenseMatrix();
+    prediction.range = elevationOf(relative, detection.trunk, at, options);
+    const HiddenBorders hidden = hiddenBorders(detection.trunk, -1, map, at);
+    prediction.left_hidden = hidden.left;
+    prediction.right_hidden = hidden.right;
+    prediction.left_contrast = left_contrast;
+    prediction.right_contrast = right_contrast;
+    const TrackingResult result = trackTrunk(frame.gradient, view.camera, prediction, options.tracking);
+    if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used ||
+        !isInsideGate(prediction, result, view.camera.fx, options.flow))
+      continue;
+    const SummaryFactor summary = summaryOf(result, weightOfView(before, at.wMc.t, options.flow));
+    before = at.wMc.t;
+    blendContrast(left_contrast, result.left_contrast);
+    blendContrast(right_contrast, result.right_contrast);
+    adoption.views.push_back({frame.pose, wMb, summary});
+    adoption.trunk.views.push_back(viewOf(result, relative, detection.trunk, at, options.flow));
+    results.push_back(result);
+  }
+  fit(adoption, results, view, options);
+  return adoption;
+}
+
+std::optional<Adoption> followInFrame(const LineDetection &detection, const WindowView &frame, const Smoother &smoother,
+                                      const Viewpoint &view, const StageOptions &options)
+{
+  const double radius = options.smoothing.prior_radius;
+  TrackingPrediction prediction;
+  prediction.relative = detection.relative;
+  prediction.range =
+      elevationOf(detection.relative, trunkFromRelative(view.wMc, detection.relative, radius), view, options);
+  const TrackingResult result = trackTrunk(frame.gradient, view.camera, prediction, options.tracking);
+  if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used)
+    return std::nullopt;
+  Adoption adoption;
+  adoption.trunk.trunk = trunkFromRelative(view.wMc, result.optimum, radius);
+  adoption.trunk.found_s = view.time_s;
+  adoption.views.push_back({frame.pose, smoother.pose(frame.pose), summaryOf(result, 1)});
+  adoption.trunk.views.push_back(viewOf(result, prediction.relative, adoption.trunk.trunk, view, options.flow));
+  return adoption;
+}
+} // namespace bole

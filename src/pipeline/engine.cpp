@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/engine.h"
+
+#include "geometry/horizontal_view.h"
+#include "pipeline/scene_points.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace bole
+{
+namespace
+{
+/// Times the stages of a frame one after the other.
+class Laps
+{
+public:
+  void operator()(const char *stage)
+  {
+    const auto now = std::chrono::steady_clock::now();
+    times_ms.emplace_back(stage, std::chrono::duration<double, std::milli>(now - m_last).count());
+    m_last = now;
+  }
+
+  std::vector<std::pair<const char *, double>> times_ms;
+
+private:
+  std::chrono::steady_clock::time_point m_last = std::chrono::steady_clock::now();
+};
+
+StageOptions withCamera(StageOptions options, const Pose &bMc)
+{
+  options.validate();
+  options.smoothing.bMc = bMc;
+  return options;
+}
+
+const vpImage<float> *background(const std::optional<Saliency> &saliency)
+{
+  return saliency ? &saliency->p_background : nullptr;
+}
+
+double seconds(std::int64_t stamp_ns) { return 1e-9 * static_cast<double>(stamp_ns); }
+
+std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
+{
+  if (!saliency)
+    return std::nullopt;
+  return SaliencyField{std::move(saliency->p_background), std::move(saliency->confidence), saliency->unknown_below};
+}
+
+bool isDropped(SummaryStatus status)
+{
+  return status == SummaryStatus::indefinite || status == SummaryStatus::not_finite;
+}
+
+std::vector<TrunkInView> inView(const std::vector<TrackedTrunk> &tracked, const TrunkMap &map, bool has_ranges)
+{
+  std::vector<TrunkInView> trunks;
+  for (const TrackedTrunk &trunk : tracked) {
+    const TrackingStatus status = trunk.result.status;
+    if (status == TrackingStatus::not_visible)
+      continue;
+    const PredictedTrunk &predicted = trunk.predicted;
+    const bool is_tracked = status == TrackingStatus::tracked;
+    trunks.push_back({predicted.id, map.trunk(predicted.id).status, is_tracked, toString(status),
+                      is_tracked ? trunk.result.optimum : predicted.tracking.relative, predicted.tracking.range.low,
+                      predicted.tracking.range.high, has_ranges ? predicted.range : 0});
+  }
+  return trunks;
+}
+} // namespace
+
+Engine::Engine(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options)
+    : m_camera(camera),
+      m_bMc(bMc),
+      m_options(withCamera(options, bMc)),
+      m_units(m_options),
+      m_saliency(camera, options.saliency),
+      m_smoother(m_options.smoothing),
+      m_map(options.map)
+{
+}
+
+FrameReport Engine::process(const Frame &frame)
+{
+  Laps lap;
+  FrameReport report;
+  const Motion motion = move(frame); // by gyro, pose filter and points, or by the images alone
+  lap("motion");
+  const Viewpoint view = extend(frame, motion); // Eq. 2: the next pose, and all that was seen before it
+  lap("smoothing");
+  if (frame.status == FrameStatus::ok) {
+    Gradient gradient = computeGradient(frame.image, m_units.gradient); // Eq. 3
+    lap("gradient");
+    std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
+    lap("saliency");
+    const std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
+    const std::vector<TrackedTrunk> tracked =
+        trackTrunks(gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
+    add(tracked, view);                                                               // Eq. 9
+    lap("tracking");
+    m_window.push(std::move(gradient), newest(), view, m_smoother, m_units);
+    adoptNew(view, background(saliency)); // Eq. 18-21
+    lap("detection");
+    report.trunks = inView(tracked, m_map, view.has_ranges);
+    report.points = points();
+    reviewMap(report.points, view); // Sec. 7
+    lap("map");
+    report.map = known(predicted, view);
+    report.saliency = fieldOf(std::move(saliency));
+  }
+  report.timing_ms = std::move(lap.times_ms);
+  return complete(std::move(report), frame, motion);
+}
+
+Motion Engine::move(const Frame &frame)
+{
+  if (m_motion)
+    return m_motion->step(frame, m_smoother.pose(newest()), m_velocity);
+  m_motion = makeMotionSource(frame, m_camera, m_bMc, m_options);
+  SmootherOptions options = m_options.smoothing;
+  options.max_iterations = m_motion->iterations(options.max_iterations);
+  m_smoother = Smoother(options);
+  Motion motion;
+  motion.start = m_motion->first(frame);
+  return motion;
+}
+
+/// The smoother takes in the motion to this frame together with what the frames before showed of trunks, in the one
+/// update of a frame: whatever follows looks from a pose that is as good as the next one will be.
+Viewpoint Engine::extend(const Frame &frame, const Motion &motion)
+{
+  constexpr double kLately_s = 1; // the covariance of what was not seen for longer hardly changes
+  if (motion.has_new_unit)
+    apply(m_map.forgetUnranged());
+  if (motion.start)
+    m_smoother.addFirstPose(motion.start->mean, motion.start->covariance);
+  else {
+    const std::size_t pose = m_smoother.addPose(motion.step.aMb, motion.step.covariance);
+    if (motion.step.absolute)
+      m_smoother.addPosePrior(pose, *motion.step.absolute);
+  }
+  for (const OdometryBetween &between : motion.odometry)
+    m_smoother.addOdometry(between.a, between.b, between.odometry);
+  for (const DirectionBetween &between : motion.directions)
+    m_smoother.addRelativePose(between.a, between.b, between.measurement);
+  m_smoother.update();
+  refreshMap(seconds(frame.stamp_ns) - kLately_s);
+  return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), seconds(frame.stamp_ns)};
+}
+
+std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motion &motion)
+{
+  constexpr double kRotation = 1e-3, kTranslation = 1e-2; // standard deviations between two smoothed poses [rad], [m]
+  if (!m_units.flow.use_saliency)
+    return std::nullopt;
+  std::optional<RotationPrior> rotation;
+  std::optional<TranslationPrior> translation;
+  if (newest() > 0) {
+    const Pose pMc = cameraAt(newest() - 1).inverse() * cameraAt(newest());
+    if (motion.is_rotation_seen)
+      rotation = RotationPrior{pMc.R, kRotation * kRotation * Eigen::Matrix3d::Identity()};
+    if (motion.step.step_from_odometry)
+      translation = TranslationPrior{pMc.t, kTranslation * kTranslation * Eigen::Matrix3d::Identity()};
+  }
+  return m_saliency.update(frame.image, rotation, translation);
+}
+
+/// Replaces the image of each trunk tracked by a summary factor.
+void Engine::add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)
+{
+  for (const TrackedTrunk &trunk : tracked) {
+    if (trunk.result.status == TrackingStatus::tracked) {
+      const double weight = weightOfView(m_map.trunk(trunk.predicted.id).seen_from, view.wMc.t, m_units.flow);
+      if (isDropped(m_smoother.addObservation(newest(), trunk.predicted.smoother_id, summaryOf(trunk.result, weight))))
+        continue;
+    }
+    m_map.record(sightingOf(trunk, m_map, view, m_units.flow));
+  }
+}
+
+/// Looks for trunks that the map does not know and takes them into it.
+void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
+{
+  const FlowOptions &flow = m_units.flow;
+  if (newest() % static_cast<std::size_t>(flow.detect_every) != 0)
+    return;
+  const bool has_ranges = m_motion->isTranslationMeasured();
+  if (p_background && (flow.detect_lines || !has_ranges))
+    for (const LineDetection &line : detectInFrame(m_window.newest(), m_map, view, p_background, m_units))
+      if (const auto adoption = followInFrame(line, m_window.newest(), m_smoother, view, m_units))
+        adopt(*adoption);
+  if (!flow.detect_window || !has_ranges)
+    return;
+  int adopted = 0;
+  for (const Detection &detection : detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units))
+    if (!m_map.recognise(detection.trunk) && adopted < flow.adopt_most) { // the best come first
+      adopt(followThroughWindow(detection, m_window, m_smoother, m_map, view, m_units));
+      ++adopted;
+    }
+}
+
+void Engine::adopt(Adoption adoption)
+{
+  const Trunk &trunk = adoption.trunk.trunk;
+  adoption.trunk.smoother_id = m_smoother.addTrunk(trunk, priorOf(trunk, m_units.smoothing));
+  for (const AdoptedView &view : adoption.views)
+    m_smoother.addObservation(view.pose, adoption.trunk.smoother_id, view.summary);
+  m_map.add(adoption.trunk);
+}
+
+std::vector<TriangulatedRay> Engine::points() const
+{
+  constexpr int kBack = 15; // frames between the two views of a point, at most
+  const PointMotion &points = m_motion->points();
+  if (points.framesBack() < 2 || !m_motion->hasRanges())
+    return {};
+  std::vector<Pose> wMc; // by good frames back
+  for (int back = 0; back <= std::min(kBack, points.framesBack()); ++back)
+    wMc.push_back(cameraAt(points.frameIndex(back)));
+  return triangulate(points.tracker(), wMc, m_camera);
+}
+
+void Engine::reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view)
+{
+  constexpr double kLeastCorrection = 0.1; // of the log of the scale: less changes no decision
+  for (const PointCount &count : countPoints(points, m_map, view, m_units))
+    m_map.record(count);
+  apply(m_map.review(view.time_s, view.has_ranges));
+  reviewScale(kLeastCorrection, false);
+}
+
+/// Covariances are asked for where something was seen lately: that of a trunk farther back costs a walk to where it
+/// stood.
+void Engine::refreshMap(double seen_since_s)
+{
+  for (const std::size_t i : m_map.active()) {
+    const MapTrunk &trunk = m_map.trunks()[i];
+    TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
+    if (trunk.last_seen_s >= seen_since_s)
+      estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+    m_map.refresh(estimate);
+  }
+}
+
+/// Inactive candidates too; covariances where enough was seen for a decision.
+void Engine::refreshWholeMap()
+{
+  for (const MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.removed)
+      continue;
+    TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
+    if (!trunk.inactive || trunk.observations >= m_units.map.confirm_observations)
+      estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+    m_map.refresh(estimate);
+  }
+}
+
+void Engine::apply(const MapUpdate &update)
+{
+  for (const MapUpdate::Merge &merge : update.merged)
+    m_smoother.mergeTrunks(merge.keep, merge.gone);
+  for (const std::size_t trunk : update.removed)
+    m_smoother.removeTrunk(trunk);
+}
+
+/// What stands about the camera. The covariance of a bearing is known where the trunk was looked for; elsewhere it is
+/// asked for, and of what was found just now it is that of the fit.
+std::vector<KnownTrunk> Engine::known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const
+{
+  constexpr double kFar = 20; // [m]: beyond it nothing reckons with a trunk
+  std::vector<KnownTrunk> trunks;
+  for (const std::size_t i : m_map.active()) {
+    const MapTrunk &trunk = m_map.trunks()[i];
+    Matrix45d J;
+    const RelativeTrunk relative = relativeTrunk(view.wMc, Pose(), trunk.trunk, nullptr, &J);
+    if (horizontalView(view.wMc, trunk.trunk).range * m_metres > kFar || !relative.isFinite()) // the camera is in it
+      continue;
+    const auto looked_for =
+        std::find_if(predicted.begin(), predicted.end(), [&](const PredictedTrunk &one) { return one.id == trunk.id; });
+    const bool is_new = trunk.hits + trunk.misses == 0;
+    const double variance = looked_for != predicted.end()
+                                ? looked_for->tracking.covariance(2, 2) - looked_for->missed_variance
+                            : is_new ? (J * trunk.covariance * J.transpose())(2, 2)
+                                     : m_smoother.relativeCovariance(trunk.smoother_id)(2, 2);
+    trunks.push_back({trunk.id, trunk.status, trunk.trunk, trunk.observations, m_map.evidence(trunk),
+                      trunk.lookedThrough(), trunk.covariance(2, 2), variance});
+  }
+  return trunks;
+}
+
+FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motion &motion)
+{
+  const Pose wMb = m_smoother.pose(newest());
+  if (newest() > 0) {
+    const double dt = seconds(frame.stamp_ns - m_online.back().stamp_ns);
+    m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / std::max(dt, 1e-3);
+  }
+  m_online.push_back({frame.stamp_ns, wMb});
+  report.index = newest();
+  report.stamp_ns = frame.stamp_ns;
+  report.frame_status = frame.status;
+  report.reason = frame.message;
+  report.wMb = wMb;
+  report.wMc = wMb * m_bMc;
+  report.pose_covariance = m_smoother.currentPoseCovariance();
+  report.is_translation_seen = motion.step.step_from_odometry;
+  report.has_ranges = m_motion->hasRanges();
+  toMetres(report, m_bMc, m_metres);
+  return report;
+}
+
+void Engine::finish()
+{
+  constexpr double kSettled = 1e-6; // of the cost: no view notices
+  if (m_smoother.poseCount() == 0)
+    return;
+  m_smoother.optimize(kSettled);
+  refreshWholeMap();
+  const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
+  apply(update);
+  if (!update.merged.empty() || !update.removed.empty()) {
+    m_smoother.optimize(kSettled);
+    refreshWholeMap();
+  }
+  reviewScale(0, true);
+}
+
+} // namespace bole

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The pipeline itself: from each frame to what is known after it (paper, Sections 3 to 7). Pipeline is its public
+/// face.
+///
+/// The stages are functions of plain values in this folder. The engine holds what lives from frame to frame (motion
+/// source, saliency, smoother, window, map) and hands the result of one stage to the next.
+
+#include "pipeline/adoption.h"
+#include "pipeline/motion_source.h"
+#include "pipeline/units.h"
+#include "saliency/saliency.h"
+#include <bole/pipeline.h>
+
+namespace bole
+{
+class Engine
+{
+public:
+  Engine(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options);
+
+  FrameReport process(const Frame &frame);
+  void finish();
+
+  std::vector<TrunkRecord> map() const;
+  WorldReference reference() const;
+  Trajectory smoothedTrajectory() const;
+  Trajectory onlineTrajectory() const;
+  Graph graph() const;
+
+  const TrunkMap &trunks() const { return m_map; } ///< in units of the motion
+
+private:
+  Motion move(const Frame &frame);
+  Viewpoint extend(const Frame &frame, const Motion &motion);
+  std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
+  void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
+  void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
+  void adopt(Adoption adoption);
+  std::vector<TriangulatedRay> points() const;
+  void reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
+  void refreshMap(double seen_since_s);
+  void refreshWholeMap();
+  void apply(const MapUpdate &update);
+  ScaleEstimate estimateScale(bool with_radii) const;
+  void reviewScale(double least_correction, bool with_radii);
+  std::vector<KnownTrunk> known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
+  FrameReport complete(FrameReport report, const Frame &frame, const Motion &motion);
+  std::size_t newest() const { return m_smoother.poseCount() - 1; }
+  Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }
+
+  PinholeCamera m_camera;
+  Pose m_bMc;
+  StageOptions m_options; ///< in metres
+  StageOptions m_units;   ///< the same in units of the motion
+  double m_metres = 1;    ///< in one unit of the motion
+  std::unique_ptr<MotionSource> m_motion;
+  SaliencyEstimator m_saliency;
+  Smoother m_smoother;
+  DetectionWindow m_window;
+  TrunkMap m_map;
+  Trajectory m_online;                    ///< in units of the motion
+  Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion
+};
+} // namespace bole

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The scale of the map, and what is read in it.
+#include "pipeline/engine.h"
+
+#include <cmath>
+
+namespace bole
+{
+/// The scale by the height over the ground and, with \p with_radii, by the radii of the trunks against their prior.
+ScaleEstimate Engine::estimateScale(bool with_radii) const
+{
+  ScaleEstimate scale = m_motion->scale();
+  if (!with_radii || scale.source != ScaleSource::prior)
+    return scale;
+  double information = 1 / (scale.sigma * scale.sigma), sum = information * scale.log_scale;
+  for (const MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.removed || trunk.status != TrunkStatus::confirmed)
+      continue;
+    const double variance = std::pow(m_options.smoothing.prior_log_radius_sigma, 2) + trunk.covariance(2, 2);
+    sum += (std::log(m_options.smoothing.prior_radius) - trunk.trunk.log_radius) / variance;
+    information += 1 / variance;
+  }
+  return {sum / information, 1 / std::sqrt(information), scale.source};
+}
+
+/// Takes over the scale when it is off by more than \p least_correction (of its log). The radii count only at the end:
+/// the detector looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows
+/// them runs away.
+void Engine::reviewScale(double least_correction, bool with_radii)
+{
+  if (!m_motion->hasRanges())
+    return;
+  const double log_scale = estimateScale(with_radii).log_scale;
+  if (std::abs(log_scale - std::log(m_metres)) <= least_correction)
+    return;
+  m_metres = std::exp(log_scale);
+  m_units = inUnits(m_options, m_metres);
+  m_map.setOptions(m_units.map);
+  m_saliency = SaliencyEstimator(m_camera, m_units.saliency);
+}
+
+std::vector<TrunkRecord> Engine::map() const
+{
+  std::vector<TrunkRecord> records;
+  if (!m_motion)
+    return records;
+  const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>() * m_metres;
+  const double sigma = m_motion->hasRanges() ? estimateScale(true).sigma : 0;
+  for (const TrunkRecord &in_units : m_map.records(m_motion->groundZ().value_or(0) + kBreastHeight / m_metres)) {
+    TrunkRecord record = inMetres(in_units, m_metres);
+    const Eigen::Vector2d by_log_scale = record.xy - origin;
+    record.covariance_xy += sigma * sigma * by_log_scale * by_log_scale.transpose();
+    record.variance_radius += sigma * sigma * record.radius * record.radius;
+    records.push_back(record);
+  }
+  return records;
+}
+
+WorldReference Engine::reference() const
+{
+  if (!m_motion)
+    return {};
+  WorldReference reference = m_motion->reference();
+  const ScaleEstimate scale = estimateScale(true);
+  if (scale.source != ScaleSource::odometry) {
+    reference.scale = scale.source;
+    reference.scale_sigma = scale.sigma;
+  }
+  return reference;
+}
+
+Trajectory Engine::smoothedTrajectory() const
+{
+  Trajectory trajectory;
+  for (std::size_t i = 0; i < m_online.size(); ++i)
+    trajectory.push_back({m_online[i].stamp_ns, inMetres(m_smoother.pose(i), m_bMc, m_metres)});
+  return trajectory;
+}
+
+Trajectory Engine::onlineTrajectory() const
+{
+  Trajectory trajectory = m_online;
+  for (StampedPose &pose : trajectory)
+    pose.wMb = inMetres(pose.wMb, m_bMc, m_metres);
+  return trajectory;
+}
+
+Graph Engine::graph() const { return m_metres == 1 ? m_smoother.graph() : scaled(m_smoother.graph(), m_metres); }
+} // namespace bole

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/monocular_motion.h"
+
+#include "geometry/median.h"
+#include "geometry/require_range.h"
+#include "geometry/so3.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+void VisualOdometryOptions::validate() const
+{
+  requireRange("visual.camera_height", camera_height, 0, 100);
+  requireRange("visual.camera_height_sigma", camera_height_sigma, 1e-3, 1);
+  requireRange("visual.start_height", start_height, 0.1, 100);
+  requireRange("visual.start_depth", start_depth, 0.5, 1000);
+  requireRange("visual.start_sigma", start_sigma, 0.05, 5);
+  requireRange("visual.step_sigma", step_sigma, 1e-5, 1);
+  requireRange("visual.step_scale_sigma", step_scale_sigma, 0, 1);
+  requireRange("visual.turn_sigma", turn_sigma, 1e-6, 1);
+  requireRange("visual.still_sigma", still_sigma, 1e-4, 10);
+  requireRange("visual.max_iterations", max_iterations, 1, 100);
+}
+
+namespace
+{
+PointOdometryOptions withFocal(bool is_known)
+{
+  PointOdometryOptions options;
+  options.focal_known = is_known;
+  return options;
+}
+
+/// \p wRb turned, as little as needed, to have \p bup pointing up.
+Matrix3d levelled(const Matrix3d &wRb, const Vector3d &bup)
+{
+  return Eigen::Quaterniond::FromTwoVectors(wRb * bup, Vector3d::UnitZ()).toRotationMatrix() * wRb;
+}
+
+/// Roll and pitch alone, at the body \p wMb with up in the direction \p bup.
+PosePrior tiltPrior(const Pose &wMb, const Vector3d &bup, double sigma)
+{
+  PosePrior prior;
+  prior.mean = Pose(levelled(wMb.R, bup), wMb.t);
+  const Matrix3d bRw = prior.mean.R.transpose();
+  prior.covariance.setZero();
+  prior.covariance.topLeftCorner<3, 3>() = 1e4 * Matrix3d::Identity();
+  prior.covariance.bottomRightCorner<3, 3>() =
+      bRw * Vector3d(sigma * sigma, sigma * sigma, 10).asDiagonal() * bRw.transpose();
+  return prior;
+}
+} // namespace
+
+MonocularMotion::MonocularMotion(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options)
+    : MotionSource(camera, bMc, options.points),
+      m_camera(camera),
+      m_bMc(bMc),
+      m_options(options.visual),
+      m_model(options.motion, options.points.gyro),
+      m_odometry(camera, withFocal(options.visual.focal_known))
+{
+  m_options.validate();
+}
+
+int MonocularMotion::iterations(int asked) const { return std::min(asked, m_options.max_iterations); }
+
+PosePrior MonocularMotion::first(const Frame &frame)
+{
+  PosePrior prior;
+  constexpr double kGuessed = 0.15; // of an image taken to be upright [rad]
+  constexpr double kSeen = 0.06;    // of one whose trunks were seen [rad]
+  double tilt = kGuessed;
+  m_points.track(frame);
+  if (frame.status == FrameStatus::ok) {
+    place(frame, std::nullopt);
+    if (m_first_up) {
+      prior.mean.R = levelled(Matrix3d::Identity(), m_bMc.R * *m_first_up);
+      tilt = kSeen;
+    }
+  }
+  m_model.advance(frame);
+  prior.covariance.setZero();
+  prior.covariance.diagonal() << 1e-6, 1e-6, 1e-6, tilt * tilt, tilt * tilt, 1e-6;
+  return prior;
+}
+
+/// Places the frame by its points, and asks it for the direction of gravity and for its height.
+PointOdometryResult MonocularMotion::place(const Frame &frame, const std::optional<GyroRotation> &rotated)
+{
+  const PointOdometryResult placed = m_odometry.process(m_points.tracker(), frame.stamp_ns, rotated);
+  m_pointsMc = placed.wMc;
+  m_placed.push_back(m_frame);
+  const VerticalEstimate vertical = gravityFromVerticals(frame.image, m_camera, up());
+  m_vertical.add(placed.wMc.R, vertical);
+  m_frames_with_up += vertical.status == VerticalStatus::ok;
+  if (vertical.status == VerticalStatus::ok)
+    m_first_up = vertical.up;
+  if (!m_has_unit && placed.status == PointOdometryStatus::ok)
+    chooseUnit();
+  measureHeight();
+  return placed;
+}
+
+/// Up in the last frame placed.
+std::optional<Vector3d> MonocularMotion::up() const
+{
+  if (!m_vertical.known())
+    return std::nullopt;
+  return Vector3d(m_pointsMc.R.transpose() * m_vertical.up());
+}
+
+double MonocularMotion::upSigma() const { return std::sqrt(0.5 * m_vertical.covariance().trace()); }
+
+/// The first guess of the metre: a height over the ground, or else how deep a forest usually looks.
+void MonocularMotion::chooseUnit()
+{
+  m_has_unit = true;
+  const std::vector<PointDepth> depths = m_odometry.depths();
+  const GroundHeight ground = up() ? heightOverGround(depths, m_camera, *up()) : GroundHeight();
+  if (ground.known) {
+    m_unit = (isHeightKnown() ? m_options.camera_height : m_options.start_height) / ground.height;
+    return;
+  }
+  std::vector<double> inverse;
+  for (const PointDepth &point : depths)
+    if (point.inverse_depth > 3 * point.sigma)
+      inverse.push_back(point.inverse_depth);
+  m_unit = inverse.empty() ? 1 : m_options.start_depth * medianOf(inverse);
+}
+
+void MonocularMotion::measureHeight()
+{
+  m_height_seen.reset();
+  if (!m_has_unit || !up())
+    return;
+  const GroundHeight ground = heightOverGround(m_odometry.depths(), m_camera, *up());
+  if (!ground.known)
+    return;
+  m_height_seen = ground.height * m_unit;
+  const double height = isHeightKnown() ? m_options.camera_height : m_options.start_height;
+  m_height_scale.add(ground, height, m_options.camera_height_sigma * height);
+}
+
+/// The ground under the camera, smoothed: bumps and slopes of some metres stay.
+void MonocularMotion::learnGround(const Pose &wMb)
+{
+  constexpr double kMemory = 0.9;
+  if (!m_height_seen)
+    return;
+  const double seen = (wMb * m_bMc).t.z() - *m_height_seen;
+  m_ground_z = m_ground_z ? kMemory * *m_ground_z + (1 - kMemory) * seen : seen;
+}
+
+ScaleEstimate MonocularMotion::scale() const
+{
+  const ScaleSource source = isHeightKnown() ? ScaleSource::height : ScaleSource::prior;
+  if (!m_height_scale.known())
+    return {0, m_options.start_sigma, source};
+  const double sigma = isHeightKnown() ? m_options.camera_height_sigma : m_options.start_sigma;
+  return {std::log(m_height_scale.metresPerUnit() / m_unit), std::hypot(m_height_scale.relativeSigma(), sigma), source};
+}
+
+WorldReference MonocularMotion::reference() const
+{
+  WorldReference reference;
+  reference.gravity = m_vertical.known() ? GravitySource::trunks : GravitySource::assumed;
+  reference.gravity_sigma = m_vertical.known() ? upSigma() : 0;
+  reference.has_ranges = m_has_unit;
+  return reference;
+}
+
+/// A motion of the camera in units of m_odometry as one of the body. \p is_held: the translation was not seen.
+Odometry MonocularMotion::toBody(const Pose &caMcb, Matrix6d covariance, bool is_held) const
+{
+  covariance.topRows<3>() *= m_unit;
+  covariance.leftCols<3>() *= m_unit;
+  const double along = m_options.step_scale_sigma * m_unit * caMcb.t.norm();
+  const double least = is_held ? m_options.still_sigma : m_options.step_sigma;
+  if (is_held) {
+    covariance.topRows<3>().setZero();
+    covariance.leftCols<3>().setZero();
+  }
+  covariance.topLeftCorner<3, 3>() += (least * least + along * along) * Matrix3d::Identity();
+  constexpr double kFocalSigma = 0.15; // of log f where it is guessed: a rotation is wrong by as much of itself
+  const double guessed = m_options.focal_known ? 0 : kFocalSigma * logSo3(caMcb.R).norm();
+  const double rotation_variance = m_options.turn_sigma * m_options.turn_sigma + guessed * guessed;
+  covariance.bottomRightCorner<3, 3>() += rotation_variance * Matrix3d::Identity();
+  const Matrix6d to_body = adjoint(m_bMc);
+  return {m_bMc * Pose(caMcb.R, m_unit * caMcb.t) * m_bMc.inverse(), to_body * covariance * to_body.transpose()};
+}
+
+/// Frames before the first baseline was known, now that they can be placed.
+void MonocularMotion::addBacklog(Motion &motion) const
+{
+  const std::vector<PlacedFrame> path = m_odometry.trajectory();
+  const std::size_t newest = path.size() - 1; // its motion comes as the step
+  const auto add = [&](std::size_t a, std::size_t b) {
+    const Odometry odometry = toBody(path[a].wMc.inverse() * path[b].wMc, Matrix6d::Zero(), false);
+    motion.odometry.push_back({m_placed[a], m_placed[b], odometry});
+  };
+  std::size_t last = 0;
+  while (last < newest && path[last + 1].status != PointOdometryStatus::ok)
+    ++last;
+  for (std::size_t i = last + 1; i < newest; ++i)
+    if (path[i].status == PointOdometryStatus::ok) {
+      add(last, i);
+      last = i;
+    }
+  if (last + 1 < newest) // frames in between were not placed
+    add(last, newest);
+}
+
+MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
+{
+  const MotionStep step = m_model.step(frame, wMa, m_points.gyroBias(), velocity);
+  m_model.advance(frame);
+  return step;
+}
+
+Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
+{
+  Motion motion;
+  ++m_frame;
+  motion.is_rotation_seen = true;
+  motion.step = expected(frame, wMa, velocity);
+  motion.step.step_from_odometry = false;
+  if (motion.step.turn_from_gyro)
+    m_points.process(frame); // for the bias that it teaches
+  else
+    m_points.track(frame);
+  if (frame.status == FrameStatus::ok)
+    see(frame, wMa, motion);
+  return motion;
+}
+
+/// What the image of \p frame says of its motion, in place of what was expected.
+void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
+{
+  const bool is_next = !m_placed.empty() && m_placed.back() + 1 == m_frame;
+  std::optional<GyroRotation> rotated; // of the camera
+  if (motion.step.turn_from_gyro && is_next) {
+    rotated.emplace();
+    rotated->R = m_bMc.R.transpose() * motion.step.aMb.R * m_bMc.R;
+    rotated->white = m_bMc.R.transpose() * motion.step.covariance.bottomRightCorner<3, 3>() * m_bMc.R;
+    rotated->complete = true;
+  }
+  const bool is_first = m_placed.empty(), had_unit = m_has_unit;
+  const Pose before = m_pointsMc;
+  const std::size_t last_placed = is_first ? m_frame : m_placed.back();
+  const PointOdometryResult placed = place(frame, rotated);
+  motion.has_new_unit = m_has_unit && !had_unit;
+  if (is_first)
+    return;
+  Pose caMcb = before.inverse() * placed.wMc;
+  Matrix6d covariance = placed.covariance;
+  if (motion.has_new_unit) {
+    const std::vector<PlacedFrame> path = m_odometry.trajectory();
+    caMcb = path[path.size() - 2].wMc.inverse() * path.back().wMc;
+    covariance.setZero(); // of the whole way from the start: between two frames of one solution little is left
+    addBacklog(motion);
+  }
+  const Odometry odometry = toBody(caMcb, covariance, !m_has_unit);
+  if (is_next) {
+    motion.step.aMb = odometry.aMb;
+    motion.step.covariance = odometry.covariance;
+  }
+  else
+    motion.odometry.push_back({last_placed, m_frame, odometry});
+  motion.step.step_from_odometry = m_has_unit && placed.status == PointOdometryStatus::ok;
+  if (up()) { // frames share the lean of their trunks: the sum over frames must not know more than the filter
+    const double sigma = upSigma() * std::sqrt(std::min(30.0, double(m_frames_with_up)));
+    motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), sigma);
+  }
+  learnGround(wMa * motion.step.aMb);
+}
+} // namespace bole

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/odometry_motion.h"
+
+#include "pipeline/monocular_motion.h"
+
+namespace bole
+{
+namespace
+{
+/// A camera that only rotates, without a gyro: points give its rotation, and nothing of its translation.
+Odometry rotationAlone(const RelativePoseEstimate &estimate, const Pose &bMc)
+{
+  constexpr double kUnknown = 1e4, kLeast = 1e-8; // variances [m^2], [rad^2]
+  Odometry odometry;
+  odometry.aMb.R = bMc.R * estimate.aRb * bMc.R.transpose();
+  odometry.covariance.setZero();
+  odometry.covariance.topLeftCorner<3, 3>() = kUnknown * Eigen::Matrix3d::Identity();
+  odometry.covariance.bottomRightCorner<3, 3>() =
+      bMc.R * estimate.covariance.topLeftCorner<3, 3>() * bMc.R.transpose() + kLeast * Eigen::Matrix3d::Identity();
+  return odometry;
+}
+} // namespace
+
+OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, bool has_odometry,
+                               const StageOptions &options)
+    : MotionSource(camera, bMc, options.points),
+      m_bMc(bMc),
+      m_has_odometry(has_odometry),
+      m_use_points(options.flow.use_points),
+      m_scale_sigma(options.motion.scale_sigma),
+      m_model(options.motion, options.points.gyro)
+{
+}
+
+PosePrior OdometryMotion::first(const Frame &frame)
+{
+  if (m_use_points)
+    m_points.process(frame);
+  const PosePrior prior = m_model.first(frame);
+  m_model.advance(frame);
+  return prior;
+}
+
+Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
+{
+  Motion motion;
+  const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
+  motion.step = m_model.step(frame, wMa, bias, velocity);
+  motion.is_rotation_seen = motion.step.step_from_odometry || !frame.gyro.empty();
+  if (m_use_points)
+    addPoints(motion, m_points.process(frame));
+  m_model.advance(frame);
+  return motion;
+}
+
+void OdometryMotion::addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const
+{
+  for (const RelativeMotion &relative : seen) {
+    const RelativePoseEstimate &estimate = relative.estimate;
+    if (estimate.hasDirection())
+      motion.directions.push_back(
+          {relative.a_index, relative.b_index, {estimate.aRb, estimate.direction, estimate.covariance}});
+    else if (estimate.hasRotation() && !relative.gyro)
+      motion.odometry.push_back({relative.a_index, relative.b_index, rotationAlone(estimate, m_bMc)});
+  }
+}
+
+std::optional<double> OdometryMotion::groundZ() const
+{
+  return m_has_odometry ? std::optional<double>(0.0) : std::nullopt;
+}
+
+ScaleEstimate OdometryMotion::scale() const { return {0, m_scale_sigma, ScaleSource::odometry}; }
+
+WorldReference OdometryMotion::reference() const
+{
+  WorldReference reference;
+  if (!m_has_odometry) {
+    reference.scale = ScaleSource::prior;
+    reference.gravity = GravitySource::assumed;
+  }
+  return reference;
+}
+
+std::unique_ptr<MotionSource> makeMotionSource(const Frame &first, const PinholeCamera &camera, const Pose &bMc,
+                                               const StageOptions &options)
+{
+  if (!first.wMb_odometry && options.flow.use_points)
+    return std::make_unique<MonocularMotion>(camera, bMc, options);
+  return std::make_unique<OdometryMotion>(camera, bMc, first.wMb_odometry.has_value(), options);
+}
+} // namespace bole

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Motion from a pose filter, a gyro and points, of which any may be missing.
+
+#include "pipeline/motion_source.h"
+
+namespace bole
+{
+/// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames.
+class OdometryMotion : public MotionSource
+{
+public:
+  /// \p has_odometry: false where nothing but a constant velocity stands in for the pose filter.
+  OdometryMotion(const PinholeCamera &camera, const Pose &bMc, bool has_odometry, const StageOptions &options);
+
+  PosePrior first(const Frame &frame) override;
+  Motion step(const Frame &frame, const Pose &wMa, const Vector6d &velocity) override;
+  bool isTranslationMeasured() const override { return m_has_odometry; }
+  std::optional<double> groundZ() const override;
+  ScaleEstimate scale() const override;
+  WorldReference reference() const override;
+
+private:
+  void addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const;
+
+  Pose m_bMc;
+  bool m_has_odometry, m_use_points;
+  double m_scale_sigma;
+  MotionModel m_model;
+};
+} // namespace bole

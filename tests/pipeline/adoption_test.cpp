@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// How a detection becomes a candidate: followed through the window, fitted to what was seen.
+#include "support/drawn_trunks.h"
+
+#include "pipeline/adoption.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+const PinholeCamera kCamera;
+const Pose kMount = SmootherOptions::forwardCamera();
+constexpr int kFrames = 10;
+
+/// A camera that has moved sideways before the small wood, known poses, nothing in the map.
+class Adopting : public testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    m_options.smoothing.bMc = kMount;
+    m_smoother = Smoother(m_options.smoothing);
+    for (int k = 0; k < kFrames; ++k) {
+      const Pose wMb(Eigen::Matrix3d::Identity(), {0, 0.08 * k, 1.2});
+      const Pose step(Eigen::Matrix3d::Identity(), {0, 0.08, 0});
+      const Matrix6d covariance = 1e-8 * Matrix6d::Identity();
+      const std::size_t pose = k == 0 ? m_smoother.addFirstPose(wMb, covariance) : m_smoother.addPose(step, covariance);
+      m_smoother.update();
+      m_view.wMc = wMb * kMount;
+      m_view.ground_z = 0;
+      m_view.time_s = 0.1 * k;
+      const auto image = test::drawTrunks(kCamera, m_view.wMc.inverse(), test::smallWood(), unsigned(k));
+      m_window.push(computeGradient(image), pose, m_view, m_smoother, m_options);
+    }
+  }
+  /// The first trunk of the wood, as a detector might have it.
+  static Detection detected(double x_error, double radius)
+  {
+    Detection detection;
+    detection.trunk.xy = {4 + x_error, 1.6 * (4 + x_error) / 4};
+    detection.trunk.log_radius = std::log(radius);
+    return detection;
+  }
+  Adoption follow(const Detection &detection) const
+  {
+    return followThroughWindow(detection, m_window, m_smoother, m_map, m_view, m_options);
+  }
+
+  StageOptions m_options;
+  Smoother m_smoother;
+  TrunkMap m_map;
+  DetectionWindow m_window;
+  Viewpoint m_view;
+};
+
+TEST_F(Adopting, EveryViewOfTheWindowThatShowsTheTrunkIsTakenIn)
+{
+  const Adoption adoption = follow(detected(0.02, 0.15));
+  EXPECT_EQ(adoption.views.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(adoption.trunk.views.size(), adoption.views.size());
+  EXPECT_LT(adoption.trunk.innovation2, 0.5);
+}
+
+TEST_F(Adopting, TheTrunkIsFittedToItsViews)
+{
+  const Adoption adoption = follow(detected(0.1, 0.154));
+  EXPECT_NEAR(adoption.trunk.trunk.xy.x(), 4, 0.04);
+  EXPECT_NEAR(adoption.trunk.trunk.xy.y(), 1.6, 0.02);
+  EXPECT_NEAR(adoption.trunk.trunk.radius(), 0.15, 0.005);
+}
+
+TEST_F(Adopting, WhereNothingStandsNothingIsSeen)
+{
+  Detection nothing = detected(0, 0.15);
+  nothing.trunk.xy = {4, 0.9};
+  const Adoption adoption = follow(nothing);
+  EXPECT_TRUE(adoption.views.empty());
+  EXPECT_EQ(adoption.trunk.innovation2, 9); // the worst there is
+}
+
+TEST_F(Adopting, ViewsBehindANearerTrunkOfTheMapAreLeftOut)
+{
+  MapTrunk curtain;
+  curtain.trunk.xy = {2, 0.8};
+  curtain.trunk.log_radius = std::log(0.3);
+  curtain.status = TrunkStatus::confirmed;
+  m_map = TrunkMap(MapOptions(), {curtain});
+  EXPECT_LT(follow(detected(0.02, 0.15)).views.size(), static_cast<std::size_t>(kFrames));
+}
+
+TEST_F(Adopting, ViewsFromOnePlaceCountForOne)
+{
+  m_options.flow.view_correlation = 0.16; // twice the way between two views
+  const Adoption adoption = follow(detected(0.02, 0.15));
+  const Adoption all = [&] {
+    m_options.flow.view_correlation = 0;
+    return follow(detected(0.02, 0.15));
+  }();
+  EXPECT_EQ(adoption.views[0].summary.F, all.views[0].summary.F);
+  EXPECT_LT((adoption.views[1].summary.F - 0.5 * all.views[1].summary.F).norm(), 1e-6 * all.views[1].summary.F.norm());
+}
+
+TEST(DetectionWindow, KeepsViewsFromPlacesApartAndAlwaysTheNewest)
+{
+  StageOptions options;
+  options.smoothing.bMc = kMount;
+  options.flow.view_spacing = 0.1;
+  options.detection.window = 4;
+  Smoother smoother(options.smoothing);
+  DetectionWindow window;
+  Viewpoint view;
+  for (std::size_t k = 0; k < 12; ++k) {
+    const Matrix6d covariance = 1e-8 * Matrix6d::Identity();
+    const Pose step(Eigen::Matrix3d::Identity(), {0, 0.06, 0});
+    k == 0 ? smoother.addFirstPose(Pose(), covariance) : smoother.addPose(step, covariance);
+    smoother.update();
+    view.wMc = smoother.pose(k) * kMount;
+    window.push(computeGradient(vpImage<unsigned char>(240, 320, 128)), k, view, smoother, options);
+    EXPECT_EQ(window.newest().pose, k);
+  }
+  ASSERT_EQ(window.views().size(), 4u);
+  for (std::size_t i = 1; i + 1 < window.views().size(); ++i)
+    EXPECT_GE(window.views()[i].pose - window.views()[i - 1].pose, 2u);
+}
+} // namespace
+} // namespace bole

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The pipeline as a user calls it.
+#include "support/drawn_trunks.h"
+
+#include "pipeline/stage_options.h"
+#include "pipeline/units.h"
+#include <bole/pipeline.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+const PinholeCamera kCamera;
+const Pose kMount = SmootherOptions::forwardCamera();
+
+Frame byHand(int k)
+{
+  Frame frame; // its index is left alone
+  frame.stamp_ns = k * 100000000LL;
+  frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0, 0.8 * std::sin(0.15 * k), 1.2});
+  frame.image = test::drawTrunks(kCamera, (*frame.wMb_odometry * kMount).inverse(), test::smallWood(), unsigned(k));
+  return frame;
+}
+
+TEST(Pipeline, MapsFromFramesFilledByHandWithImageStampAndOdometry)
+{
+  Pipeline pipeline(kCamera, kMount);
+  FrameReport report;
+  for (int k = 0; k < 30; ++k) {
+    report = pipeline.process(byHand(k));
+    EXPECT_EQ(report.index, static_cast<std::size_t>(k));
+  }
+  pipeline.finish();
+  int found = 0;
+  for (const TrunkRecord &trunk : pipeline.map())
+    for (const Cylinder &truth : test::smallWood())
+      found += trunk.status == TrunkStatus::confirmed && (trunk.xy - truth.foot.head<2>()).norm() < 0.3;
+  EXPECT_GE(found, 3);
+  EXPECT_FALSE(report.trunks.empty());
+  EXPECT_FALSE(report.map.empty());
+}
+
+TEST(Pipeline, OfWhatIsNoTrunkItTellsWhy)
+{
+  Pipeline pipeline(kCamera, kMount);
+  for (int k = 0; k < 30; ++k)
+    pipeline.process(byHand(k));
+  pipeline.finish();
+  for (const TrunkRecord &trunk : pipeline.map())
+    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.fate == TrunkFate::none) << toString(trunk.fate);
+}
+
+TEST(Pipeline, AFrameThatIsNotOkKeepsItsReasonAndItsPose)
+{
+  Pipeline pipeline(kCamera, kMount);
+  pipeline.process(byHand(0));
+  Frame broken = byHand(1);
+  broken.status = FrameStatus::corrupt;
+  broken.message = "half of it is missing";
+  const FrameReport report = pipeline.process(broken);
+  EXPECT_EQ(report.frame_status, FrameStatus::corrupt);
+  EXPECT_EQ(report.reason, broken.message);
+  EXPECT_TRUE(report.trunks.empty());
+  EXPECT_LT((report.wMb.t - broken.wMb_odometry->t).norm(), 0.05);
+}
+
+TEST(Pipeline, BeforeAnyFrameThereIsNothing)
+{
+  Pipeline pipeline(kCamera, kMount);
+  pipeline.finish();
+  EXPECT_TRUE(pipeline.map().empty());
+  EXPECT_TRUE(pipeline.smoothedTrajectory().empty());
+}
+
+TEST(Units, OptionsAndReadingsAreInversesOfEachOther)
+{
+  const StageOptions metres;
+  const StageOptions units = inUnits(metres, 2.5);
+  EXPECT_NEAR(units.detection.range_max * 2.5, metres.detection.range_max, 1e-12);
+  EXPECT_NEAR(units.map.usual_radius * 2.5, metres.map.usual_radius, 1e-12);
+  Trunk trunk;
+  trunk.xy = {2, -1};
+  EXPECT_NEAR(inMetres(trunk, 2.5).radius(), 2.5 * trunk.radius(), 1e-12);
+  EXPECT_NEAR(inMetres(trunk, 2.5).xy.x(), 5, 1e-12);
+  const Pose wMb(Eigen::Matrix3d::Identity(), {1, 2, 3}), bMc(kMount.R, {0.1, 0, 0.05});
+  EXPECT_LT(((inMetres(wMb, bMc, 2.5) * bMc).t - 2.5 * (wMb * bMc).t).norm(), 1e-12);
+}
+
+TEST(Units, WhatACameraSeesOfATrunkDoesNotDependOnTheUnit)
+{
+  const Pose wMb(Eigen::Matrix3d::Identity(), {1, 0.2, 1.3});
+  Trunk trunk;
+  trunk.xy = {5, 1};
+  const RelativeTrunk before = relativeTrunk(wMb, kMount, trunk);
+  const RelativeTrunk after = relativeTrunk(inMetres(wMb, kMount, 0.7), kMount, inMetres(trunk, 0.7));
+  EXPECT_LT(before.minus(after).norm(), 1e-12);
+}
+} // namespace
+} // namespace bole

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What hides what, and where the detectors need not look.
+#include "pipeline/prediction.h"
+
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+const Pose kMount = SmootherOptions::forwardCamera();
+
+Trunk trunkAt(double x, double y, double radius = 0.15, Eigen::Vector2d lean = {0, 0})
+{
+  Trunk trunk;
+  trunk.xy = {x, y};
+  trunk.log_radius = std::log(radius);
+  trunk.lean = lean;
+  return trunk;
+}
+
+/// A camera at eye height that looks along x.
+Viewpoint eye()
+{
+  Viewpoint view;
+  view.wMc = Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.2}) * kMount;
+  view.ground_z = 0;
+  return view;
+}
+
+TrunkMap mapOf(std::initializer_list<std::pair<Trunk, TrunkStatus>> trunks)
+{
+  std::vector<MapTrunk> known;
+  for (const auto &[trunk, status] : trunks) {
+    MapTrunk one;
+    one.id = static_cast<int>(known.size());
+    one.trunk = trunk;
+    one.status = status;
+    known.push_back(one);
+  }
+  return TrunkMap(MapOptions(), known);
+}
+
+TEST(Occlusion, ANearerConfirmedTrunkHidesTheBorderBehindIt)
+{
+  // 0.15 m at 3 m fill 0.05 rad to either side; the trunk behind reaches from 0.04 to 0.09 rad to the left
+  const TrunkMap map = mapOf({{trunkAt(3, 0), TrunkStatus::confirmed}});
+  const Trunk behind = trunkAt(6, 0.39);
+  const HiddenBorders hidden = hiddenBorders(behind, -1, map, eye());
+  EXPECT_FALSE(hidden.left);
+  EXPECT_TRUE(hidden.right);
+  const HiddenBorders mirrored = hiddenBorders(trunkAt(6, -0.39), -1, map, eye());
+  EXPECT_TRUE(mirrored.left);
+  EXPECT_FALSE(mirrored.right);
+}
+
+TEST(Occlusion, NeitherACandidateNorAFartherTrunkNorTheTrunkItselfHidesABorder)
+{
+  const TrunkMap map = mapOf({{trunkAt(3, 0), TrunkStatus::candidate},
+                              {trunkAt(9, 0.39), TrunkStatus::confirmed},
+                              {trunkAt(5.5, 0.39), TrunkStatus::confirmed}});
+  const HiddenBorders hidden = hiddenBorders(trunkAt(6, 0.39), 2, map, eye());
+  EXPECT_FALSE(hidden.left || hidden.right);
+}
+
+TEST(Occlusion, IsAskedAtTheHeightOfTheCameraWhereTheTrunkLeans)
+{
+  // leaning by 0.1 to the left: at the height of the camera the trunk stands 0.12 m to the left of its foot
+  const TrunkMap map = mapOf({{trunkAt(3, -0.12, 0.15, {0, 0.1}), TrunkStatus::confirmed}});
+  EXPECT_TRUE(hiddenBorders(trunkAt(6, 0.39), -1, map, eye()).right);
+  const TrunkMap upright = mapOf({{trunkAt(3, -0.12), TrunkStatus::confirmed}});
+  EXPECT_FALSE(hiddenBorders(trunkAt(6, 0.39), -1, upright, eye()).right);
+}
+
+TEST(Inhibition, TakesTheColumnsOfConfirmedTrunksAndOfCandidatesOnRequest)
+{
+  const TrunkMap map = mapOf({{trunkAt(4, 1), TrunkStatus::confirmed}, {trunkAt(4, -1), TrunkStatus::candidate}});
+  const auto known = inhibitedRanges(map, eye(), false), all = inhibitedRanges(map, eye(), true);
+  ASSERT_EQ(known.size(), 1u);
+  EXPECT_EQ(all.size(), 2u);
+  EXPECT_LT(known[0].q_right, 0.25 - 0.15 / 4.2);
+  EXPECT_GT(known[0].q_left, 0.25 + 0.15 / 4.2);
+  EXPECT_LT(known[0].q_left - known[0].q_right, 2 * (0.15 / 4 + 2 / eye().camera.fx));
+}
+
+TEST(Elevation, IsThatOfTwoHeightsOverTheGround)
+{
+  StageOptions options;
+  const Trunk trunk = trunkAt(4, 0);
+  Viewpoint view = eye();
+  const RelativeTrunk relative = relativeTrunk(view.wMc, Pose(), trunk);
+  const ElevationRange range = elevationOf(relative, trunk, view, options);
+  EXPECT_NEAR(range.low, (options.flow.trunk_low - 1.2) / 4, 1e-3);
+  EXPECT_NEAR(range.high, (options.flow.trunk_high - 1.2) / 4, 1e-3);
+  view.ground_z.reset();
+  EXPECT_EQ(elevationOf(relative, trunk, view, options).high, options.detection.profile.range.high);
+}
+} // namespace
+} // namespace bole
