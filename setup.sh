@@ -1,46 +1,91 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-2.0-or-later
-# From a fresh Debian 12 machine to a map (./setup.sh demo) or to a passed test suite (./setup.sh test).
+# From a fresh Debian machine to a map, a passed test suite, an installation or packages.
 set -eu
 cd "$(dirname "$0")"
 
-PACKAGES="build-essential cmake ninja-build ccache pkg-config libvisp-dev libopencv-dev libeigen3-dev libnlopt-dev
-libnlopt-cxx-dev libgtest-dev libgmock-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev libfmt-dev libavcodec-dev
-libavformat-dev libavutil-dev libswscale-dev libembree-dev visp-images-data xvfb"
+BUILD_PACKAGES="g++ cmake ninja-build pkg-config git libvisp-dev libopencv-dev libeigen3-dev libnlopt-dev libyaml-cpp-dev
+libcli11-dev nlohmann-json3-dev libfmt-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev"
+TEST_PACKAGES="libgtest-dev libgmock-dev libembree-dev visp-images-data xvfb xauth"
+PACKAGE_PACKAGES="dpkg-dev file"
 
 usage() {
-  echo "usage: ./setup.sh demo   install what is needed, build, map the demonstration flight"
-  echo "       ./setup.sh test   install what is needed, build, pass the test suite"
+  echo "usage: ./setup.sh demo               map the demonstration flight"
+  echo "       ./setup.sh test               pass the test suite"
+  echo "       ./setup.sh install [PREFIX]   the command, library and headers (default /usr/local)"
+  echo "       ./setup.sh package            Debian packages in build/demo/packages"
+  echo "Each installs the Debian packages that it needs and builds first."
 }
 
-install_packages() {
-  for package in $PACKAGES; do
-    if ! dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q "install ok installed"; then
-      echo "installing Debian packages"
-      sudo=""
-      [ "$(id -u)" -eq 0 ] || sudo="sudo"
-      $sudo apt-get update -qq
-      # shellcheck disable=SC2086
-      $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $PACKAGES
-      return
-    fi
+as_root() {
+  if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+say() {
+  echo "== $(date +%H:%M:%S) $*"
+}
+
+install_packages() { # PACKAGE...
+  missing=""
+  for package in "$@"; do
+    dpkg-query -W -f '${Status}\n' "$package" 2>/dev/null | grep -q "install ok installed" || missing="$missing $package"
   done
+  [ -n "$missing" ] || return 0
+  say "installing Debian packages (about two minutes):$missing"
+  as_root apt-get update -qq
+  # shellcheck disable=SC2086
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+}
+
+# Release build of the library and the command alone, without laboratory and tests.
+build_command() { # CMAKE_ARGUMENT...
+  # shellcheck disable=SC2086
+  install_packages $BUILD_PACKAGES
+  say "building the library and the command (about three minutes on two cores)"
+  cmake --preset demo "$@" >build.log || { cat build.log && exit 1; }
+  rm -f build.log
+  cmake --build --preset demo
 }
 
 case "${1:-}" in
 demo)
-  install_packages
-  cmake --preset release -DBOLE_BUILD_TESTS=OFF
-  cmake --build --preset release --target bole
-  build/release/bole track data/park-forward -o run
-  build/release/bole evaluate run data/park-forward
-  echo "Look at run/overlay.mp4, run/saliency.mp4 and run/map.svg"
+  echo "This takes about five minutes on two cores."
+  build_command
+  ln -sf build/demo/bole bole
+  say "mapping the demonstration flight"
+  ./bole track data/park-forward -o run
+  ./bole evaluate run data/park-forward
+  say "done. Look at run/overlay.mp4 and run/map.svg."
+  echo "Here the command is ./bole; ./setup.sh install makes it \`bole\` in every folder."
   ;;
 test)
-  install_packages
-  cmake --preset release -DBOLE_BUILD_TESTS=ON
-  cmake --build --preset release
-  ctest --test-dir build/release -j2 --output-on-failure
+  echo "This takes about twelve minutes on two cores."
+  # shellcheck disable=SC2086
+  install_packages $BUILD_PACKAGES $TEST_PACKAGES
+  say "building the library, the laboratory and the tests"
+  cmake --preset check
+  cmake --build --preset check
+  say "running the tests"
+  ctest --test-dir build/check -j2 --output-on-failure --no-tests=error
+  ;;
+install)
+  prefix="${2:-/usr/local}"
+  build_command -DCMAKE_INSTALL_PREFIX="$prefix" -DCMAKE_SKIP_INSTALL_RPATH=OFF
+  mkdir -p "$prefix" 2>/dev/null || true
+  if [ -w "$prefix" ]; then
+    cmake --install build/demo >/dev/null
+  else
+    as_root cmake --install build/demo >/dev/null
+  fi
+  if [ "$(id -u)" -eq 0 ]; then ldconfig; fi
+  say "installed to $prefix: try $prefix/bin/bole track park-forward -o run"
+  ;;
+package)
+  # shellcheck disable=SC2086
+  install_packages $BUILD_PACKAGES $PACKAGE_PACKAGES
+  build_command -DCMAKE_INSTALL_PREFIX=/usr -DCMAKE_SKIP_INSTALL_RPATH=ON
+  (cd build/demo && cpack -G DEB)
+  say "done: apt install ./build/demo/packages/*.deb, then bole track park-forward -o run in any folder"
   ;;
 *)
   usage

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole evaluate: a finished run against the ground truth of its sequence.
 #include "commands.h"
+#include "data_files.h"
 
 #include "output/atomic_file.h"
 #include <bole/evaluation.h>
@@ -26,6 +27,7 @@ void addEvaluate(CLI::App &app)
       ->add_option("SEQUENCE", arguments->sequence,
                    "EuRoC/ASL folder with ground truth (and trees.csv), or another run to be "
                    "compared with")
+      ->transform(findSequence)
       ->required();
   command->add_flag("-v,--verbose", arguments->is_verbose, "List every match, miss and false positive");
   command->add_flag("--align-time", arguments->options.align_time,

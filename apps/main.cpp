@@ -2,13 +2,30 @@
 // The command `bole`: one subcommand a file, see commands.h.
 #include "commands.h"
 
+#include "version.h"
+
 #include <cstdio>
+#include <opencv2/core/version.hpp>
+#include <string>
+#include <visp3/core/vpConfig.h>
 #include <visp3/core/vpException.h>
+
+namespace
+{
+/// "bole 0.1.0 (9720183abc), ViSP 3.5.0, OpenCV 4.6.0"
+std::string versions()
+{
+  const std::string commit = BOLE_COMMIT;
+  return "bole " BOLE_VERSION + (commit.empty() ? "" : " (" + commit + ")") + ", ViSP " +
+         std::to_string(VISP_VERSION_MAJOR) + "." + std::to_string(VISP_VERSION_MINOR) + "." +
+         std::to_string(VISP_VERSION_PATCH) + ", OpenCV " CV_VERSION;
+}
+} // namespace
 
 int main(int argc, char **argv)
 {
   CLI::App app("bole: tree trunks as vertical cylinders, tracked and mapped from a small drone's video", "bole");
-  app.set_version_flag("--version", "bole " BOLE_VERSION);
+  app.set_version_flag("--version", versions());
   app.require_subcommand(1);
   bole::apps::addTrack(app);
   bole::apps::addEvaluate(app);
@@ -25,6 +42,7 @@ int main(int argc, char **argv)
   bole::apps::addCalibrateSaliency(app);
   bole::apps::addShowSaliency(app);
 #endif
+  bole::apps::addDocumentation(app, "bole " BOLE_VERSION);
   try {
     app.parse(argc, argv);
   }

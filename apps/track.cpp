@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole track: from a flight through trees to a map of trunks and a trajectory.
 #include "commands.h"
+#include "data_files.h"
 #include "field_of_view.h"
 #include "interrupt.h"
 #include "overlay_window.h"
@@ -195,11 +196,14 @@ void addTrack(CLI::App &app)
   command
       ->add_option("INPUT", arguments->input,
                    "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
+      ->transform(findSequence)
       ->required();
   command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
-  command->add_option("--config", arguments->config,
-                      "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
-                      "config/compressed.yaml)");
+  command
+      ->add_option("--config", arguments->config,
+                   "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
+                   "config/compressed.yaml)")
+      ->transform(findPreset);
   command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path,

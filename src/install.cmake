@@ -1,20 +1,38 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# cmake --install: headers, libraries, the command, presets and data, and boleConfig.cmake.
-install(TARGETS bole_library EXPORT boleTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS bole RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY include/bole DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-
-set(BOLE_DATA_DIR ${CMAKE_INSTALL_DATADIR}/bole)
-foreach(folder config models data)
-  if(EXISTS ${PROJECT_SOURCE_DIR}/${folder})
-    install(DIRECTORY ${folder} DESTINATION ${BOLE_DATA_DIR})
-  endif()
-endforeach()
-
+# cmake --install: the library, its public headers, the command with presets, models and demonstration flight, and what
+# find_package(bole) reads, here and in the build tree. src/package.cmake makes Debian packages of the components.
+include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bole)
-install(EXPORT boleTargets NAMESPACE bole:: DESTINATION ${package_dir})
-configure_package_config_file(src/boleConfig.cmake.in ${CMAKE_BINARY_DIR}/boleConfig.cmake
+set(BOLE_DATA_DIR ${CMAKE_INSTALL_DATADIR}/bole)
+
+install(TARGETS bole_library EXPORT boleTargets
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
+install(DIRECTORY include/bole DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN *.h)
+install(TARGETS bole RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+install(DIRECTORY config models data DESTINATION ${BOLE_DATA_DIR} COMPONENT command PATTERN figures EXCLUDE)
+
+install(EXPORT boleTargets NAMESPACE bole:: DESTINATION ${package_dir} COMPONENT development)
+configure_package_config_file(src/boleConfig.cmake.in ${PROJECT_BINARY_DIR}/installed/boleConfig.cmake
   INSTALL_DESTINATION ${package_dir} PATH_VARS BOLE_DATA_DIR)
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/boleConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/boleConfig.cmake ${CMAKE_BINARY_DIR}/boleConfigVersion.cmake
-  DESTINATION ${package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/boleConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/installed/boleConfig.cmake ${PROJECT_BINARY_DIR}/boleConfigVersion.cmake
+  DESTINATION ${package_dir} COMPONENT development)
+
+# The build tree: its presets and flight are those of the sources.
+set(BOLE_DATA_DIR ${PROJECT_SOURCE_DIR})
+export(EXPORT boleTargets NAMESPACE bole:: FILE ${PROJECT_BINARY_DIR}/boleTargets.cmake)
+configure_package_config_file(src/boleConfig.cmake.in ${PROJECT_BINARY_DIR}/boleConfig.cmake
+  INSTALL_DESTINATION ${PROJECT_BINARY_DIR} INSTALL_PREFIX ${PROJECT_BINARY_DIR} PATH_VARS BOLE_DATA_DIR)
+
+# Man pages and completions, by the command itself from its definitions.
+set(documentation ${PROJECT_BINARY_DIR}/documentation)
+add_custom_command(OUTPUT ${documentation}/_bole COMMAND bole documentation ${documentation} DEPENDS bole
+  COMMENT "Writing man pages and completions")
+add_custom_target(bole_documentation ALL DEPENDS ${documentation}/_bole)
+install(DIRECTORY ${documentation}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT command
+  FILES_MATCHING PATTERN *.1)
+install(FILES ${documentation}/bole.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME bole
+  COMPONENT command)
+install(FILES ${documentation}/_bole DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT command)
+
+include(src/package.cmake)

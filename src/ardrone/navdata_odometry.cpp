@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+#include "geometry/require_range.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
@@ -13,12 +14,6 @@ namespace
 {
 constexpr double kDegree = M_PI / 180;
 constexpr double kCorrelation_s = 0.1; // of the velocity's error
-
-void require(const char *name, double value, double low, double high)
-{
-  if (!(value > low && value < high))
-    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
-}
 
 double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
 Eigen::Matrix3d turnedBy(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
@@ -57,15 +52,15 @@ BodyState interpolated(const BodyState &a, const BodyState &b, std::int64_t stam
 
 void NavdataOdometry::Options::validate() const
 {
-  require("velocity_sigma", velocity_sigma, 0, 5);
-  require("scale_sigma", scale_sigma, 0, 1);
-  require("height_sigma", height_sigma, 0, 1);
-  require("tilt_sigma", tilt_sigma, 0, 0.5);
-  require("yaw_sigma", yaw_sigma, 0, 0.5);
-  require("ground_step", ground_step, 0.02, 5);
-  require("largest_gap_s", largest_gap_s, 0.05, 10);
-  require("extrapolation_s", extrapolation_s, 0, 1);
-  require("history_s", history_s, 1, 600);
+  requireRange("velocity_sigma", velocity_sigma, 1e-9, 5);
+  requireRange("scale_sigma", scale_sigma, 1e-9, 1);
+  requireRange("height_sigma", height_sigma, 1e-9, 1);
+  requireRange("tilt_sigma", tilt_sigma, 1e-9, 0.5);
+  requireRange("yaw_sigma", yaw_sigma, 1e-9, 0.5);
+  requireRange("ground_step", ground_step, 0.02, 5);
+  requireRange("largest_gap_s", largest_gap_s, 0.05, 10);
+  requireRange("extrapolation_s", extrapolation_s, 1e-9, 1);
+  requireRange("history_s", history_s, 1, 600);
 }
 
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw)

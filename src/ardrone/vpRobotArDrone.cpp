@@ -5,6 +5,7 @@
 #include <bole/vpRobotArDrone.h>
 
 #include "ardrone/socket.h"
+#include "geometry/require_range.h"
 
 #include <algorithm>
 #include <atomic>
@@ -18,11 +19,6 @@ namespace
 constexpr std::chrono::milliseconds kPeriod{33}; // commands every 30 ms fly smoothly, says the manufacturer
 constexpr int kRepeats = 3;                      // single datagrams get lost
 
-void require(const char *name, double value, double low, double high)
-{
-  if (!(value > low && value < high))
-    throw vpException(vpException::badValue, "%s = %g, must be in (%g, %g)", name, value, low, high);
-}
 } // namespace
 
 struct vpRobotArDrone::State
@@ -102,12 +98,12 @@ vpRobotArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) {}
 
 void vpRobotArDrone::Options::validate() const
 {
-  require("hover_after_s", hover_after_s, 0.05, 2);
-  require("land_after_s", land_after_s, hover_after_s, 60);
-  require("gain", gain, 0, 2);
-  require("largest_share", largest_share, 0, 1.0001);
-  require("largest_climb", largest_climb, 0, 5);
-  require("largest_turn", largest_turn, 0, 7);
+  bole::requireRange("hover_after_s", hover_after_s, 0.05, 2);
+  bole::requireRange("land_after_s", land_after_s, hover_after_s, 60);
+  bole::requireRange("gain", gain, 1e-9, 2);
+  bole::requireRange("largest_share", largest_share, 1e-9, 1);
+  bole::requireRange("largest_climb", largest_climb, 1e-9, 5);
+  bole::requireRange("largest_turn", largest_turn, 1e-9, 7);
 }
 
 vpRobotArDrone::vpRobotArDrone(vpArDroneGrabber &grabber) : vpRobotArDrone(grabber, Options()) {}

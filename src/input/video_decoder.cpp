@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/video_decoder.h"
+#include "input/libav.h"
 
 #include <array>
 #include <cmath>
@@ -58,7 +59,7 @@ private:
 /// Quarter turns, clockwise, that bring the picture upright.
 int quarterTurns(AVStream &stream)
 {
-  const std::uint8_t *matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  const std::uint8_t *matrix = libav::displayMatrix(stream);
   if (matrix == nullptr)
     return 0;
   std::array<std::int32_t, 9> values;

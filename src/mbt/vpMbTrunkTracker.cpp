@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The ViSP side of vpMbTrunkTracker; its estimation is in vpMbTrunkTrackerPose.cpp and ...Servo.cpp, its display in
 // ...Display.cpp.
+#include "geometry/require_range.h"
 #include "mbt/cao_reader.h"
 #include "mbt/trunk_settings.h"
 #include <bole/vpMbTrunkTracker.h>
@@ -18,12 +19,6 @@ using bole::Pose;
 
 namespace
 {
-void check(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} .. {}", name, value, low, high));
-}
-
 vpMbTrunkTracker::Status statusOf(ImageFault fault)
 {
   using Status = vpMbTrunkTracker::Status;
@@ -54,25 +49,25 @@ void vpMbTrunkTracker::Options::validate() const
 {
   trunk.validate();
   health.validate();
-  check("border_sigma_px", border_sigma_px, 0.1, 20);
-  check("lean_sigma_rad", lean_sigma_rad, 1e-4, 0.5);
-  check("radius_sigma", radius_sigma, 1e-3, 1);
-  check("scan_min_px", scan_min_px, 2, 20);
-  check("scan_max_px", scan_max_px, 8, 100);
-  check("refine_px", refine_px, 2, 20);
-  check("refinements", refinements, 0, 5);
-  check("step_sigma_m", step_sigma_m, 0.001, 10);
-  check("accel_sigma_m", accel_sigma_m, 0.001, 10);
-  check("climb_sigma_m", climb_sigma_m, 0.001, 10);
-  check("turn_sigma_rad", turn_sigma_rad, 1e-4, 1);
-  check("memory_rate", memory_rate, 0.01, 1);
-  check("min_support", min_support, 0.05, 1);
-  check("min_agreement", min_agreement, 0, 1);
-  check("max_jump", max_jump, 0.1, 1000);
-  check("max_sigma_m", max_sigma_m, 0.001, 100);
-  check("max_sigma_rad", max_sigma_rad, 0.001, 3.2);
-  check("unobserved_m", unobserved_m, 0.01, 10);
-  check("lever_m", lever_m, 0.1, 100);
+  bole::requireRange("border_sigma_px", border_sigma_px, 0.1, 20);
+  bole::requireRange("lean_sigma_rad", lean_sigma_rad, 1e-4, 0.5);
+  bole::requireRange("radius_sigma", radius_sigma, 1e-3, 1);
+  bole::requireRange("scan_min_px", scan_min_px, 2, 20);
+  bole::requireRange("scan_max_px", scan_max_px, 8, 100);
+  bole::requireRange("refine_px", refine_px, 2, 20);
+  bole::requireRange("refinements", refinements, 0, 5);
+  bole::requireRange("step_sigma_m", step_sigma_m, 0.001, 10);
+  bole::requireRange("accel_sigma_m", accel_sigma_m, 0.001, 10);
+  bole::requireRange("climb_sigma_m", climb_sigma_m, 0.001, 10);
+  bole::requireRange("turn_sigma_rad", turn_sigma_rad, 1e-4, 1);
+  bole::requireRange("memory_rate", memory_rate, 0.01, 1);
+  bole::requireRange("min_support", min_support, 0.05, 1);
+  bole::requireRange("min_agreement", min_agreement, 0, 1);
+  bole::requireRange("max_jump", max_jump, 0.1, 1000);
+  bole::requireRange("max_sigma_m", max_sigma_m, 0.001, 100);
+  bole::requireRange("max_sigma_rad", max_sigma_rad, 0.001, 3.2);
+  bole::requireRange("unobserved_m", unobserved_m, 0.01, 10);
+  bole::requireRange("lever_m", lever_m, 0.1, 100);
 }
 
 const char *vpMbTrunkTracker::toString(Status status)

@@ -37,10 +37,11 @@ Matrix6d vpMbTrunkTracker::estimatedInObject() const
 /// The part of the camera's twist \p xi that lies in the degrees of freedom to be estimated.
 Vector6d vpMbTrunkTracker::estimated(const Vector6d &xi) const
 {
-  if (isoJoIdentity)
+  const Matrix6d J = estimatedInObject();
+  if (J.isIdentity(0))
     return xi;
   const Matrix6d V = twistMatrix(m_cMo);
-  return V * estimatedInObject() * V.inverse() * xi;
+  return V * J * V.inverse() * xi;
 }
 
 void vpMbTrunkTracker::computeVVSInit()
@@ -124,7 +125,7 @@ void vpMbTrunkTracker::servo(const Prediction &prediction)
     H += prior_information;
     b += prior_information * twistBetween(m_cMo, prediction.cMo);
     Vector6d xi;
-    if (isoJoIdentity)
+    if (estimatedInObject().isIdentity(0))
       xi = inverted(H) * b;
     else { // only the estimated degrees of freedom, given in the object frame
       const Matrix6d VJ = twistMatrix(m_cMo) * estimatedInObject();

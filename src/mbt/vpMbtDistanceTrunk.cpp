@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/borders.h"
 
+#include "geometry/require_range.h"
 #include "mbt/vpMbtDistanceTrunk.h"
 
 #include <Eigen/Geometry>
@@ -20,24 +21,18 @@ namespace
 constexpr double kProfileRate =
     0.5; ///< how fast the remembered profile follows: the background moves on behind the border
 
-void check(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high))
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} .. {}", name, value, low, high));
-}
-
 Vector3d toEigen(const vpPoint &p) { return {p.get_oX(), p.get_oY(), p.get_oZ()}; }
 } // namespace
 
 void vpMbtDistanceTrunk::Options::validate() const
 {
-  check("pieces", pieces, 1, 16);
-  check("samples", samples, 8, 400);
-  check("near_m", near_m, 0.001, 10);
-  check("margin_px", margin_px, 0, 50);
-  check("min_length_px", min_length_px, 4, 1000);
-  check("min_width_px", min_width_px, 1, 100);
-  check("min_contrast", min_contrast, 0, 50);
+  bole::requireRange("pieces", pieces, 1, 16);
+  bole::requireRange("samples", samples, 8, 400);
+  bole::requireRange("near_m", near_m, 0.001, 10);
+  bole::requireRange("margin_px", margin_px, 0, 50);
+  bole::requireRange("min_length_px", min_length_px, 4, 1000);
+  bole::requireRange("min_width_px", min_width_px, 1, 100);
+  bole::requireRange("min_contrast", min_contrast, 0, 50);
 }
 
 vpMbtDistanceTrunk::vpMbtDistanceTrunk() = default;

@@ -3,6 +3,7 @@
 
 #include "motion/require.h"
 
+#include "geometry/degree.h"
 #include "geometry/median.h"
 
 #include <algorithm>
@@ -12,8 +13,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kDegree = M_PI / 180;
-
 struct Height
 {
   double value, variance;

@@ -3,6 +3,7 @@
 
 #include "geometry/median.h"
 
+#include "geometry/degree.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
 #include "motion/require.h"
@@ -51,7 +52,6 @@ struct Record
   PointOdometryStatus status = PointOdometryStatus::starting;
 };
 
-constexpr double kDegree = M_PI / 180;
 constexpr double kHeldSigma = 1.0; // of a translation that was not seen, in units of the first baseline
 // Prior on an unseen depth, in typical inverse depths. Wide: at twice the typical one it pulled far
 // points nearer and the unit of length drifted by 40 % over pine-arc, at ten times by 2 %.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/vertical.h"
 
+#include "geometry/degree.h"
 #include "motion/epipolar.h"
 #include "motion/require.h"
 
@@ -14,7 +15,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kDegree = M_PI / 180;
 constexpr double kPriorSigma = 20 * kDegree;
 constexpr double kChance = 0.2; ///< share of edges at random that agree with the best direction
 

@@ -36,6 +36,13 @@ std::string readmeProgram()
   return readme.substr(begin + fence.size(), end - begin - fence.size());
 }
 
+/// Opens a flight and uses Eigen, ViSP and the library.
+constexpr const char *kProgram = "#include <bole/open_source.h>\n"
+                                 "int main(int count, char **arguments)\n"
+                                 "{\n"
+                                 "  return count > 1 && bole::openSource(arguments[1])->camera().width > 0 ? 0 : 1;\n"
+                                 "}\n";
+
 /// This build, installed once for all tests.
 class Install : public testing::Test
 {
@@ -50,6 +57,23 @@ protected:
   static void TearDownTestSuite() { fs::remove_all(s_folder); }
   void SetUp() override { ASSERT_EQ(s_installed.status, 0) << s_installed.text; }
 
+  /// The build folder of a program of somebody else's with \p program as its source, configured with \p arguments.
+  fs::path configure(const std::string &name, const std::string &program, const std::string &arguments)
+  {
+    const fs::path outside = s_folder / name, build = outside / "build";
+    fs::copy(BOLE_SOURCE_DIR "/tests/install/outside", outside);
+    std::ofstream(outside / "main.cpp") << program;
+    std::string command = BOLE_CMAKE " -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=" BOLE_COMPILER " " +
+                          arguments + " -S " + outside.string() + " -B " + build.string();
+    if (*BOLE_SANITIZERS != '\0')
+      command += " -DCMAKE_CXX_FLAGS=-fsanitize=" BOLE_SANITIZERS;
+    const Outcome configured = bole::test::runShell(command);
+    m_configured = configured.text;
+    EXPECT_EQ(configured.status, 0) << m_configured;
+    return build;
+  }
+
+  std::string m_configured; ///< what CMake printed
   inline static fs::path s_folder, s_prefix;
   inline static Outcome s_installed;
 };
@@ -57,27 +81,34 @@ protected:
 
 TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
 {
-  const fs::path outside = s_folder / "outside", build = s_folder / "build";
-  fs::copy(BOLE_SOURCE_DIR "/tests/install/outside", outside);
   const std::string program = readmeProgram();
-  ASSERT_THAT(program, HasSubstr("int main()"));
-  std::ofstream(outside / "main.cpp") << program;
-
-  std::string configure = BOLE_CMAKE " -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=" BOLE_COMPILER
-                                     " -DCMAKE_PREFIX_PATH=" +
-                          s_prefix.string() + " -S " + outside.string() + " -B " + build.string();
-  const std::string sanitizers = BOLE_SANITIZERS;
-  if (!sanitizers.empty())
-    configure += " -DCMAKE_CXX_FLAGS=-fsanitize=" + sanitizers;
-  const Outcome configured = bole::test::runShell(configure);
-  ASSERT_EQ(configured.status, 0) << configured.text;
-  EXPECT_THAT(configured.text, HasSubstr("data in " + (s_prefix / "share/bole").string()));
+  ASSERT_THAT(program, HasSubstr("int main("));
+  const fs::path build = configure("readme", program, "-DCMAKE_PREFIX_PATH=" + s_prefix.string());
+  EXPECT_THAT(m_configured, HasSubstr("data in " + (s_prefix / "share/bole").string()));
   const Outcome built = bole::test::runShell(BOLE_CMAKE " --build " + build.string());
   ASSERT_EQ(built.status, 0) << built.text;
 
   const Outcome ran =
       bole::test::runShell("cd " + (s_prefix / "share/bole").string() + " && " + (build / "outside").string());
   EXPECT_EQ(ran.status, 0) << ran.text;
+}
+
+TEST_F(Install, ABuildTreeIsFoundAsAnInstallationIs)
+{
+  const fs::path build = configure("build_tree", kProgram, "-Dbole_DIR=" BOLE_BINARY_DIR);
+  EXPECT_THAT(m_configured, HasSubstr("data in " BOLE_SOURCE_DIR));
+  const Outcome built = bole::test::runShell(BOLE_CMAKE " --build " + build.string() + " && " + build.string() +
+                                             "/outside " BOLE_SOURCE_DIR "/data/park-forward");
+  EXPECT_EQ(built.status, 0) << built.text;
+}
+
+// The library itself is not built a second time: the program is compiled, and the link is CMake's to arrange.
+TEST_F(Install, TheSourcesAreAPartOfAnotherProject)
+{
+  const fs::path build = configure("subdirectory", kProgram, "-DBOLE_SOURCES=" BOLE_SOURCE_DIR);
+  const Outcome built =
+      bole::test::runShell(BOLE_CMAKE " --build " + build.string() + " --target CMakeFiles/outside.dir/main.cpp.o");
+  EXPECT_EQ(built.status, 0) << built.text;
 }
 
 TEST_F(Install, NothingOfTheSourceOrBuildTreeIsNeeded)
@@ -87,12 +118,35 @@ TEST_F(Install, NothingOfTheSourceOrBuildTreeIsNeeded)
       EXPECT_THAT(textOf(entry.path()), testing::Not(HasSubstr(BOLE_SOURCE_DIR))) << entry.path();
 }
 
-TEST_F(Install, TheCommandFindsItsPresetsAndItsFlight)
+TEST_F(Install, TheCommandFindsItsPresetsAndItsFlightByName)
 {
-  const fs::path share = s_prefix / "share/bole", folder = s_folder / "run";
-  const Outcome ran = bole::test::runShell(
-      (s_prefix / "bin/bole").string() + " track " + (share / "data/park-forward").string() + " -o " + folder.string() +
-      " --config " + (share / "config/default.yaml").string() + " --no-video --frames 5");
+  const fs::path folder = s_folder / "run";
+  const Outcome ran =
+      bole::test::runShell("cd / && " + (s_prefix / "bin/bole").string() + " track park-forward --config default -o " +
+                           folder.string() + " --no-video --frames 5");
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_TRUE(fs::exists(folder / "trunks.csv"));
+}
+
+TEST_F(Install, TheCommandTellsItsVersions)
+{
+  const Outcome ran = bole::test::runShell((s_prefix / "bin/bole").string() + " --version");
+  EXPECT_THAT(ran.text,
+              testing::MatchesRegex("bole [0-9.]+( \\([0-9a-f]+(-dirty)?\\))?, ViSP [0-9.]+, OpenCV [0-9.]+.*\n"));
+}
+
+TEST_F(Install, EveryCommandHasAManPageAndIsCompleted)
+{
+  const std::string page = textOf(s_prefix / "share/man/man1/bole-track.1");
+  EXPECT_THAT(page, HasSubstr(".SH NAME\nbole\\-track \\- Map the trunks"));
+  EXPECT_THAT(page, HasSubstr("\\-\\-config VALUE"));
+  EXPECT_THAT(textOf(s_prefix / "share/man/man1/bole.1"), HasSubstr("bole\\-evaluate(1)"));
+
+  const Outcome completed =
+      bole::test::runShell("bash -c '. " + (s_prefix / "share/bash-completion/completions/bole").string() +
+                           "; COMP_WORDS=(bole track --conf); COMP_CWORD=2; _bole; echo ${COMPREPLY[@]}; "
+                           "COMP_WORDS=(bole ev); COMP_CWORD=1; "
+                           "_bole; echo ${COMPREPLY[@]}'");
+  EXPECT_EQ(completed.text, "--config\nevaluate\n");
+  EXPECT_THAT(textOf(s_prefix / "share/zsh/site-functions/_bole"), HasSubstr("'--config["));
 }

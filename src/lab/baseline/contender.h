@@ -5,12 +5,11 @@
 
 #include "lab/baseline/test_flight.h"
 
+#include <bole/vpMbTrunkTracker.h>
+
 #include <memory>
 #include <string>
 #include <vector>
-
-class vpMbTracker;
-class vpMbTrunkTracker;
 
 namespace bole
 {

@@ -47,8 +47,6 @@ void RayScene::attach(const QuadMesh &mesh, unsigned id)
 
 bool RayScene::occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &direction, double reach) const
 {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay ray{};
   ray.org_x = static_cast<float>(from.x());
   ray.org_y = static_cast<float>(from.y());
@@ -59,15 +57,12 @@ bool RayScene::occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &dire
   ray.tnear = 0.01f;
   ray.tfar = static_cast<float>(reach);
   ray.mask = 0xffffffffu;
-  rtcOccluded1(m_scene, &context, &ray);
+  embree::occluded(m_scene, ray);
   return ray.tfar < 0;
 }
 
 void RayScene::intersect(const int *valid, RTCRayHit16 &rays) const
 {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(valid, m_scene, &context, &rays);
+  embree::intersectCoherent(valid, m_scene, rays);
 }
 } // namespace bole

@@ -3,9 +3,8 @@
 /// \file
 /// The meshes of a forest in Embree's hands, freed with this object.
 
+#include "lab/simulation/embree.h"
 #include "lab/simulation/forest_mesh.h"
-
-#include <embree3/rtcore.h>
 
 namespace bole
 {
