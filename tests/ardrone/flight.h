@@ -3,6 +3,7 @@
 /// \file
 /// A made-up flight with known motion, and an emulator that flies it.
 
+#include "ardrone/drone_link.h"
 #include "geometry/so3.h"
 #include "lab/emulator/emulator.h"
 #include <bole/ardrone_source.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
 #include "ardrone/video_decoder.h"
+#include "lab/emulator/h264_encoder.h"
 
 #include "flight.h"
 
@@ -73,7 +74,7 @@ Bytes damaged(Bytes frame, Damage damage)
 /// Numbers of the frames that are `ok` when \p frames come one by one.
 std::vector<std::uint32_t> whole(const std::vector<Bytes> &frames)
 {
-  VideoDecoder decoder(2);
+  DroneVideoDecoder decoder(2);
   std::vector<std::uint32_t> numbers;
   for (const Bytes &bytes : frames)
     for (const DecodedFrame &frame : decoder.decode(bytes.data(), bytes.size()))
@@ -83,7 +84,7 @@ std::vector<std::uint32_t> whole(const std::vector<Bytes> &frames)
 }
 } // namespace
 
-TEST(VideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
+TEST(DroneVideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
 {
   const auto good = encodedFlight(50);
   ASSERT_EQ(whole(good).size(), 50u);
