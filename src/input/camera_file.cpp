@@ -73,18 +73,6 @@ void readDistortion(const SensorYaml &yaml, CameraModel &model)
     model.distortion = Distortion::none;
 }
 
-MountedCamera readYaml(const std::string &path)
-{
-  if (const SensorYaml any(path, {}); any.has("camera_matrix"))
-    return readCalibration(any);
-  const SensorYaml yaml(path, kCameraKeys);
-  MountedCamera camera;
-  camera.model.pinhole = readPinhole(yaml);
-  readDistortion(yaml, camera.model);
-  camera.bMc = yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : forwardCamera();
-  return camera;
-}
-
 /// OpenCV's calibration, and ROS's camera_info, which has the same keys. The camera looks straight ahead.
 MountedCamera readCalibration(const SensorYaml &yaml)
 {
@@ -120,6 +108,18 @@ MountedCamera readCalibration(const SensorYaml &yaml)
   if (model == "plumb_bob" && d[4] != 0 && foldThirdCoefficient(pinhole, d[4], d[0], d[1]) > kLargestRest_px)
     yaml.fail("distortion_coefficients", "radial by two coefficients to 1 px: calibrate with k3 = 0 (CALIB_FIX_K3)");
   std::copy_n(d.begin(), 4, camera.model.coefficients.begin());
+  return camera;
+}
+
+MountedCamera readYaml(const std::string &path)
+{
+  if (const SensorYaml any(path, {}); any.has("camera_matrix"))
+    return readCalibration(any);
+  const SensorYaml yaml(path, kCameraKeys);
+  MountedCamera camera;
+  camera.model.pinhole = readPinhole(yaml);
+  readDistortion(yaml, camera.model);
+  camera.bMc = yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : forwardCamera();
   return camera;
 }
 

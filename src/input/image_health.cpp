@@ -323,9 +323,13 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
     agreement.reset();
     return ImageFault::none;
   }
+  const double focal = motion.focal_px * small.cols / last.cols;
+  if ((focal * shiftOf(*gyro)).cwiseAbs().maxCoeff() > 0.4 * kSearchShare * small.cols) {
+    agreement.reset(); // farther than images are searched for each other
+    return ImageFault::none;
+  }
   const Match moved = previous.data == thumb.data ? with_last : match(previous, small);
   GyroAgreement::Interval interval;
-  const double focal = motion.focal_px * small.cols / last.cols;
   interval.image = Eigen::Vector2d(moved.x, moved.y) / focal;
   interval.gyro = shiftOf(*gyro);
   interval.is_sure = moved.correlation > kSureMatch;

@@ -48,6 +48,27 @@ TEST(Navdata, ReadsEveryOptionOfAPacketThatADroneSent)
   EXPECT_FLOAT_EQ(navdata.physical->acceleration_mg.z(), -942.52832f);
 }
 
+TEST(Navdata, LeavesOutWhatNoDroneCanDo)
+{
+  const auto readBack = [](const Navdata &sent) {
+    const auto bytes = encodeNavdata(sent);
+    Navdata read;
+    EXPECT_EQ(parseNavdata(bytes.data(), bytes.size(), read), NavdataError::none);
+    return read;
+  };
+  Navdata sent = example();
+  sent.demo->velocity_mm_s.x() = 1e30f;
+  EXPECT_FALSE(readBack(sent).demo);
+  EXPECT_TRUE(readBack(sent).physical);
+  sent = example();
+  sent.demo->altitude_mm = 2'000'000'000;
+  EXPECT_FALSE(readBack(sent).demo);
+  sent = example();
+  sent.physical->rate_deg_s.z() = -1e9f;
+  EXPECT_FALSE(readBack(sent).physical);
+  EXPECT_TRUE(readBack(sent).demo);
+}
+
 TEST(Navdata, ReadsBackWhatItEncodes)
 {
   const Navdata sent = example();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
+#include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
 #include "lab/emulator/h264_encoder.h"
 
@@ -106,4 +107,29 @@ TEST(DroneVideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWhere
   RecordProperty("most_frames_lost", static_cast<int>(longest));
   EXPECT_LE(longest, kKeyInterval);
   EXPECT_GT(longest, 0u);
+}
+
+TEST(DroneVideoDecoder, DatagramsThatCannotBeAPictureAreNoFrames)
+{
+  DroneVideoDecoder decoder(1);
+  const Bytes tiny(12, 0xA5);
+  for (int k = 0; k < 10'000; ++k)
+    EXPECT_TRUE(decoder.decode(tiny.data(), tiny.size()).empty());
+  EXPECT_EQ(decoder.counters().refused, 10'000u);
+  EXPECT_EQ(decoder.counters().frames, 0u);
+}
+
+TEST(DroneVideoDecoder, ADatagramThatWasOvertakenIsNoFrame)
+{
+  test::MadeUpFlight flight(4);
+  std::vector<Bytes> pictures;
+  for (Frame frame; flight.next(frame);)
+    pictures.push_back(encodeUvlc(frame.image, static_cast<std::uint32_t>(frame.index + 1)));
+  DroneVideoDecoder decoder(1);
+  std::vector<std::uint32_t> numbers;
+  for (const std::size_t k : {0u, 2u, 1u, 2u, 3u})
+    for (const DecodedFrame &frame : decoder.decode(pictures[k].data(), pictures[k].size()))
+      numbers.push_back(frame.number);
+  EXPECT_EQ(numbers, (std::vector<std::uint32_t>{1, 3, 4}));
+  EXPECT_EQ(decoder.counters().refused, 2u);
 }

@@ -114,6 +114,17 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
       {"mav0/odom0/data.csv", "900000000000,0,0,1,1,0,0,0\n", "never meet"},
       {"mav0/imu0/data.csv", "0,0,0,inf\n", "imu0/data.csv:1: w_z = \"inf\""},
       {"mav0/imu0/data.csv", "0.5,0,0,0\n", "imu0/data.csv:1: timestamp = \"0.5\""},
+      {"mav0/imu0/data.csv", "#h\n", "imu0/data.csv: no sample in it"},
+      {"mav0/imu0/data.csv", "0,17,0,0\n5000000,18,2,0\n", "looks like degrees per second"},
+      {"mav0/imu0/data.csv",
+       "0,0,0,0\n5,0,0,0\n10,0,0,0\n15,0,0,0\n20,0,0,0\n25,0,0,0\n30,0,0,0\n35,0,0,0\n40,0,0,0\n45,0,0,0\n",
+       "must be in nanoseconds"},
+      {"mav0/imu0/data.csv", "0,0,142302,0,282068,-0,176885\n",
+       "imu0/data.csv:1: the decimals look as if written with a comma"},
+      {"mav0/imu0/data.csv", "900000000000,0,0,0\n", "never meet those of the images"},
+      {"mav0/odom0/data.csv", "0;0;0;1;1;0;0;0\n", "semicolons"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,1e9,0,1,1,0,0,0\n", "odom0/data.csv:2: position"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,900,0,1,1,0,0,0\n", "odom0/data.csv:2: speed"},
       {"mav0/cam0/data.csv", "100,a.png\n50,b.png\n", "cam0/data.csv:2: timestamp = 50 ns"},
       {"mav0/cam0/data.csv", "#nothing\n", "cam0/data.csv: no image"},
       {"mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\nfoo: 1\n",
@@ -129,6 +140,16 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
     flight.write(c.file, c.text);
     EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message)) << c.text;
   }
+}
+
+TEST(AslSource, ReadsAByteOrderMarkAndAHeaderWithoutItsSign)
+{
+  FlightFolder flight(3);
+  flight.write("mav0/odom0/data.csv",
+               "\xEF\xBB\xBFtimestamp,x,y,z,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n200000000,0.2,0,1,1,0,0,0\n");
+  flight.write("mav0/imu0/data.csv", "\xEF\xBB\xBF#timestamp\n0,0,0,0\n100000000,0,0,0\n");
+  AslSource source(flight.path());
+  EXPECT_TRUE(readAll(source)[1].wMb_odometry);
 }
 
 TEST(AslSource, RefusesFoldersThatAreNoFlight)
