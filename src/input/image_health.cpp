@@ -1,24 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/image_health.h"
 #include "input/gyro_agreement.h"
+#include "input/image_measures.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
+#include <vector>
 
 namespace bole
 {
 namespace
 {
-constexpr int kThumbWidth = 80;         // px: a trunk is still a column of it
-constexpr double kSearchShare = 0.15;   // of the thumb's width: how far two frames are searched for each other
 constexpr std::size_t kMemory = 8;      // accepted images that tell what is usual
 constexpr double kMinDeviation = 3;     // grey levels: below, an image is blank
 constexpr int kDarkLevel = 24;          // 99 % of the pixels below: no more than the camera's own noise
-constexpr int kBrightLevel = 250;       // grey level
 constexpr double kBrightShare = 0.65;   // of the pixels: beyond, no trunk is left between the flares
 constexpr double kMaxRoughness = 0.75;  // difference of neighbours over deviation; white noise has 1.1
 constexpr double kNoiseFactor = 1.8;    // times the usual noise, and
@@ -34,128 +32,6 @@ constexpr double kFlipGain = 0.3;       // correlation that an exchange of sides
 constexpr double kFlipLeast = 0.6;      // correlation that it must reach
 constexpr int kLastsMost = 30;          // frames that blur and noise are refused before they count as usual
 constexpr int kJumpsMost = 5;           // frames out of order before the new place is believed
-
-struct Numbers
-{
-  double deviation = 0, roughness = 0, repeated = 0, noise = 0, sharpness = 0, bright_share = 0;
-  int level_99 = 255; ///< 99 % of the pixels are below
-};
-
-struct Match
-{
-  double correlation = -1;
-  double x = 0, y = 0; ///< pixels of the thumb
-};
-
-/// Rows or columns that repeat their neighbour to an eighth of a grey level a pixel.
-double repeatedShare(const cv::Mat &I)
-{
-  int rows = 0, columns = 0;
-  for (int v = 1; v < I.rows; ++v) {
-    const unsigned char *row = I.ptr(v), *above = I.ptr(v - 1);
-    int difference = 0;
-    for (int u = 1; u < I.cols; u += 4)
-      difference += std::abs(row[u] - above[u]);
-    rows += difference * 8 < I.cols / 4 ? 1 : 0;
-  }
-  std::vector<int> differences(static_cast<std::size_t>(I.cols), 0);
-  for (int v = 0; v < I.rows; v += 8) {
-    const unsigned char *row = I.ptr(v);
-    for (int u = 4; u < I.cols; ++u)
-      differences[static_cast<std::size_t>(u)] += std::abs(row[u] - row[u - 1]);
-  }
-  for (int u = 4; u < I.cols; ++u)
-    columns += differences[static_cast<std::size_t>(u)] * 8 < I.rows / 8 ? 1 : 0;
-  return std::max(static_cast<double>(rows) / I.rows, static_cast<double>(columns) / I.cols);
-}
-
-/// One pass over every fourth column: levels, differences of neighbours, noise and sharpness.
-Numbers measure(const cv::Mat &I)
-{
-  Numbers numbers;
-  std::array<long, 256> histogram{};
-  long n = 0, rough = 0, mixed = 0, sharp = 0;
-  for (int v = 2; v + 2 < I.rows; ++v) {
-    const unsigned char *a = I.ptr(v - 1), *b = I.ptr(v), *c = I.ptr(v + 1);
-    const unsigned char *above = I.ptr(v - 2), *below = I.ptr(v + 2);
-    for (int u = 2 + v % 4; u + 2 < I.cols; u += 4, ++n) {
-      ++histogram[b[u]];
-      rough += std::abs(b[u] - b[u - 1]);
-      // Second difference in both directions: blind to edges, sees noise.
-      mixed += std::abs(a[u - 1] - 2 * a[u] + a[u + 1] - 2 * (b[u - 1] - 2 * b[u] + b[u + 1]) + c[u - 1] - 2 * c[u] +
-                        c[u + 1]);
-      // Curvature over two pixels of sums of three: sees fine structure more than noise.
-      const int across = (a[u - 2] + b[u - 2] + c[u - 2]) - 2 * (a[u] + b[u] + c[u]) + (a[u + 2] + b[u + 2] + c[u + 2]);
-      const int down = (above[u - 1] + above[u] + above[u + 1]) - 2 * (b[u - 1] + b[u] + b[u + 1]) +
-                       (below[u - 1] + below[u] + below[u + 1]);
-      sharp += std::abs(across) + std::abs(down);
-    }
-  }
-  double sum = 0, squares = 0;
-  long below_count = 0;
-  for (int g = 0; g < 256; ++g) {
-    const auto count = static_cast<double>(histogram[static_cast<std::size_t>(g)]);
-    sum += g * count;
-    squares += static_cast<double>(g) * g * count;
-    if (g >= kBrightLevel)
-      numbers.bright_share += count / static_cast<double>(n);
-    below_count += histogram[static_cast<std::size_t>(g)];
-    if (static_cast<double>(below_count) < 0.99 * static_cast<double>(n))
-      numbers.level_99 = g + 1;
-  }
-  numbers.level_99 = std::min(numbers.level_99, 255);
-  const auto count = static_cast<double>(n);
-  numbers.deviation = std::sqrt(std::max(0.0, squares / count - sum * sum / count / count));
-  const double deviation = std::max(numbers.deviation, 1e-6);
-  numbers.roughness = static_cast<double>(rough) / count / deviation;
-  numbers.noise = static_cast<double>(mixed) / count * std::sqrt(M_PI / 2) / 6;
-  numbers.sharpness = static_cast<double>(sharp) / count / deviation;
-  numbers.repeated = repeatedShare(I);
-  return numbers;
-}
-
-cv::Mat thumbOf(const cv::Mat &I)
-{
-  const int width = std::min(kThumbWidth, I.cols);
-  cv::Mat small, thumb;
-  cv::resize(I, small, {width, std::max(1, I.rows * width / I.cols)}, 0, 0, cv::INTER_AREA);
-  small.convertTo(thumb, CV_32F);
-  return thumb;
-}
-
-double parabola(float left, float centre, float right)
-{
-  const double curvature = left - 2 * centre + right;
-  return curvature < -1e-9 ? 0.5 * (left - right) / curvature : 0;
-}
-
-/// Shift s at which now(u) = before(u + s).
-Match match(const cv::Mat &before, const cv::Mat &now)
-{
-  const int reach_x = static_cast<int>(kSearchShare * now.cols);
-  const int reach_y = std::min(reach_x / 2 + 1, now.rows / 4);
-  const cv::Rect inner(reach_x, reach_y, now.cols - 2 * reach_x, now.rows - 2 * reach_y);
-  cv::Mat response;
-  cv::matchTemplate(before, now(inner), response, cv::TM_CCOEFF_NORMED);
-  double value = -1;
-  cv::Point at;
-  cv::minMaxLoc(response, nullptr, &value, nullptr, &at);
-  Match result{value, static_cast<double>(at.x - reach_x), static_cast<double>(at.y - reach_y)};
-  if (at.x > 0 && at.x + 1 < response.cols)
-    result.x +=
-        parabola(response.at<float>(at.y, at.x - 1), static_cast<float>(value), response.at<float>(at.y, at.x + 1));
-  if (at.y > 0 && at.y + 1 < response.rows)
-    result.y +=
-        parabola(response.at<float>(at.y - 1, at.x), static_cast<float>(value), response.at<float>(at.y + 1, at.x));
-  return result;
-}
-
-double changeBetween(const cv::Mat &a, const cv::Mat &b)
-{
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(b - a, mean, deviation); // an exposure that changes is no motion
-  return deviation[0];
-}
 
 double medianOf(const std::deque<double> &values)
 {
@@ -228,11 +104,11 @@ struct ImageHealth::State
     return fault;
   }
   void addMotion(const MeasuredRotation &motion);
-  ImageFault judgeAlone(const Numbers &numbers);
-  ImageFault judgeQuality(const Numbers &numbers);
+  ImageFault judgeAlone(const ImageNumbers &numbers);
+  ImageFault judgeQuality(const ImageNumbers &numbers);
   ImageFault judgeFrozen(const cv::Mat &image, const cv::Mat &small);
   ImageFault judgeOrder(const cv::Mat &small, const MeasuredRotation &motion);
-  void accept(const cv::Mat &image, const cv::Mat &small, const Numbers &numbers);
+  void accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers);
 };
 
 void ImageHealth::State::addMotion(const MeasuredRotation &motion)
@@ -249,7 +125,7 @@ void ImageHealth::State::addMotion(const MeasuredRotation &motion)
 }
 
 /// What an image shows by itself.
-ImageFault ImageHealth::State::judgeAlone(const Numbers &numbers)
+ImageFault ImageHealth::State::judgeAlone(const ImageNumbers &numbers)
 {
   if (numbers.bright_share > kBrightShare)
     return say(ImageFault::saturated, fmt::format("saturated: {:.0f} % of the pixels", 100 * numbers.bright_share));
@@ -259,17 +135,17 @@ ImageFault ImageHealth::State::judgeAlone(const Numbers &numbers)
     return say(ImageFault::black, fmt::format("dark: 99 % of the pixels below grey level {}", numbers.level_99));
   if (numbers.roughness > kMaxRoughness)
     return say(ImageFault::noise, "nothing but noise");
-  if (numbers.repeated > good_repeated + kRepeatedShare)
-    return say(ImageFault::smeared,
-               fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
   return ImageFault::none;
 }
 
-/// Noise and sharpness against what is usual.
-ImageFault ImageHealth::State::judgeQuality(const Numbers &numbers)
+/// Noise, sharpness and repeated rows against what is usual.
+ImageFault ImageHealth::State::judgeQuality(const ImageNumbers &numbers)
 {
   ImageFault fault = ImageFault::none;
-  if (noises.size() >= 2) {
+  if (numbers.repeated > good_repeated + kRepeatedShare)
+    fault = say(ImageFault::smeared,
+                fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
+  else if (noises.size() >= 2) {
     const double usual = medianOf(noises) * numbers.deviation, usual_sharpness = medianOf(sharpnesses);
     if (numbers.noise > kNoiseFactor * usual && numbers.noise > usual + kNoiseAdded)
       fault = say(ImageFault::noise, fmt::format("noise of {:.0f} grey levels after {:.0f}", numbers.noise, usual));
@@ -280,7 +156,8 @@ ImageFault ImageHealth::State::judgeQuality(const Numbers &numbers)
   bad_quality = fault == ImageFault::none ? 0 : bad_quality + 1;
   if (bad_quality <= kLastsMost)
     return fault;
-  noises.clear(); // the camera is another one now
+  good_repeated = numbers.repeated; // the camera is another one now
+  noises.clear();
   sharpnesses.clear();
   bad_quality = 0;
   return ImageFault::none;
@@ -308,12 +185,12 @@ ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &
 /// Against the images before and the gyro.
 ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRotation &motion)
 {
-  const Match with_last = match(thumb, small);
+  const ImageMatch with_last = matchImages(thumb, small);
   if (with_last.correlation < kFlipLeast) {
     cv::Mat flipped;
     for (const int code : {-1, 1}) {
       cv::flip(small, flipped, code);
-      const double other = match(thumb, flipped).correlation;
+      const double other = matchImages(thumb, flipped).correlation;
       if (other > kFlipLeast && other > with_last.correlation + kFlipGain)
         return code == -1 ? say(ImageFault::upside_down, "upside down against the frame before")
                           : say(ImageFault::mirrored, "mirrored against the frame before");
@@ -328,7 +205,7 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
     agreement.reset(); // farther than images are searched for each other
     return ImageFault::none;
   }
-  const Match moved = previous.data == thumb.data ? with_last : match(previous, small);
+  const ImageMatch moved = previous.data == thumb.data ? with_last : matchImages(previous, small);
   GyroAgreement::Interval interval;
   interval.image = Eigen::Vector2d(moved.x, moved.y) / focal;
   interval.gyro = shiftOf(*gyro);
@@ -356,7 +233,7 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
   return ImageFault::none;
 }
 
-void ImageHealth::State::accept(const cv::Mat &image, const cv::Mat &small, const Numbers &numbers)
+void ImageHealth::State::accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers)
 {
   if (!thumb.empty())
     remember(changes, changeBetween(thumb, small));
@@ -383,7 +260,7 @@ void ImageHealth::start(const vpImage<unsigned char> &I)
   m_state->options = options;
   const cv::Mat image(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
   const cv::Mat small = thumbOf(image);
-  m_state->accept(image, small, measure(image));
+  m_state->accept(image, small, measureImage(image));
   m_state->previous = small;
 }
 
@@ -401,7 +278,7 @@ ImageFault ImageHealth::check(const vpImage<unsigned char> &I, const MeasuredRot
                  fmt::format("image of {}x{} px, must be {}x{}", image.cols, image.rows, s.last.cols, s.last.rows));
   if (I.getWidth() < kSmallest_px || I.getHeight() < kSmallest_px)
     return ImageFault::none;
-  const Numbers numbers = measure(image);
+  const ImageNumbers numbers = measureImage(image);
   ImageFault fault = s.judgeAlone(numbers);
   if (fault == ImageFault::none && !s.last.empty())
     fault = s.judgeQuality(numbers);

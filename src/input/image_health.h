@@ -10,7 +10,7 @@
 /// camera but for the parallax.
 ///
 /// Limits are in grey levels, in shares, and in multiples of what the flight showed so far, so that they hold for every
-/// camera. A camera that really has changed for good (a drop on the lens) is believed again after a second.
+/// camera. A camera that really has changed for good (a drop on the lens) is believed again after 30 images.
 
 #include <Eigen/Core>
 
@@ -51,7 +51,7 @@ struct MeasuredRotation
 /// Remembers what the flight looked like. Cost: about 0.3 ms at 320x240. Not thread-safe.
 ///
 /// Laws (each a test): an image is never accepted as new within the flight when 99.9 % of its pixels are those of the
-/// last accepted one; a fault that lasts is named anew for each image, blur and noise for a second at most.
+/// last accepted one; a fault that lasts is named anew for each image, smear, blur and noise for 30 images at most.
 class ImageHealth
 {
 public:

@@ -2,6 +2,8 @@
 #include "flight_folder.h"
 #include "messages.h"
 
+#include "input/image_file.h"
+
 #include "input/asl_source.h"
 
 #include <gmock/gmock.h>
@@ -73,6 +75,44 @@ TEST(AslSource, EveryTruncationOfAPngIsCorrupt)
     flight.truncateImage(1, size);
     AslSource source(flight.path());
     EXPECT_EQ(readAll(source)[1].status, FrameStatus::corrupt) << size;
+  }
+}
+
+TEST(AslSource, AHugePictureAmongSmallOnesIsNotDecoded)
+{
+  FlightFolder flight(3);
+  std::fstream file(flight.imagePath(1), std::ios::in | std::ios::out | std::ios::binary);
+  const char header[] = {0, 0, 0x7D, 0, 0, 0, 0x7D, 0, 8, 0, 0, 0, 0}; // IHDR of 32000x32000, 8 bit, grey
+  std::string chunk = std::string("IHDR") + std::string(header, sizeof header);
+  std::uint32_t crc = 0xFFFFFFFFu;
+  for (const char byte : chunk) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int k = 0; k < 8; ++k)
+      crc = (crc & 1) ? 0xEDB88320u ^ (crc >> 1) : crc >> 1;
+  }
+  crc = ~crc;
+  file.seekp(12);
+  file.write(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+  for (int k = 3; k >= 0; --k)
+    file.put(static_cast<char>(crc >> (8 * k)));
+  file.close();
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+  EXPECT_EQ(frames[1].status, FrameStatus::resized);
+  EXPECT_THAT(frames[1].message, HasSubstr("image of 32000x32000 px, must be 64x48"));
+  EXPECT_EQ(frames[2].status, FrameStatus::ok);
+}
+
+TEST(AslSource, ATiffThatWasCutOffIsCorrupt)
+{
+  FlightFolder flight(2);
+  const std::string path = flight.path() + "/whole.tiff";
+  ASSERT_TRUE(cv::imwrite(path, cv::imread(flight.imagePath(1), cv::IMREAD_GRAYSCALE)));
+  EXPECT_EQ(readImageFile(path).status, FrameStatus::ok) << readImageFile(path).message;
+  const auto size = std::filesystem::file_size(path);
+  for (const double share : {0.95, 0.5, 0.1}) {
+    std::filesystem::resize_file(path, static_cast<std::uintmax_t>(share * static_cast<double>(size)));
+    EXPECT_EQ(readImageFile(path).status, FrameStatus::corrupt) << share;
   }
 }
 
