@@ -38,9 +38,8 @@ void report(const StatusCounts &counts, const LinkCounters &link, std::size_t by
 
 void run(const Arguments &arguments)
 {
-  const ArDroneAddress address = ArDroneAddress::parse(arguments.address);
   RecordingWriter raw(arguments.folder);
-  ArDroneSource source(address, arguments.source,
+  ArDroneSource source(arguments.address, arguments.source,
                        [&raw](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data,
                               std::size_t size) { raw.write(channel, arrival_ns, data, size); });
   std::unique_ptr<FlightFolder> folder;

@@ -7,7 +7,6 @@
 #include "overlay_window.h"
 #include "track_output.h"
 
-#include "input/video_source.h"
 #include "output/progress.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>
@@ -62,13 +61,7 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments, std::string &
     return openVideo(arguments, note);
   ArDroneSource::Options options;
   options.give_up_s = arguments.give_up_s;
-  return std::make_unique<ArDroneSource>(ArDroneAddress::parse(arguments.input), options);
-}
-
-bool isCompressed(const FrameSource &source)
-{
-  return dynamic_cast<const ArDroneSource *>(&source) != nullptr ||
-         dynamic_cast<const VideoSource *>(&source) != nullptr;
+  return std::make_unique<ArDroneSource>(arguments.input, options);
 }
 
 StageOptions readOptions(const Arguments &arguments, bool is_compressed)
@@ -149,14 +142,14 @@ void track(const Arguments &arguments)
   readOptions(arguments, false); // a mistake in them is said before the input is waited for
   std::string note;
   const auto source = openInput(arguments, note);
-  StageOptions options = readOptions(arguments, isCompressed(*source));
+  StageOptions options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   options.visual.focal_known = options.visual.focal_known && source->isCameraKnown();
   if (!note.empty())
     std::fprintf(stderr, "bole: %s\n", note.c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
-  const std::string preset = arguments.config.empty() && isCompressed(*source) ? "compressed" : arguments.config;
+  const std::string preset = arguments.config.empty() && source->isCompressed() ? "compressed" : arguments.config;
   TrackOutput output(arguments.run, arguments.input, preset, *source, note, arguments.has_video);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);

@@ -3,9 +3,8 @@
 /// \file
 /// A live drone as a source of frames for the pipeline.
 
-#include "input/camera_file.h"
-#include "input/rectifier.h"
 #include <bole/frame.h>
+#include <bole/open_source.h>
 #include <bole/vpArDroneGrabber.h>
 
 #include <memory>
@@ -42,11 +41,11 @@ public:
     void validate() const;
   };
 
-  /// Connects and waits for the first whole frame whose motion is known (see ClockFit::isReady(); the
+  /// Connects and waits for the first whole frame whose motion is known (the
   /// first whole one where no navdata come); throws vpException when none comes, for a wrong
   /// address or camera file, and for a camera of another shape.
   explicit ArDroneSource(const std::string &address);
-  ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap = {});
+  ArDroneSource(const std::string &address, const Options &options, LinkTap tap = {});
   ~ArDroneSource() override;
 
   bool next(Frame &frame) override;
@@ -55,6 +54,7 @@ public:
   std::string name() const override;
   bool hasOdometry() const override { return true; }
   bool hasGyro() const override;
+  bool isCompressed() const override { return true; }
 
   void stop() noexcept;
   LinkCounters counters() const;
@@ -65,7 +65,7 @@ public:
   const LiveFrame &liveFrame() const;
 
   /// Whether \p address is one for this source.
-  static bool accepts(const std::string &address) { return ArDroneAddress::accepts(address); }
+  static bool accepts(const std::string &address);
 
 private:
   struct State;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What enters the pipeline: frames with a timestamp, a status, and the motion sensors' word on
-/// them.
+/// What enters the pipeline: frames with a timestamp, a status, and what the motion sensors measured.
 
 #include <bole/camera.h>
 #include <bole/pose.h>
@@ -23,7 +22,8 @@ enum class FrameStatus
   stale,   ///< the same image again: a frozen camera or a decoder that repeats its last picture
   corrupt, ///< could not be decoded (whole or part): do not trust the pixels
   missing, ///< the source says that a frame should be here, and it is not; the image is empty
-  resized  ///< not the size of the frames before: not used
+  resized, ///< not the size of the frames before: not used
+  doubtful ///< decoded, and no picture of this place at this time: dark, noise, smeared, out of order, late
 };
 const char *toString(FrameStatus status);
 
@@ -72,6 +72,8 @@ public:
   virtual bool hasGyro() const = 0;
   /// False where the focal length is a guess.
   virtual bool isCameraKnown() const { return true; }
+  /// Whether the images went through a lossy codec at a low rate: a video file, a drone's video link.
+  virtual bool isCompressed() const { return false; }
   /// What the user should be told about how the input is read (an assumed camera); empty when
   /// nothing.
   virtual std::string note() const { return {}; }

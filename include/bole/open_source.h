@@ -1,13 +1,64 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// One door to every kind of recording.
+/// One door to every kind of recording, and how recordings are read.
 
 #include <bole/frame.h>
-#include <bole/source_options.h>
+
+#include <memory>
+#include <string>
 
 namespace bole
 {
+/// A calibrated camera and where it sits in the body.
+struct MountedCamera
+{
+  CameraModel model;
+  Pose bMc;
+};
+
+/// Pose in the body (x forward, y left, z up) of a camera at its origin that looks straight ahead.
+Pose forwardCamera();
+
+/// Reads a camera: EuRoC, OpenCV or ROS YAML (`.yaml`, `.yml`) or ViSP XML (`.xml`).
+///
+/// YAML: keys of the EuRoC datasets and no others; distortion_model is `none`, `radial-tangential`
+/// (or `radtan`; k1 k2 p1 p2, a fifth coefficient must be 0), `equidistant` (k1 .. k4) or `fov` (s
+/// [rad]). `T_BS` takes coordinates of the camera to those of the body; without it the camera is
+/// forwardCamera(). XML: read by vpXmlParserCamera, the model with distortion where there is one
+/// (kud becomes k1); a file with several cameras is resolved by \p width and \p height [px], 0 for
+/// any.
+///
+/// A file with the key `camera_matrix` is a calibration of OpenCV or ROS: the camera is forwardCamera(), a third radial
+/// coefficient is folded into the other two.
+///
+/// Errors: vpException "file:line: key = value, must be ..." for an unknown, repeated, missing,
+/// mistyped or out-of-range key, and for a T_BS that is not a rigid motion;
+/// "file: ..." for a camera that cannot be one (field of view, distortion that folds the picture, place in the body).
+MountedCamera readCamera(const std::string &path, int width = 0, int height = 0);
+
+/// Options of every frame source. validate() throws vpException "name = value, must be ...".
+struct SourceOptions
+{
+  std::string camera_path;   ///< camera file (readCamera()); empty: the one of the folder, or a guess
+  std::string odometry_path; ///< trajectory file (readTrajectory()); empty: the one of the folder, or none
+  /// [s], added to the stamps of odometry_path so that they count as the video's do. Default 0.
+  double odometry_offset_s = 0;
+  /// [s], > 0: between odometry samples further apart than this nothing is interpolated. Default 1:
+  /// a body in flight is not where a straight line says after longer.
+  double max_odometry_gap_s = 1;
+  /// [Hz], > 0, 1e-3 to 1e4: rate of numbered images, which have no stamps of their own.
+  /// Default 25.
+  double frame_rate_hz = 25;
+  /// [px], 0 (keep) or >= 64: wider images are shrunk to this. Default 640: see Rectifier.
+  int max_width_px = 640;
+  /// [degrees], 10 to 150: horizontal field of view that is assumed, and said, where no camera is
+  /// given. Default 65: between a phone's video and an action camera's.
+  double field_of_view_deg = 65;
+
+  void validate() const;
+};
+
 /// Opens \p input: an ASL folder (AslSource), a pattern such as `image%04d.png` or a folder of
 /// numbered images (SequenceSource), or else a video file (VideoSource). Errors: vpException, one
 /// line that names the input and what is wrong with it.

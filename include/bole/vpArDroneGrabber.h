@@ -3,11 +3,81 @@
 /// \file
 /// AR.Drone 1 and 2 behind ViSP's grabber interface.
 
-#include "ardrone/drone_link.h"
+#include <bole/frame.h>
 
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <visp3/core/vpFrameGrabber.h>
+
+namespace bole
+{
+class DroneLink;
+struct LiveFrame;
+
+/// What navdata say of the body at one instant, in SI units and the axes x forward, y left, z up.
+struct BodyState
+{
+  std::int64_t stamp_ns = 0; ///< drone's navdata clock, unwrapped
+  Pose wMb;                  ///< integrated from the start; the world stands on the ground, z up
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
+  std::optional<Eigen::Vector3d> rate;                ///< [rad/s], body frame; with full navdata only
+  double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
+  double battery = 0;                                 ///< share of full, 0 to 1
+  std::uint32_t state = 0;                            ///< the drone's state word
+  std::uint32_t flight_phase = 0;                     ///< 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
+};
+
+/// What came of the video.
+struct VideoCounters
+{
+  std::size_t frames = 0; ///< given out, whatever their status
+  std::size_t ok = 0, corrupt = 0, stale = 0, resized = 0;
+  std::size_t refused = 0;       ///< datagrams that cannot be a picture, or come faster than any drone sends
+  std::size_t skipped = 0;       ///< never decoded, since a newer key frame was there
+  std::size_t resyncs = 0;       ///< times that the stream had to be searched for a header
+  std::size_t skipped_bytes = 0; ///< bytes that belonged to no frame
+};
+
+/// What came over the link so far.
+struct LinkCounters
+{
+  VideoCounters video;
+  std::size_t delivered = 0;       ///< frames given out
+  std::size_t frozen = 0;          ///< of them, stale
+  std::size_t dropped = 0;         ///< decoded, but a newer frame came before anyone asked
+  std::size_t connections = 0;     ///< of the video, the first one too
+  std::size_t clock_jumps = 0;     ///< of the video's clock: reboots
+  std::size_t navdata_packets = 0; ///< used
+  std::size_t navdata_refused = 0; ///< wrong checksum, cut
+  std::size_t navdata_late = 0;    ///< out of sequence
+  std::size_t navdata_restarts = 0;
+};
+
+/// What a received piece belongs to.
+enum class LinkChannel : std::uint8_t
+{
+  video = 1,
+  navdata = 2,
+  video_connected = 3
+};
+/// Sees every received byte first; called from the receiving threads, must be quick and
+/// thread-safe.
+using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)>;
+
+/// How the connection behaves.
+struct LinkOptions
+{
+  bool full_navdata = true; ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
+  double silence_s = 0.8;   ///< [s], (0.1, 30): a link this long silent is opened anew
+  double retry_s = 0.1;     ///< [s], (0.01, 5): pause between attempts
+  double frozen_m = 0.1;    ///< [m], (0, 10): a motion that no scene among trees can hide
+  double frozen_rad = 0.02; ///< [rad], (0, 3): 4 px at 320 columns
+  void validate() const;
+};
+} // namespace bole
 
 /// Grabs the newest image of an AR.Drone's front camera with the navdata of the same instant.
 ///
@@ -38,13 +108,22 @@ public:
   {
     double open_timeout_s = 5;    ///< [s], (0.1, 600): a key frame comes every half second
     double frame_timeout_s = 0.4; ///< [s], (0.02, 60): acquire() gives up then, the status is `missing`
-    bole::DroneLink::Options link;
+    bole::LinkOptions link;
     void validate() const;
   };
 
-  /// \param address see bole::ArDroneAddress; throws vpException when it is none.
+  /// \param address `ardrone://HOST[?key=value&...]`, `ardrone://` alone is the drone's own network, 192.168.1.1.
+  /// | key | meaning | default |
+  /// |---|---|---|
+  /// | `offset` | added to the three ports below, 0 .. 59000: several emulators on one machine | 0 |
+  /// | `navdata`, `video`, `at` | UDP, TCP (drone 2) or UDP (drone 1), UDP port | 5554, 5555, 5556 |
+  /// | `generation` | `1`, `2` or `auto`: tries the drone 2's TCP port first | `auto` |
+  /// | `camera` | camera file, readCamera() | the published calibration of the generation |
+  /// | `video_delay_ms` | from exposure to the arrival of the fastest frame, 0 .. 500 | 60 |
+  ///
+  /// Errors: vpException "address: key = value, must be ...".
   explicit vpArDroneGrabber(const std::string &address = "ardrone://192.168.1.1");
-  vpArDroneGrabber(const bole::ArDroneAddress &address, const Options &options, bole::LinkTap tap = {});
+  vpArDroneGrabber(const std::string &address, const Options &options, bole::LinkTap tap = {});
   ~vpArDroneGrabber() override;
 
   void open(vpImage<unsigned char> &I) override;
@@ -54,34 +133,28 @@ public:
   void close() override;
 
   // Of the image acquired last:
-  bole::FrameStatus getStatus() const { return m_frame.status; }
-  const std::string &getMessage() const { return m_frame.message; }
-  double getTimestamp() const { return static_cast<double>(m_frame.stamp_ns) * 1e-9; } ///< drone's clock [s]
-  std::uint32_t getFrameNumber() const { return m_frame.number; }
+  bole::FrameStatus getStatus() const;
+  const std::string &getMessage() const; ///< why the status is not ok
+  double getTimestamp() const;           ///< drone's clock [s]
+  std::uint32_t getFrameNumber() const;  ///< as the drone counts
   /// Attitude, rates, velocity, height, battery and state at the exposure; nothing where navdata
   /// are missing.
-  const std::optional<bole::BodyState> &getBody() const { return m_frame.body; }
-  const bole::LiveFrame &getFrame() const { return m_frame; }
+  const std::optional<bole::BodyState> &getBody() const;
 
   bole::LinkCounters getCounters() const;
-  /// The connection, for the navdata of now and for vpRobotArDrone. Throws vpException when not
-  /// open.
-  bole::DroneLink &getLink();
   /// Connects without waiting for an image: for programs that need navdata or commands only.
   void connect();
+
+  // For the library's own classes, whose types are private:
+  /// The connection. Throws vpException when not open.
+  bole::DroneLink &getLink();
+  /// The frame acquired last with everything that came with it.
+  const bole::LiveFrame &getFrame() const;
 
 private:
   void waitForFirstImage();
   void grab();
 
-  bole::ArDroneAddress m_address;
-  Options m_options;
-  bole::LinkTap m_tap;
-  std::unique_ptr<bole::DroneLink> m_link;
-  bole::LiveFrame m_frame;
-  struct Instant
-  {
-    std::int64_t stamp_ns = 0, arrival_ns = 0;
-  };
-  Instant m_last_whole; ///< of the frame before those that are missing
+  struct State;
+  std::unique_ptr<State> m_state;
 };

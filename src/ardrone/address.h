@@ -8,16 +8,7 @@
 
 namespace bole
 {
-/// Keys (all optional):
-/// | key | meaning | default |
-/// |---|---|---|
-/// | `offset` | added to the three ports below, 0 .. 59000: several emulators on one machine | 0 |
-/// | `navdata`, `video`, `at` | UDP, TCP (drone 2) or UDP (drone 1), UDP port | 5554, 5555, 5556 |
-/// | `generation` | `1`, `2` or `auto`: tries the drone 2's TCP port first | `auto` |
-/// | `camera` | camera file, readCamera() | the published calibration of the generation |
-/// | `video_delay_ms` | from exposure to the arrival of the fastest frame, 0 .. 500 | 60 |
-///
-/// `ardrone://` alone is the drone's own network, 192.168.1.1.
+/// Its keys are told of at vpArDroneGrabber.
 struct ArDroneAddress
 {
   std::string host = "192.168.1.1";

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/ardrone_source.h>
 
+#include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
+#include "input/frame_health.h"
+#include "input/rectifier.h"
 
 #include <atomic>
 #include <cmath>
@@ -50,8 +53,8 @@ MountedCamera publishedArDroneCamera(int generation, int width, int height)
 
 struct ArDroneSource::State
 {
-  State(const ArDroneAddress &a, const Options &o, LinkTap tap)
-      : address(a), options(o), grabber(a, o.grabber, std::move(tap))
+  State(const std::string &a, const Options &o, LinkTap tap)
+      : address(ArDroneAddress::parse(a)), options(o), grabber(a, o.grabber, std::move(tap))
   {
   }
 
@@ -60,6 +63,7 @@ struct ArDroneSource::State
   vpArDroneGrabber grabber;
   MountedCamera mounted;
   std::unique_ptr<Rectifier> rectifier;
+  std::optional<FrameHealth> health;
   std::atomic<bool> running{true};
   bool first_is_waiting = false; // the frame that the constructor waited for
   std::size_t index = 0;
@@ -76,6 +80,7 @@ struct ArDroneSource::State
       mounted.model = fitted(mounted.model, width, height, address.camera_path);
     }
     rectifier = std::make_unique<Rectifier>(mounted.model, options.max_width_px);
+    health.emplace(mounted.model.pinhole, mounted.bMc);
   }
 
   /// The first frames have no odometry worth the name: the delays of the link are not known yet.
@@ -102,11 +107,6 @@ struct ArDroneSource::State
     frame.arrival_ns = live.arrival_ns;
     frame.stamp_ns = std::max(live.stamp_ns, last_stamp_ns + 1);
     last_stamp_ns = frame.stamp_ns;
-    const bool usable = live.status == FrameStatus::ok || live.status == FrameStatus::stale;
-    if (usable) {
-      frame.image = image;
-      rectifier->apply(frame.image);
-    }
     frame.gyro = live.gyro;
     frame.odometry_covariance = live.odometry_covariance;
     if (live.body) {
@@ -114,6 +114,11 @@ struct ArDroneSource::State
       if (live.body->height > 0)
         frame.height = live.body->height;
     }
+    if (live.status == FrameStatus::ok || live.status == FrameStatus::stale)
+      frame.image = image;
+    health->judge(frame);
+    if (frame.image.getSize() > 0 && frame.status != FrameStatus::resized)
+      rectifier->apply(frame.image);
   }
 };
 
@@ -126,14 +131,14 @@ void ArDroneSource::Options::validate() const
     throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px", max_width_px);
 }
 
-ArDroneSource::ArDroneSource(const std::string &address) : ArDroneSource(ArDroneAddress::parse(address), Options{}) {}
+ArDroneSource::ArDroneSource(const std::string &address) : ArDroneSource(address, Options{}) {}
 
-ArDroneSource::ArDroneSource(const ArDroneAddress &address, const Options &options, LinkTap tap)
+ArDroneSource::ArDroneSource(const std::string &address, const Options &options, LinkTap tap)
 {
   options.validate();
   m_state = std::make_unique<State>(address, options, std::move(tap));
-  if (!address.camera_path.empty())
-    readCamera(address.camera_path); // a fault in the file is said before the drone is waited for
+  if (!m_state->address.camera_path.empty())
+    readCamera(m_state->address.camera_path); // a fault in the file is said before the drone is waited for
   vpImage<unsigned char> first;
   m_state->grabber.open(first);
   m_state->chooseCamera(first);
@@ -142,6 +147,8 @@ ArDroneSource::ArDroneSource(const ArDroneAddress &address, const Options &optio
 }
 
 ArDroneSource::~ArDroneSource() = default;
+
+bool ArDroneSource::accepts(const std::string &address) { return ArDroneAddress::accepts(address); }
 
 bool ArDroneSource::next(Frame &frame)
 {

@@ -69,4 +69,25 @@ bool ClockFit::isReady() const
 {
   return m_offset_ns && static_cast<double>(m_last_host_ns - m_first_host_ns) * 1e-9 >= m_options.settle_s;
 }
+
+void ClockRate::add(std::int64_t drone_ns, std::int64_t host_ns)
+{
+  constexpr std::int64_t kSpacing_ns = 50'000'000, kWindow_ns = 3'000'000'000;
+  if (!m_instants.empty() && host_ns - m_instants.back().host_ns < kSpacing_ns)
+    return;
+  m_instants.push_back({drone_ns, host_ns});
+  while (m_instants.size() > 2 && host_ns - m_instants[1].host_ns >= kWindow_ns)
+    m_instants.pop_front();
+}
+
+std::optional<double> ClockRate::rate() const
+{
+  constexpr std::int64_t kLeast_ns = 2'900'000'000;
+  if (m_instants.size() < 10)
+    return std::nullopt;
+  const std::int64_t host_ns = m_instants.back().host_ns - m_instants.front().host_ns;
+  if (host_ns < kLeast_ns)
+    return std::nullopt;
+  return static_cast<double>(m_instants.back().drone_ns - m_instants.front().drone_ns) / static_cast<double>(host_ns);
+}
 } // namespace bole

@@ -4,6 +4,7 @@
 /// The drone's clocks: unwrapped, and fitted to the host's.
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 namespace bole
@@ -66,5 +67,21 @@ private:
   Options m_options;
   std::optional<std::int64_t> m_offset_ns;
   std::int64_t m_first_host_ns = 0, m_last_host_ns = 0;
+};
+
+/// How fast a drone's clock runs against the host's, over the last three seconds of arrivals.
+class ClockRate
+{
+public:
+  void add(std::int64_t drone_ns, std::int64_t host_ns);
+  /// Drone's seconds a host's second; nothing before three seconds of packets.
+  std::optional<double> rate() const;
+
+private:
+  struct Instant
+  {
+    std::int64_t drone_ns, host_ns;
+  };
+  std::deque<Instant> m_instants; ///< at most one every 50 ms
 };
 } // namespace bole

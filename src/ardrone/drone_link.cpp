@@ -5,6 +5,7 @@
 #include "ardrone/video_stamps.h"
 
 #include <condition_variable>
+#include <fmt/format.h>
 #include <mutex>
 #include <visp3/core/vpException.h>
 
@@ -18,15 +19,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 /// What the two receiving threads bring together for the consumer.
 struct DroneLink::State
 {
-  State(const ArDroneAddress &a, const Options &o)
-      : address(a),
-        options(o),
-        commands(a.host, a.at_port),
-        video_clock(o.clock),
-        navdata_clock(o.clock),
-        odometry(o.odometry)
-  {
-  }
+  State(const ArDroneAddress &a, const Options &o) : address(a), options(o), commands(a.host, a.at_port) {}
 
   const ArDroneAddress address;
   const Options options;
@@ -37,6 +30,7 @@ struct DroneLink::State
   std::optional<LiveFrame> newest;
   LinkCounters counters;
   ClockFit video_clock, navdata_clock;
+  ClockRate video_rate, navdata_rate;
   VideoStamps stamps;
   std::int64_t fresh_stamp_ns = 0;
   ClockUnwrapper navdata_time{kNavdataTimePeriod_us};
@@ -56,7 +50,7 @@ struct DroneLink::State
       const std::lock_guard<std::mutex> lock(mutex);
       ++counters.connections;
     };
-    of_video.frame = [this](DecodedFrame &&frame, const VideoDecoder::Counters &counted, std::int64_t arrival_ns) {
+    of_video.frame = [this](DecodedFrame &&frame, const DroneVideoDecoder::Counters &counted, std::int64_t arrival_ns) {
       publish(std::move(frame), counted, arrival_ns);
     };
     NavdataReceiver::Callbacks of_navdata;
@@ -68,7 +62,7 @@ struct DroneLink::State
     navdata = std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
   }
 
-  void publish(DecodedFrame &&decoded, const VideoDecoder::Counters &counted, std::int64_t arrival_ns)
+  void publish(DecodedFrame &&decoded, const DroneVideoDecoder::Counters &counted, std::int64_t arrival_ns)
   {
     const std::lock_guard<std::mutex> lock(mutex);
     counters.video = counted;
@@ -80,6 +74,9 @@ struct DroneLink::State
       video_clock.add(frame.stamp_ns, arrival_ns);
     frame.status = decoded.status;
     frame.message = std::move(decoded.message);
+    video_rate.add(frame.stamp_ns, arrival_ns);
+    if (frame.status == FrameStatus::ok)
+      checkStamp(frame, stamp.is_measured);
     frame.picture = std::move(decoded.picture);
     frame.number = decoded.number;
     frame.arrival_ns = arrival_ns;
@@ -88,8 +85,26 @@ struct DroneLink::State
     else if (decoded.status == FrameStatus::ok)
       fresh_stamp_ns = frame.stamp_ns;
     counters.dropped += newest ? 1 : 0;
-    newest = std::move(frame);
+    const bool is_worse = newest && newest->status == FrameStatus::ok && frame.status == FrameStatus::corrupt;
+    if (!is_worse) // what nobody can decode does not take the place of a picture
+      newest = std::move(frame);
     frame_came.notify_one();
+  }
+
+  /// A picture of which it is not known when it was taken is of no use to anyone.
+  void checkStamp(LiveFrame &frame, bool is_measured) const
+  {
+    constexpr double kLargestRatio = 1.4; // of the two clocks of one drone; bursts and stalls stay below
+    const auto video = video_rate.rate(), motion = navdata_rate.rate();
+    if (video && motion && *motion > 0 && (*video > kLargestRatio * *motion || *video * kLargestRatio < *motion)) {
+      frame.status = FrameStatus::doubtful;
+      frame.message =
+          fmt::format("the video's clock runs {:.2g} times as fast as that of the navdata", *video / *motion);
+    }
+    else if (!is_measured) {
+      frame.status = FrameStatus::doubtful;
+      frame.message = "its stamp is not after that of the frame before";
+    }
   }
 
   /// \return the state bits of a good packet.
@@ -120,6 +135,7 @@ struct DroneLink::State
       // Demo packets have no time: then the arrival must do.
       const std::int64_t stamp_ns =
           navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000 : arrival_ns;
+      navdata_rate.add(stamp_ns, arrival_ns);
       if (!navdata_clock.add(stamp_ns, arrival_ns))
         odometry.restart();
       odometry.add(stamp_ns, navdata);
@@ -172,7 +188,7 @@ struct DroneLink::State
   }
 };
 
-void DroneLink::Options::validate() const
+void LinkOptions::validate() const
 {
   if (!(silence_s > 0.1 && silence_s < 30))
     throw vpException(vpException::badValue, "silence_s = %g, must be in (0.1, 30) s", silence_s);
@@ -182,8 +198,6 @@ void DroneLink::Options::validate() const
     throw vpException(vpException::badValue, "frozen_m = %g, must be in (0, 10) m", frozen_m);
   if (!(frozen_rad > 0 && frozen_rad < 3))
     throw vpException(vpException::badValue, "frozen_rad = %g, must be in (0, 3) rad", frozen_rad);
-  odometry.validate();
-  clock.validate();
 }
 
 DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options{}) {}

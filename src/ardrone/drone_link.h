@@ -8,8 +8,8 @@
 #include "ardrone/drone_clock.h"
 #include "ardrone/navdata_odometry.h"
 #include "ardrone/video_decoder.h"
+#include <bole/vpArDroneGrabber.h>
 
-#include <functional>
 #include <memory>
 
 namespace bole
@@ -29,30 +29,6 @@ struct LiveFrame
   std::optional<Matrix6d> odometry_covariance;    ///< of the motion since the frame given out before
 };
 
-struct LinkCounters
-{
-  VideoDecoder::Counters video;
-  std::size_t delivered = 0;       ///< frames given out
-  std::size_t frozen = 0;          ///< of them, stale
-  std::size_t dropped = 0;         ///< decoded, but a newer frame came before anyone asked
-  std::size_t connections = 0;     ///< of the video, the first one too
-  std::size_t clock_jumps = 0;     ///< of the video's clock: reboots
-  std::size_t navdata_packets = 0; ///< used
-  std::size_t navdata_refused = 0; ///< wrong checksum, cut
-  std::size_t navdata_late = 0;    ///< out of sequence
-  std::size_t navdata_restarts = 0;
-};
-
-enum class LinkChannel : std::uint8_t
-{
-  video = 1,
-  navdata = 2,
-  video_connected = 3
-};
-/// Sees every received byte first; called from the receiving threads, must be quick and
-/// thread-safe.
-using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)>;
-
 /// Talks to a drone as a listener: wakes the streams, asks for full navdata, keeps the
 /// communication watchdog content. Never sends a flight command.
 ///
@@ -68,17 +44,7 @@ using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const s
 class DroneLink
 {
 public:
-  struct Options
-  {
-    bool full_navdata = true; ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
-    double silence_s = 0.8;   ///< [s], (0.1, 30): a link this long silent is opened anew
-    double retry_s = 0.1;     ///< [s], (0.01, 5): pause between attempts
-    double frozen_m = 0.1;    ///< [m], (0, 10): a motion that no scene among trees can hide
-    double frozen_rad = 0.02; ///< [rad], (0, 3): 4 px at 320 columns
-    NavdataOdometry::Options odometry;
-    ClockFit::Options clock;
-    void validate() const;
-  };
+  using Options = LinkOptions;
 
   explicit DroneLink(const ArDroneAddress &address);
   DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap = {});

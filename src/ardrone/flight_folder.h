@@ -4,7 +4,7 @@
 /// A live flight as an ASL folder, written while it is flown.
 
 #include "ardrone/drone_link.h"
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 
 #include <string>
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata.h"
+#include <cmath>
 
 #include "ardrone/bytes.h"
 
+#include <cmath>
 #include <numeric>
 
 namespace bole
@@ -24,6 +26,13 @@ Eigen::Vector3f readVector(const std::uint8_t *p)
   return {readLittleEndian<float>(p), readLittleEndian<float>(p + 4), readLittleEndian<float>(p + 8)};
 }
 
+// What no AR.Drone can do: a number beyond is damage or malice, and the option is not used.
+constexpr float kLargestAngle_mdeg = 400e3f, kFastest_mm_s = 30e3f, kLargestAcceleration_mg = 20e3f,
+                kFastest_deg_s = 4e3f;
+constexpr double kHighest_mm = 300e3;
+
+bool isPossible(const Eigen::Vector3f &v, float most) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= most; }
+
 void readTypedOptions(Navdata &navdata)
 {
   const auto bytesOf = [&](std::uint16_t id, std::size_t least) -> const std::uint8_t * {
@@ -38,7 +47,8 @@ void readTypedOptions(Navdata &navdata)
     demo.phi_theta_psi_mdeg = {theta_phi_psi.y(), theta_phi_psi.x(), theta_phi_psi.z()};
     demo.altitude_mm = readLittleEndian<std::int32_t>(p + 20);
     demo.velocity_mm_s = readVector(p + 24);
-    if (demo.phi_theta_psi_mdeg.allFinite() && demo.velocity_mm_s.allFinite())
+    if (isPossible(demo.phi_theta_psi_mdeg, kLargestAngle_mdeg) && isPossible(demo.velocity_mm_s, kFastest_mm_s) &&
+        std::abs(static_cast<double>(demo.altitude_mm)) <= kHighest_mm)
       navdata.demo = demo;
   }
   if (const std::uint8_t *p = bytesOf(kTime, 4))
@@ -47,7 +57,8 @@ void readTypedOptions(Navdata &navdata)
     Navdata::Physical physical;
     physical.acceleration_mg = readVector(p + 6);
     physical.rate_deg_s = readVector(p + 18);
-    if (physical.acceleration_mg.allFinite() && physical.rate_deg_s.allFinite())
+    if (isPossible(physical.acceleration_mg, kLargestAcceleration_mg) &&
+        isPossible(physical.rate_deg_s, kFastest_deg_s))
       navdata.physical = physical;
   }
 }
@@ -126,7 +137,7 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
       readTypedOptions(navdata);
       return NavdataError::none;
     }
-    navdata.options[id].assign(data + at + kOptionHead, data + at + length);
+    navdata.options[id].assign(data + at + kOptionHead, data + at + length); // at most a datagram
     at += length;
   }
   return NavdataError::no_checksum;

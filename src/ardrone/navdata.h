@@ -76,19 +76,4 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
 /// The datagram of \p navdata: its typed options 0, 1 and 3 where they are set (with zeros for what
 /// the struct leaves out), the others as bytes, and the checksum. For the emulator and the tests.
 std::vector<std::uint8_t> encodeNavdata(const Navdata &navdata);
-
-/// Name of an option, "option 42" for unknown ones.
-std::string navdataOptionName(std::uint16_t id);
-
-struct NavdataField
-{
-  std::string name; ///< with index for fields of more than one number, "motor_2"
-  double value;
-};
-/// Every field of the option \p id by the layout of the manufacturer's SDK 2.0 (navdata_common.h),
-/// in order and in the drone's units. Bytes behind the known layout (other firmwares append) are
-/// left alone; fields that the bytes do not hold are left out. Unknown options have no fields.
-std::vector<NavdataField> navdataFields(std::uint16_t id, const std::vector<std::uint8_t> &bytes);
-/// Size in bytes of the known layout of an option without its id and size; 0 for unknown options.
-std::size_t navdataOptionSize(std::uint16_t id);
 } // namespace bole

@@ -4,8 +4,7 @@
 /// Where the drone says it has flown: odometry from navdata.
 
 #include "ardrone/navdata.h"
-#include <bole/frame.h>
-#include <bole/pose.h>
+#include <bole/vpArDroneGrabber.h>
 
 #include <cstdint>
 #include <deque>
@@ -14,20 +13,6 @@
 
 namespace bole
 {
-/// What navdata say of the body at one instant, in SI units and the axes x forward, y left, z up.
-struct BodyState
-{
-  std::int64_t stamp_ns = 0;                          ///< drone's navdata clock, unwrapped
-  Pose wMb;                                           ///< see NavdataOdometry
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
-  std::optional<Eigen::Vector3d> rate;                ///< [rad/s], body frame; with full navdata only
-  double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
-  double battery = 0;                                 ///< share of full, 0 to 1
-  std::uint32_t state = 0;                            ///< bits of DroneState
-  std::uint32_t flight_phase = 0;                     ///< Navdata::flightPhase()
-  bool has(DroneState bit) const { return (state & static_cast<std::uint32_t>(bit)) != 0; }
-};
-
 /// Attitude wRb from the drone's angles roll, pitch, yaw [rad].
 ///
 /// The drone's frames have y to the right and z down, ours y left and z up; half a turn about x, F,

@@ -13,6 +13,8 @@ constexpr Milliseconds kPoll{50};
 // With the pause and half a second to a key frame: within a second.
 constexpr Milliseconds kConnect{250};
 constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr int kMostDatagrams = 1000; // a second: the drone sends 15, an emulator at its fastest 600
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 } // namespace
 
@@ -50,7 +52,7 @@ void VideoReceiver::run()
   }
 }
 
-void VideoReceiver::begin(VideoDecoder &video)
+void VideoReceiver::begin(DroneVideoDecoder &video)
 {
   video.restart();
   if (m_callbacks.tap)
@@ -63,7 +65,7 @@ bool VideoReceiver::isSilent(std::int64_t since_ns) const
   return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > m_options.silence_s;
 }
 
-VideoDecoder &VideoReceiver::decoderFor(int generation)
+DroneVideoDecoder &VideoReceiver::decoderFor(int generation)
 {
   if (!m_decoder || m_decoder_generation != generation) {
     m_decoder.emplace(generation);
@@ -74,7 +76,7 @@ VideoDecoder &VideoReceiver::decoderFor(int generation)
 
 void VideoReceiver::receiveStream(const Socket &socket, std::vector<std::uint8_t> &buffer)
 {
-  VideoDecoder &video = decoderFor(2);
+  DroneVideoDecoder &video = decoderFor(2);
   begin(video);
   std::int64_t last_data_ns = steadyNowNs();
   while (m_running && !isSilent(last_data_ns)) {
@@ -93,7 +95,8 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
 {
   const Socket socket = Socket::connectUdp(m_address.host, m_address.video_port);
   bool has_begun = false;
-  std::int64_t last_data_ns = steadyNowNs(), last_wake_ns = 0;
+  std::int64_t last_data_ns = steadyNowNs(), last_wake_ns = 0, second_ns = 0;
+  int count = 0;
   while (m_running && socket.valid() && !isSilent(last_data_ns)) {
     const std::int64_t now_ns = steadyNowNs();
     if (now_ns - last_wake_ns > kWakeAgain_ns) {
@@ -107,8 +110,14 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
     if (read != Socket::Read::data)
       continue;
     last_data_ns = steadyNowNs();
+    if (last_data_ns - second_ns > kSecond_ns) {
+      second_ns = last_data_ns;
+      count = 0;
+    }
+    if (++count > kMostDatagrams)
+      continue; // a flood: the socket's buffer drops the rest
     m_generation = 1;
-    VideoDecoder &video = decoderFor(1);
+    DroneVideoDecoder &video = decoderFor(1);
     if (!has_begun)
       begin(video);
     has_begun = true;
@@ -116,7 +125,8 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
   }
 }
 
-void VideoReceiver::handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
+void VideoReceiver::handle(DroneVideoDecoder &video, const std::uint8_t *data, std::size_t size,
+                           std::int64_t arrival_ns)
 {
   if (m_callbacks.tap)
     m_callbacks.tap(LinkChannel::video, arrival_ns, data, size);

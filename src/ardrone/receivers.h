@@ -22,7 +22,7 @@ public:
   {
     LinkTap tap; ///< may be empty
     std::function<void()> connected;
-    std::function<void(DecodedFrame &&, const VideoDecoder::Counters &, std::int64_t arrival_ns)> frame;
+    std::function<void(DecodedFrame &&, const DroneVideoDecoder::Counters &, std::int64_t arrival_ns)> frame;
   };
   VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks);
   ~VideoReceiver();
@@ -32,16 +32,16 @@ private:
   void run();
   void receiveStream(const Socket &socket, std::vector<std::uint8_t> &buffer);
   void receiveDatagrams(std::vector<std::uint8_t> &buffer);
-  void handle(VideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns);
-  void begin(VideoDecoder &video);
-  VideoDecoder &decoderFor(int generation);
+  void handle(DroneVideoDecoder &video, const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns);
+  void begin(DroneVideoDecoder &video);
+  DroneVideoDecoder &decoderFor(int generation);
   bool isSilent(std::int64_t since_ns) const;
 
   const ArDroneAddress m_address;
   const DroneLink::Options m_options;
   const Callbacks m_callbacks;
   std::atomic<int> m_generation; ///< 0: not known yet
-  std::optional<VideoDecoder> m_decoder;
+  std::optional<DroneVideoDecoder> m_decoder;
   int m_decoder_generation = 0;
   std::atomic<bool> m_running{true};
   std::thread m_thread;

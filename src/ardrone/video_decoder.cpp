@@ -12,6 +12,8 @@ namespace
 {
 constexpr double kUnchanged = 0.7; // grey levels
 constexpr int kBlock = 16;
+constexpr std::size_t kSmallestPicture = 64; // bytes: 99 macroblocks of nothing and the headers
+constexpr std::uint32_t kReordered = 30;     // pictures: two seconds; farther back it is a drone that was restarted
 
 /// Mean over the blocks of 16x16 pixels of the change of their mean.
 double blockChange(const YuvPicture &a, const YuvPicture &b)
@@ -30,16 +32,17 @@ double blockChange(const YuvPicture &a, const YuvPicture &b)
 }
 } // namespace
 
-VideoDecoder::VideoDecoder(int generation) : m_generation(generation) {}
+DroneVideoDecoder::DroneVideoDecoder(int generation) : m_generation(generation) {}
 
-void VideoDecoder::restart()
+void DroneVideoDecoder::restart()
 {
+  m_last_number.reset();
   m_parser.reset();
   m_h264.flush();
   m_needs_key = true;
 }
 
-DecodedFrame VideoDecoder::decodePave(const PaveFrame &frame)
+DecodedFrame DroneVideoDecoder::decodePave(const PaveFrame &frame)
 {
   DecodedFrame out;
   out.number = frame.header.frame_number;
@@ -63,7 +66,7 @@ DecodedFrame VideoDecoder::decodePave(const PaveFrame &frame)
   return out;
 }
 
-void VideoDecoder::judge(DecodedFrame &frame)
+void DroneVideoDecoder::judge(DecodedFrame &frame)
 {
   if (frame.status == FrameStatus::ok) {
     if (m_width == 0) {
@@ -93,16 +96,27 @@ void VideoDecoder::judge(DecodedFrame &frame)
   m_counters.resized += frame.status == FrameStatus::resized ? 1 : 0;
 }
 
-std::vector<DecodedFrame> VideoDecoder::decode(const std::uint8_t *data, std::size_t size)
+std::vector<DecodedFrame> DroneVideoDecoder::decode(const std::uint8_t *data, std::size_t size)
 {
   std::vector<DecodedFrame> out;
   if (m_generation == 1) {
+    if (size < kSmallestPicture) {
+      ++m_counters.refused;
+      return out;
+    }
     UvlcResult result = decodeUvlc(data, size);
     DecodedFrame frame;
     frame.status = result.whole ? FrameStatus::ok : FrameStatus::corrupt;
     frame.message = std::move(result.message);
     frame.number = result.picture.number;
     frame.picture = std::move(result.picture);
+    if (frame.status == FrameStatus::ok && m_last_number && frame.number <= *m_last_number &&
+        *m_last_number - frame.number < kReordered) {
+      ++m_counters.refused; // a datagram that was overtaken, or sent again
+      return out;
+    }
+    if (frame.status == FrameStatus::ok)
+      m_last_number = frame.number;
     judge(frame);
     out.push_back(std::move(frame));
     return out;

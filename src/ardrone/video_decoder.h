@@ -5,7 +5,7 @@
 
 #include "ardrone/h264.h"
 #include "ardrone/pave.h"
-#include <bole/frame.h>
+#include <bole/vpArDroneGrabber.h>
 
 #include <cstdint>
 #include <optional>
@@ -36,20 +36,13 @@ struct DecodedFrame
 ///
 /// Neither stream has a checksum: damage that still reads as a picture is not seen here (see the
 /// README). Not thread-safe.
-class VideoDecoder
+class DroneVideoDecoder
 {
 public:
-  struct Counters
-  {
-    std::size_t frames = 0; ///< given out, whatever their status
-    std::size_t ok = 0, corrupt = 0, stale = 0, resized = 0;
-    std::size_t skipped = 0;       ///< never decoded, since a newer key frame was there
-    std::size_t resyncs = 0;       ///< times that the stream had to be searched for a header
-    std::size_t skipped_bytes = 0; ///< bytes that belonged to no frame
-  };
+  using Counters = VideoCounters;
 
   /// \param generation 1 or 2.
-  explicit VideoDecoder(int generation);
+  explicit DroneVideoDecoder(int generation);
   /// Bytes of the stream (2) or one datagram (1), and the frames that they complete.
   std::vector<DecodedFrame> decode(const std::uint8_t *data, std::size_t size);
   /// For a new connection: the next frame must be a key frame.
@@ -61,6 +54,7 @@ private:
   void judge(DecodedFrame &frame);
 
   int m_generation;
+  std::optional<std::uint32_t> m_last_number; ///< of an AR.Drone 1's pictures
   PaveParser m_parser;
   H264Decoder m_h264;
   bool m_needs_key = true;

@@ -8,6 +8,7 @@ namespace bole
 namespace
 {
 constexpr std::int64_t kJump_ns = 5'000'000'000; // no link delays a packet so long
+constexpr std::int64_t kBack_ns = 200'000'000;   // and none makes a clock run backwards
 } // namespace
 
 VideoStamps::Stamp VideoStamps::next(const std::optional<std::uint32_t> &timestamp_ms, std::int64_t arrival_ns)
@@ -25,7 +26,9 @@ VideoStamps::Stamp VideoStamps::next(const std::optional<std::uint32_t> &timesta
 VideoStamps::Stamp VideoStamps::onDroneClock(std::int64_t raw_ns, std::int64_t arrival_ns)
 {
   const std::int64_t expected_ns = m_last_ns + arrival_ns - m_last_arrival_ns;
-  if (!m_has_last || std::abs(raw_ns + m_shift_ns - expected_ns) <= kJump_ns) {
+  const bool is_near = std::abs(raw_ns + m_shift_ns - expected_ns) <= kJump_ns;
+  const bool went_back = raw_ns + m_shift_ns < m_last_ns - kBack_ns;
+  if (!m_has_last || (is_near && !went_back)) {
     m_jumped.reset();
     return {raw_ns + m_shift_ns, true};
   }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/body_velocity.h"
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 #include <bole/pose.h>
 #include <bole/vpRobotArDrone.h>
 
+#include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
 #include "geometry/require_range.h"
 

@@ -3,7 +3,9 @@
 
 #include "input/asl_source.h"
 #include "input/csv_reader.h"
+#include "input/sensor_yaml.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
@@ -38,7 +40,49 @@ std::vector<Row> readImageRows(const fs::path &cam0)
   }
   if (rows.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no image in it", path));
+  constexpr std::int64_t kFastest_ns = 100'000; // 10,000 images a second
+  if (rows.size() > 2 &&
+      (rows.back().stamp_ns - rows.front().stamp_ns) / static_cast<std::int64_t>(rows.size() - 1) < kFastest_ns)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: more than 10000 images a second: stamps must be in nanoseconds", path));
   return rows;
+}
+
+/// Throws for rates and stamps in other units than rad/s and ns.
+void requirePlausible(const std::vector<GyroSample> &gyro, const std::string &path)
+{
+  constexpr double kFastest_rad_s = 5; // rms over a flight: 290 degrees a second all the time
+  constexpr double kSlowest_Hz = 5, kFastest_Hz = 20000;
+  if (gyro.empty())
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: no sample in it (without a gyro the folder imu0 must not be there)", path));
+  double squares = 0;
+  for (const GyroSample &sample : gyro)
+    squares += sample.rate.squaredNorm() / static_cast<double>(gyro.size());
+  if (std::sqrt(squares) > kFastest_rad_s)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: angular rate = {:.3g} rad/s (rms), must be at most {:g}: looks like degrees per "
+                                  "second",
+                                  path, std::sqrt(squares), kFastest_rad_s));
+  if (gyro.size() < 10)
+    return;
+  const double rate_Hz =
+      1e9 * static_cast<double>(gyro.size() - 1) / static_cast<double>(gyro.back().stamp_ns - gyro.front().stamp_ns);
+  if (rate_Hz < kSlowest_Hz || rate_Hz > kFastest_Hz)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: {:.3g} samples a second, must be {:g} to {:g}: stamps must be in nanoseconds",
+                                  path, rate_Hz, kSlowest_Hz, kFastest_Hz));
+}
+
+/// Throws where no sample falls into the time of the images: the gyro would be unused without a word.
+void requireOverlap(const std::vector<GyroSample> &gyro, const std::vector<Row> &rows, const std::string &path)
+{
+  if (gyro.empty() || (gyro.front().stamp_ns <= rows.back().stamp_ns && gyro.back().stamp_ns >= rows.front().stamp_ns))
+    return;
+  throw vpException(vpException::badValue,
+                    fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of the images, {:.3f} to {:.3f} s",
+                                path, gyro.front().stamp_ns * 1e-9, gyro.back().stamp_ns * 1e-9,
+                                rows.front().stamp_ns * 1e-9, rows.back().stamp_ns * 1e-9));
 }
 
 std::vector<GyroSample> readGyro(const fs::path &imu0)
@@ -52,6 +96,7 @@ std::vector<GyroSample> readGyro(const fs::path &imu0)
     const std::int64_t stamp_ns = csv.risingStampNs(0);
     gyro.push_back({stamp_ns, bRs * Eigen::Vector3d(csv.number(1, "w_x"), csv.number(2, "w_y"), csv.number(3, "w_z"))});
   }
+  requirePlausible(gyro, (imu0 / "data.csv").string());
   return gyro;
 }
 
@@ -116,6 +161,7 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options) : 
                  folder);
   recording.truth = readPoses(root / "state_groundtruth_estimate0");
   recording.gyro = readGyro(root / "imu0");
+  requireOverlap(recording.gyro, m_state->rows, (root / "imu0" / "data.csv").string());
   m_state->builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
@@ -126,7 +172,8 @@ bool AslSource::next(Frame &frame)
   if (m_state->at >= m_state->rows.size())
     return false;
   const Row &row = m_state->rows[m_state->at++];
-  m_state->builder->build(row.stamp_ns, readImageFile(row.image_path), frame);
+  FrameBuilder &builder = *m_state->builder;
+  builder.build(row.stamp_ns, readImageFile(row.image_path, builder.inputWidth(), builder.inputHeight()), frame);
   return true;
 }
 

@@ -5,7 +5,7 @@
 
 #include "input/trajectory.h"
 #include <bole/frame.h>
-#include <bole/source_options.h>
+#include <bole/open_source.h>
 
 namespace bole
 {

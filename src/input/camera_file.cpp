@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/camera_plausibility.h"
 #include "input/sensor_yaml.h"
 
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <cmath>
@@ -40,8 +41,6 @@ PinholeCamera readPinhole(const SensorYaml &yaml)
   const auto k = yaml.numbers("intrinsics");
   if (k.size() != 4 || !(k[0] > 0) || !(k[1] > 0))
     yaml.fail("intrinsics", "fx, fy, cx, cy in pixels with fx, fy > 0");
-  if (k[2] < -size[0] || k[2] > 2 * size[0] || k[3] < -size[1] || k[3] > 2 * size[1])
-    yaml.fail("intrinsics", "fx, fy, cx, cy with the principal point near the image");
   return {k[0], k[1], k[2], k[3], static_cast<int>(size[0]), static_cast<int>(size[1])};
 }
 
@@ -74,8 +73,48 @@ void readDistortion(const SensorYaml &yaml, CameraModel &model)
     model.distortion = Distortion::none;
 }
 
+/// OpenCV's calibration, and ROS's camera_info, which has the same keys. The camera looks straight ahead.
+MountedCamera readCalibration(const SensorYaml &yaml)
+{
+  MountedCamera camera{{}, forwardCamera()};
+  PinholeCamera &pinhole = camera.model.pinhole;
+  const auto size = [&yaml](const char *key) {
+    const auto numbers = yaml.numbers(key);
+    if (numbers.size() != 1 || !(numbers[0] >= 8 && numbers[0] <= 16384 && numbers[0] == std::floor(numbers[0])))
+      yaml.fail(key, "8 to 16384 px");
+    return static_cast<int>(numbers[0]);
+  };
+  pinhole.width = size("image_width");
+  pinhole.height = size("image_height");
+  const auto k = yaml.matrix("camera_matrix");
+  if (k.size() != 9 || !(k[0] > 0) || !(k[4] > 0))
+    yaml.fail("camera_matrix", "a 3x3 matrix with focal lengths above 0");
+  pinhole.fx = k[0];
+  pinhole.fy = k[4];
+  pinhole.cx = k[2];
+  pinhole.cy = k[5];
+  const std::string model = yaml.has("distortion_model") ? yaml.text("distortion_model") : "plumb_bob";
+  if (model != "plumb_bob" && model != "equidistant")
+    yaml.fail("distortion_model", "plumb_bob or equidistant");
+  auto d = yaml.has("distortion_coefficients") ? yaml.matrix("distortion_coefficients") : std::vector<double>();
+  if (d.size() > 5 && std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; }))
+    yaml.fail("distortion_coefficients", "at most 5 numbers that are not 0");
+  d.resize(5, 0);
+  if (model == "equidistant")
+    camera.model.distortion = Distortion::equidistant;
+  else if (std::any_of(d.begin(), d.end(), [](double v) { return v != 0; }))
+    camera.model.distortion = Distortion::radial_tangential;
+  constexpr double kLargestRest_px = 1;
+  if (model == "plumb_bob" && d[4] != 0 && foldThirdCoefficient(pinhole, d[4], d[0], d[1]) > kLargestRest_px)
+    yaml.fail("distortion_coefficients", "radial by two coefficients to 1 px: calibrate with k3 = 0 (CALIB_FIX_K3)");
+  std::copy_n(d.begin(), 4, camera.model.coefficients.begin());
+  return camera;
+}
+
 MountedCamera readYaml(const std::string &path)
 {
+  if (const SensorYaml any(path, {}); any.has("camera_matrix"))
+    return readCalibration(any);
   const SensorYaml yaml(path, kCameraKeys);
   MountedCamera camera;
   camera.model.pinhole = readPinhole(yaml);
@@ -148,11 +187,12 @@ MountedCamera readCamera(const std::string &path, int width, int height)
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
   const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".xml")
-    return readXml(path, width, height);
-  if (extension == ".yaml" || extension == ".yml")
-    return readYaml(path);
-  throw vpException(vpException::ioError, fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
+  if (extension != ".xml" && extension != ".yaml" && extension != ".yml")
+    throw vpException(vpException::ioError, fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
+  const MountedCamera camera = extension == ".xml" ? readXml(path, width, height) : readYaml(path);
+  if (const std::string fault = implausibility(camera); !fault.empty())
+    throw vpException(vpException::badValue, fmt::format("{}: {}", path, fault));
+  return camera;
 }
 
 Pose readSensorPose(const std::string &path)

@@ -19,6 +19,33 @@ std::string_view trimmed(std::string_view text)
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::size_t kLongestLine = 100'000;
+
+/// "stamp,0,142302,-0,176885": no point anywhere, and every second field is a fraction of at least two digits.
+bool hasDecimalCommas(const std::vector<std::string> &fields)
+{
+  if (fields.size() < 7 || fields.size() % 2 == 0)
+    return false;
+  for (std::size_t i = 1; i < fields.size(); ++i) {
+    const bool is_fraction = i % 2 == 0;
+    const std::string digits =
+        !is_fraction && !fields[i].empty() && fields[i].front() == '-' ? fields[i].substr(1) : fields[i];
+    if (digits.find_first_not_of("0123456789") != std::string::npos || digits.size() < (is_fraction ? 2u : 1u) ||
+        (!is_fraction && digits.size() > 4))
+      return false;
+  }
+  return true;
+}
+
+/// A first line of names, written without the '#': it begins with a letter and is no number.
+bool isHeader(std::string_view line)
+{
+  const char first = line.front();
+  const bool is_word = (first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z') || first == '"' || first == '_';
+  return is_word && line.substr(0, 3) != "nan" && line.substr(0, 3) != "inf";
+}
+
 /// Seconds in decimal notation as nanoseconds, without a detour through floating point.
 bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
 {
@@ -82,12 +109,20 @@ bool CsvReader::next()
   std::string line;
   while (std::getline(m_file, line)) {
     ++m_line;
-    const std::string_view content = trimmed(line);
-    if (content.empty() || content.front() == '#')
+    std::string_view content = trimmed(line);
+    if (m_line == 1 && content.substr(0, kByteOrderMark.size()) == kByteOrderMark)
+      content.remove_prefix(kByteOrderMark.size());
+    if (line.size() > kLongestLine)
+      fail(fmt::format("{} characters, must be at most {} in a line", line.size(), kLongestLine));
+    if (content.empty() || content.front() == '#' || (m_rows == 0 && isHeader(content)))
       continue;
     split(std::string(content));
+    if (m_format.separator == ',' && content.find(';') != std::string_view::npos)
+      fail("the columns are separated by semicolons, must be by commas (and decimals written with a point)");
     if (m_fields.size() < m_format.min_columns)
       fail(fmt::format("{} columns, must be {}", m_fields.size(), m_format.min_columns));
+    if (m_format.separator == ',' && hasDecimalCommas(m_fields))
+      fail("the decimals look as if written with a comma, must have a point");
     if (m_rows > 0 && m_fields.size() != m_columns)
       fail(fmt::format("{} columns, must be {} as in the rows before", m_fields.size(), m_columns));
     m_columns = m_fields.size();

@@ -16,6 +16,8 @@ const char *toString(FrameStatus status)
     return "missing";
   case FrameStatus::resized:
     return "resized";
+  case FrameStatus::doubtful:
+    return "doubtful";
   }
   return "unknown";
 }

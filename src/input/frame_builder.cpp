@@ -1,62 +1,40 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
-namespace
-{
-bool samePixels(const vpImage<unsigned char> &a, const vpImage<unsigned char> &b)
-{
-  return a.getSize() == b.getSize() && a.getWidth() == b.getWidth() && a.getSize() > 0 &&
-         std::memcmp(a.bitmap, b.bitmap, a.getSize()) == 0;
-}
-} // namespace
-
 FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
     : m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
       m_recording(std::move(recording)),
-      m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9))
+      m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9)),
+      m_health(camera.model.pinhole, camera.bMc)
 {
 }
 
-void FrameBuilder::judge(ImageFile &file)
+void FrameBuilder::requireSize(Frame &frame) const
 {
-  if (file.image.getSize() == 0)
+  const int width = static_cast<int>(frame.image.getWidth()), height = static_cast<int>(frame.image.getHeight());
+  if (frame.image.getSize() == 0 || (width == m_rectifier.inputWidth() && height == m_rectifier.inputHeight()))
     return;
-  const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
-  if (width != m_rectifier.inputWidth() || height != m_rectifier.inputHeight()) {
-    file.status = FrameStatus::resized;
-    file.message = fmt::format("image of {}x{} px, must be {}x{}", width, height, m_rectifier.inputWidth(),
-                               m_rectifier.inputHeight());
-    file.image.resize(0, 0);
-    return;
-  }
-  if (file.status == FrameStatus::ok && samePixels(file.image, m_last_image)) {
-    file.status = FrameStatus::stale;
-    file.message = "the same image as before";
-  }
-  if (file.status == FrameStatus::ok)
-    m_last_image = file.image;
+  frame.status = FrameStatus::resized;
+  frame.message = fmt::format("image of {}x{} px, must be {}x{}", width, height, m_rectifier.inputWidth(),
+                              m_rectifier.inputHeight());
+  frame.image.resize(0, 0);
 }
 
 void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
 {
-  judge(file);
   frame = Frame();
   frame.stamp_ns = stamp_ns;
   frame.index = m_index++;
   frame.status = file.status;
   frame.message = std::move(file.message);
   frame.image = std::move(file.image);
-  if (frame.image.getSize() > 0)
-    m_rectifier.apply(frame.image);
   frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns, m_max_gap_ns);
   frame.wMb_truth = interpolate(m_recording.truth, stamp_ns, m_max_gap_ns);
 
@@ -65,6 +43,11 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
     if (m_last_stamp_ns && gyro[m_gyro_at].stamp_ns > *m_last_stamp_ns)
       frame.gyro.push_back(gyro[m_gyro_at]);
   m_last_stamp_ns = stamp_ns;
+
+  requireSize(frame);
+  m_health.judge(frame);
+  if (frame.image.getSize() > 0)
+    m_rectifier.apply(frame.image);
 }
 
 Trajectory readOdometry(const SourceOptions &options)

@@ -3,13 +3,13 @@
 /// \file
 /// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
 
+#include "input/frame_health.h"
 #include "input/image_file.h"
 
-#include "input/camera_file.h"
 #include "input/rectifier.h"
 #include "input/trajectory.h"
 #include <bole/frame.h>
-#include <bole/source_options.h>
+#include <bole/open_source.h>
 
 #include <optional>
 
@@ -23,7 +23,7 @@ struct Recording
   std::vector<GyroSample> gyro;
 };
 
-/// Judges images (stale, resized), rectifies them and adds what the motion sensors said.
+/// Adds what the motion sensors measured, judges the images (FrameHealth) and rectifies them.
 class FrameBuilder
 {
 public:
@@ -33,18 +33,21 @@ public:
   /// call.
   void build(std::int64_t stamp_ns, ImageFile file, Frame &frame);
 
+  /// Size of the images that build() takes [px].
+  int inputWidth() const { return m_rectifier.inputWidth(); }
+  int inputHeight() const { return m_rectifier.inputHeight(); }
   const PinholeCamera &camera() const { return m_rectifier.camera(); }
   const Pose &bMc() const { return m_bMc; }
   const Recording &recording() const { return m_recording; }
 
 private:
-  void judge(ImageFile &file);
+  void requireSize(Frame &frame) const;
 
   Rectifier m_rectifier;
   Pose m_bMc;
   Recording m_recording;
   std::int64_t m_max_gap_ns;
-  vpImage<unsigned char> m_last_image; ///< raw pixels of the last readable image
+  FrameHealth m_health;
   std::optional<std::int64_t> m_last_stamp_ns;
   std::size_t m_gyro_at = 0;
   std::size_t m_index = 0;

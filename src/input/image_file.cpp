@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 
 namespace bole
 {
@@ -69,6 +70,75 @@ std::string jpegFault(const Bytes &bytes)
   return has_end ? std::string() : fmt::format("truncated JPEG of {} bytes", bytes.size());
 }
 
+/// Reads a TIFF's first directory in its byte order: all strips or tiles must be in the file. Size and offsets may lie.
+class TiffDirectory
+{
+public:
+  explicit TiffDirectory(const Bytes &bytes) : m_bytes(bytes), m_is_little(bytes[0] == 'I') {}
+
+  std::string fault() const
+  {
+    const std::uint64_t directory = number(4, 4);
+    const std::uint64_t entries = number(directory, 2);
+    std::uint64_t end = directory + 2 + 12 * entries;
+    std::uint64_t offsets = 0, counts = 0;
+    for (std::uint64_t at = directory + 2; at + 12 <= m_bytes.size() && at < directory + 2 + 12 * entries; at += 12) {
+      const std::uint64_t tag = number(at, 2);
+      if (tag == 273 || tag == 324)
+        offsets = at;
+      if (tag == 279 || tag == 325)
+        counts = at;
+    }
+    if (offsets != 0 && counts != 0)
+      for (std::uint64_t k = 0; k < std::min(number(offsets + 4, 4), number(counts + 4, 4)) && end <= m_bytes.size();
+           ++k)
+        end = std::max(end, value(offsets, k) + value(counts, k));
+    return end > m_bytes.size() ? fmt::format("truncated TIFF of {} bytes", m_bytes.size()) : std::string();
+  }
+
+private:
+  std::uint64_t number(std::uint64_t at, int size) const
+  {
+    std::uint64_t result = 0;
+    for (int i = 0; i < size; ++i) {
+      const std::uint64_t from = at + static_cast<std::uint64_t>(m_is_little ? size - 1 - i : i);
+      result = result << 8 | (from < m_bytes.size() ? m_bytes[from] : 0xFF);
+    }
+    return result;
+  }
+  /// The k-th value of the entry at \p entry, which is in the entry itself when it fits into four bytes.
+  std::uint64_t value(std::uint64_t entry, std::uint64_t k) const
+  {
+    const int size = number(entry + 2, 2) == 3 ? 2 : 4;
+    const bool is_inside = number(entry + 4, 4) * static_cast<std::uint64_t>(size) <= 4;
+    return number((is_inside ? entry + 8 : number(entry + 8, 4)) + k * static_cast<std::uint64_t>(size), size);
+  }
+  const Bytes &m_bytes;
+  bool m_is_little;
+};
+
+/// Size by the header of a PNG, BMP or JPEG, before anything is allocated for it; nothing for others.
+std::optional<cv::Size> sizeOf(const Bytes &bytes)
+{
+  const auto big16 = [&bytes](std::size_t at) { return static_cast<int>(bytes[at]) << 8 | bytes[at + 1]; };
+  if (bytes.size() >= 24 && bytes[0] == 0x89 && bytes[1] == 'P')
+    return cv::Size(static_cast<int>(std::min(bigEndian32(&bytes[16]), 1u << 30)),
+                    static_cast<int>(std::min(bigEndian32(&bytes[20]), 1u << 30)));
+  if (bytes.size() >= 26 && bytes[0] == 'B' && bytes[1] == 'M') {
+    std::int32_t size[2];
+    std::memcpy(size, &bytes[18], sizeof size);
+    return cv::Size(std::abs(size[0] % (1 << 30)), std::abs(size[1] % (1 << 30)));
+  }
+  if (bytes[0] == 0xFF && bytes.size() > 4 && bytes[1] == 0xD8)
+    for (std::size_t at = 2; at + 9 < bytes.size() && bytes[at] == 0xFF;
+         at += 2 + static_cast<std::size_t>(big16(at + 2))) {
+      const int marker = bytes[at + 1];
+      if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC)
+        return cv::Size(big16(at + 7), big16(at + 5));
+    }
+  return std::nullopt;
+}
+
 std::string containerFault(const Bytes &bytes)
 {
   const std::array<unsigned char, 8> png{{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A}};
@@ -78,6 +148,9 @@ std::string containerFault(const Bytes &bytes)
     return pngFault(bytes);
   if (bytes.size() >= 3 && bytes[0] == 0xFF && bytes[1] == 0xD8 && bytes[2] == 0xFF)
     return jpegFault(bytes);
+  if (bytes.size() >= 8 && ((bytes[0] == 'I' && bytes[1] == 'I' && bytes[2] == 42) ||
+                            (bytes[0] == 'M' && bytes[1] == 'M' && bytes[3] == 42)))
+    return TiffDirectory(bytes).fault();
   return {};
 }
 
@@ -87,11 +160,16 @@ ImageFile broken(FrameStatus status, const std::string &path, const std::string 
 }
 } // namespace
 
-ImageFile readImageFile(const std::string &path)
+ImageFile readImageFile(const std::string &path, int width, int height)
 {
+  constexpr std::uintmax_t kLargestFile = std::uintmax_t{256} << 20; // bytes
+  constexpr double kMostPixels = 1e8;
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
-    return broken(FrameStatus::missing, path, "no such image");
+    return broken(FrameStatus::missing, path,
+                  std::filesystem::exists(path, error) ? "is no file of an image" : "no such image");
+  if (std::filesystem::file_size(path, error) > kLargestFile)
+    return broken(FrameStatus::corrupt, path, "larger than 256 MB");
   std::ifstream file(path, std::ios::binary);
   const Bytes bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   if (!file.is_open() || file.bad())
@@ -99,6 +177,13 @@ ImageFile readImageFile(const std::string &path)
   const std::string fault = containerFault(bytes);
   if (!fault.empty())
     return broken(FrameStatus::corrupt, path, fault);
+  if (const auto size = sizeOf(bytes); size && width > 0 && *size != cv::Size(width, height))
+    return broken(FrameStatus::resized, path,
+                  fmt::format("image of {}x{} px, must be {}x{}", size->width, size->height, width, height));
+  else if (size && static_cast<double>(size->width) * size->height > kMostPixels)
+    return broken(
+        FrameStatus::corrupt, path,
+        fmt::format("image of {}x{} px, must be at most {:g} pixels", size->width, size->height, kMostPixels));
 
   cv::Mat grey;
   try {

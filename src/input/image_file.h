@@ -11,12 +11,13 @@ namespace bole
 {
 struct ImageFile
 {
-  FrameStatus status = FrameStatus::ok; ///< ok, corrupt or missing
+  FrameStatus status = FrameStatus::ok; ///< ok, corrupt, missing or resized
   std::string message;                  ///< why not ok
   vpImage<unsigned char> image;         ///< grey; empty when not ok
 };
 
 /// Decodes \p path as grey. A file that ends early is corrupt even where its decoder would fill the
 /// rest with grey (JPEG) or leave the last rows undefined.
-ImageFile readImageFile(const std::string &path);
+/// \param width, height [px] of the images before: one of another size is `resized` and not decoded; 0: any size.
+ImageFile readImageFile(const std::string &path, int width = 0, int height = 0);
 } // namespace bole

@@ -1,14 +1,56 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/image_health.h"
+#include "input/gyro_agreement.h"
+#include "input/image_measures.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <deque>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
+#include <opencv2/core.hpp>
+#include <vector>
 
 namespace bole
 {
+namespace
+{
+constexpr std::size_t kMemory = 8;      // accepted images that tell what is usual
+constexpr double kMinDeviation = 3;     // grey levels: below, an image is blank
+constexpr int kDarkLevel = 24;          // 99 % of the pixels below: no more than the camera's own noise
+constexpr double kBrightShare = 0.65;   // of the pixels: beyond, no trunk is left between the flares
+constexpr double kMaxRoughness = 0.75;  // difference of neighbours over deviation; white noise has 1.1
+constexpr double kNoiseFactor = 1.8;    // times the usual noise, and
+constexpr double kNoiseAdded = 8;       // grey levels above it: more than a codec adds at a low bit rate
+constexpr double kBlurFactor = 0.4;     // of the usual sharpness
+constexpr double kRepeatedShare = 0.15; // of the rows or columns, beyond the last good image's
+constexpr double kSamePixels = 0.999;   // a clock in the corner may go on
+constexpr double kFrozenChange = 1.3;   // grey levels of the thumb: noise of 5 grey levels, averaged
+constexpr double kFrozenShare = 0.12;   // of the least of the last three changes: no flight stops so fast
+constexpr double kStillRotation = 2e-3; // rad: by the gyro the camera may stand still
+constexpr double kSureMatch = 0.75;     // correlation of two images that show the same
+constexpr double kFlipGain = 0.3;       // correlation that an exchange of sides must add
+constexpr double kFlipLeast = 0.6;      // correlation that it must reach
+constexpr int kLastsMost = 30;          // frames that blur and noise are refused before they count as usual
+constexpr int kJumpsMost = 5;           // frames out of order before the new place is believed
+
+double medianOf(const std::deque<double> &values)
+{
+  std::vector<double> sorted(values.begin(), values.end());
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+void remember(std::deque<double> &values, double value)
+{
+  values.push_back(value);
+  if (values.size() > kMemory)
+    values.pop_front();
+}
+
+/// Shift of a distant image over the focal length when the camera rotates by \p rotation.
+Eigen::Vector2d shiftOf(const Eigen::Vector3d &rotation) { return {rotation.y(), -rotation.x()}; }
+} // namespace
+
 const char *toString(ImageFault fault)
 {
   switch (fault) {
@@ -18,92 +60,245 @@ const char *toString(ImageFault fault)
     return "wrong size";
   case ImageFault::black:
     return "black";
+  case ImageFault::saturated:
+    return "saturated";
   case ImageFault::noise:
     return "noise";
-  case ImageFault::frozen:
-    return "frozen";
+  case ImageFault::blurred:
+    return "blurred";
   case ImageFault::smeared:
     return "smeared";
+  case ImageFault::frozen:
+    return "frozen";
+  case ImageFault::mirrored:
+    return "mirrored";
+  case ImageFault::upside_down:
+    return "upside down";
+  case ImageFault::out_of_order:
+    return "out of order";
+  case ImageFault::late:
+    return "late";
   }
   return "?";
 }
 
-void ImageHealth::Options::validate() const
+struct ImageHealth::State
 {
-  const auto check = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} .. {}", name, value, low, high));
+  Options options;
+  cv::Mat last;     ///< the last accepted image
+  cv::Mat thumb;    ///< of it
+  cv::Mat previous; ///< thumb of the last image that had a picture in it, accepted or not
+  bool may_repeat = true;
+  double good_repeated = 0;
+  std::deque<double> noises, sharpnesses, changes; ///< of accepted images; noise over deviation
+  int bad_quality = 0, jumps = 0;
+  std::optional<Eigen::Vector3d> gyro = Eigen::Vector3d::Zero(),
+                                 odometry = Eigen::Vector3d::Zero(); ///< since `previous`
+  double gyro_since_good = 0;                                        ///< angle [rad], negative where it is not known
+  GyroAgreement agreement;
+  std::string reason;
+
+  ImageFault say(ImageFault fault, std::string text)
+  {
+    reason = std::move(text);
+    return fault;
+  }
+  void addMotion(const MeasuredRotation &motion);
+  ImageFault judgeAlone(const ImageNumbers &numbers);
+  ImageFault judgeQuality(const ImageNumbers &numbers);
+  ImageFault judgeFrozen(const cv::Mat &image, const cv::Mat &small);
+  ImageFault judgeOrder(const cv::Mat &small, const MeasuredRotation &motion);
+  void accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers);
+};
+
+void ImageHealth::State::addMotion(const MeasuredRotation &motion)
+{
+  const auto add = [](std::optional<Eigen::Vector3d> &sum, const std::optional<Eigen::Vector3d> &part) {
+    if (sum && part)
+      *sum += *part;
+    else
+      sum.reset();
   };
-  check("min_deviation", min_deviation, 0, 50);
-  check("max_roughness", max_roughness, 0.3, 1);
-  check("max_repeated", max_repeated, 0, 1);
-  check("same_pixels", same_pixels, 0.5, 1);
+  add(gyro, motion.gyro);
+  add(odometry, motion.odometry);
+  gyro_since_good = motion.gyro && gyro_since_good >= 0 ? gyro_since_good + motion.gyro->norm() : -1;
 }
 
-ImageHealth::Numbers ImageHealth::measure(const vpImage<unsigned char> &I)
+/// What an image shows by itself.
+ImageFault ImageHealth::State::judgeAlone(const ImageNumbers &numbers)
 {
-  const int w = int(I.getWidth()), h = int(I.getHeight());
-  Numbers numbers;
-  if (w < 8 || h < 8)
-    return numbers;
-  long n = 0, sum = 0, squares = 0, rough = 0;
-  int repeated_rows = 0;
-  for (int v = 1; v < h; ++v) {
-    const unsigned char *row = I[unsigned(v)], *above = I[unsigned(v - 1)];
-    int difference = 0;
-    for (int u = 1; u < w; u += 4) {
-      const int g = row[u];
-      sum += g, squares += g * g;
-      rough += std::abs(g - row[u - 1]);
-      difference += std::abs(g - above[u]);
-      ++n;
-    }
-    repeated_rows += difference * 8 < w / 4 ? 1 : 0; // less than an eighth of a grey level a pixel
-  }
-  int repeated_columns = 0;
-  for (int u = 4; u < w; ++u) {
-    int difference = 0;
-    for (int v = 0; v < h; v += 8)
-      difference += std::abs(I[unsigned(v)][u] - I[unsigned(v)][u - 1]);
-    repeated_columns += difference * 8 < h / 8 ? 1 : 0;
-  }
-  const double mean = double(sum) / double(n);
-  numbers.deviation = std::sqrt(std::max(0.0, double(squares) / double(n) - mean * mean));
-  numbers.roughness = numbers.deviation > 0 ? double(rough) / double(n) / numbers.deviation : 0;
-  numbers.repeated = std::max(double(repeated_rows) / h, double(repeated_columns) / w);
-  return numbers;
+  if (numbers.bright_share > kBrightShare)
+    return say(ImageFault::saturated, fmt::format("saturated: {:.0f} % of the pixels", 100 * numbers.bright_share));
+  if (numbers.deviation < kMinDeviation)
+    return say(ImageFault::black, fmt::format("no contrast: deviation of {:.1f} grey levels", numbers.deviation));
+  if (numbers.level_99 < kDarkLevel)
+    return say(ImageFault::black, fmt::format("dark: 99 % of the pixels below grey level {}", numbers.level_99));
+  if (numbers.roughness > kMaxRoughness)
+    return say(ImageFault::noise, "nothing but noise");
+  return ImageFault::none;
 }
+
+/// Noise, sharpness and repeated rows against what is usual.
+ImageFault ImageHealth::State::judgeQuality(const ImageNumbers &numbers)
+{
+  ImageFault fault = ImageFault::none;
+  if (numbers.repeated > good_repeated + kRepeatedShare)
+    fault = say(ImageFault::smeared,
+                fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
+  else if (noises.size() >= 2) {
+    const double usual = medianOf(noises) * numbers.deviation, usual_sharpness = medianOf(sharpnesses);
+    if (numbers.noise > kNoiseFactor * usual && numbers.noise > usual + kNoiseAdded)
+      fault = say(ImageFault::noise, fmt::format("noise of {:.0f} grey levels after {:.0f}", numbers.noise, usual));
+    else if (numbers.sharpness < kBlurFactor * usual_sharpness)
+      fault = say(ImageFault::blurred,
+                  fmt::format("blurred: {:.0f} % of the usual sharpness", 100 * numbers.sharpness / usual_sharpness));
+  }
+  bad_quality = fault == ImageFault::none ? 0 : bad_quality + 1;
+  if (bad_quality <= kLastsMost)
+    return fault;
+  good_repeated = numbers.repeated; // the camera is another one now
+  noises.clear();
+  sharpnesses.clear();
+  bad_quality = 0;
+  return ImageFault::none;
+}
+
+/// The last accepted image again, pixel by pixel or under fresh noise.
+ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &small)
+{
+  if (!options.detect_frozen || may_repeat)
+    return ImageFault::none;
+  const int changed = cv::countNonZero(image != last);
+  if (changed <= (1 - kSamePixels) * static_cast<double>(image.total()))
+    return say(ImageFault::frozen, changed == 0 ? "the same image as before"
+                                                : fmt::format("the same image as before but for {} pixels", changed));
+  if (changes.size() < 3)
+    return ImageFault::none;
+  const double least = *std::min_element(changes.end() - 3, changes.end());
+  const double change = changeBetween(thumb, small);
+  const bool may_stand = gyro_since_good >= 0 && gyro_since_good < kStillRotation;
+  if (change < kFrozenChange && change < kFrozenShare * least && !may_stand)
+    return say(ImageFault::frozen, "the image before under fresh noise");
+  return ImageFault::none;
+}
+
+/// Against the images before and the gyro.
+ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRotation &motion)
+{
+  const ImageMatch with_last = matchImages(thumb, small);
+  if (with_last.correlation < kFlipLeast) {
+    cv::Mat flipped;
+    for (const int code : {-1, 1}) {
+      cv::flip(small, flipped, code);
+      const double other = matchImages(thumb, flipped).correlation;
+      if (other > kFlipLeast && other > with_last.correlation + kFlipGain)
+        return code == -1 ? say(ImageFault::upside_down, "upside down against the frame before")
+                          : say(ImageFault::mirrored, "mirrored against the frame before");
+    }
+  }
+  if (!gyro || motion.focal_px <= 0) {
+    agreement.reset();
+    return ImageFault::none;
+  }
+  const double focal = motion.focal_px * small.cols / last.cols;
+  if ((focal * shiftOf(*gyro)).cwiseAbs().maxCoeff() > 0.4 * kSearchShare * small.cols) {
+    agreement.reset(); // farther than images are searched for each other
+    return ImageFault::none;
+  }
+  const ImageMatch moved = previous.data == thumb.data ? with_last : matchImages(previous, small);
+  GyroAgreement::Interval interval;
+  interval.image = Eigen::Vector2d(moved.x, moved.y) / focal;
+  interval.gyro = shiftOf(*gyro);
+  interval.is_sure = moved.correlation > kSureMatch;
+  if (odometry)
+    interval.odometry = shiftOf(*odometry);
+  const GyroAgreement::Verdict verdict = agreement.add(interval);
+  jumps = verdict == GyroAgreement::Verdict::jumped ? jumps + 1 : 0;
+  switch (verdict) {
+  case GyroAgreement::Verdict::agrees:
+    return ImageFault::none;
+  case GyroAgreement::Verdict::jumped:
+    return jumps > kJumpsMost
+               ? ImageFault::none
+               : say(ImageFault::out_of_order, "out of order: it does not follow the frame before as the "
+                                               "gyro says");
+  case GyroAgreement::Verdict::late:
+    return say(ImageFault::late, fmt::format("{} by {} frames against the gyro", agreement.lag() > 0 ? "late" : "early",
+                                             std::abs(agreement.lag())));
+  case GyroAgreement::Verdict::mirrored:
+    return say(ImageFault::mirrored, "mirrored against the gyro");
+  case GyroAgreement::Verdict::upside_down:
+    return say(ImageFault::upside_down, "upside down against the gyro");
+  }
+  return ImageFault::none;
+}
+
+void ImageHealth::State::accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers)
+{
+  if (!thumb.empty())
+    remember(changes, changeBetween(thumb, small));
+  remember(noises, numbers.noise / std::max(numbers.deviation, kMinDeviation)); // the same at any brightness
+  remember(sharpnesses, numbers.sharpness);
+  good_repeated = numbers.repeated;
+  image.copyTo(last);
+  thumb = small;
+  gyro_since_good = 0;
+}
+
+ImageHealth::ImageHealth() : ImageHealth(Options{}) {}
+ImageHealth::ImageHealth(const Options &options) : m_state(std::make_unique<State>()) { m_state->options = options; }
+ImageHealth::~ImageHealth() = default;
+ImageHealth::ImageHealth(ImageHealth &&) noexcept = default;
+ImageHealth &ImageHealth::operator=(ImageHealth &&) noexcept = default;
+
+const std::string &ImageHealth::reason() const { return m_state->reason; }
 
 void ImageHealth::start(const vpImage<unsigned char> &I)
 {
-  m_last = I;
-  m_may_repeat = true;
-  m_good_repeated = measure(I).repeated;
+  const Options options = m_state->options;
+  *m_state = State();
+  m_state->options = options;
+  const cv::Mat image(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
+  const cv::Mat small = thumbOf(image);
+  m_state->accept(image, small, measureImage(image));
+  m_state->previous = small;
 }
 
-ImageFault ImageHealth::check(const vpImage<unsigned char> &I)
+void ImageHealth::skip(const MeasuredRotation &motion) { m_state->addMotion(motion); }
+
+ImageFault ImageHealth::check(const vpImage<unsigned char> &I, const MeasuredRotation &motion)
 {
-  if (I.getWidth() != m_last.getWidth() || I.getHeight() != m_last.getHeight())
-    return ImageFault::wrong_size;
-  bool same = false;
-  if (m_options.detect_frozen && !m_may_repeat) {
-    long equal = 0;
-    for (unsigned i = 0; i < I.getSize(); ++i)
-      equal += I.bitmap[i] == m_last.bitmap[i] ? 1 : 0;
-    same = double(equal) >= m_options.same_pixels * double(I.getSize());
+  constexpr unsigned kSmallest_px = 24;
+  State &s = *m_state;
+  s.reason.clear();
+  s.addMotion(motion);
+  const cv::Mat image(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
+  if (!s.last.empty() && image.size() != s.last.size())
+    return s.say(ImageFault::wrong_size,
+                 fmt::format("image of {}x{} px, must be {}x{}", image.cols, image.rows, s.last.cols, s.last.rows));
+  if (I.getWidth() < kSmallest_px || I.getHeight() < kSmallest_px)
+    return ImageFault::none;
+  const ImageNumbers numbers = measureImage(image);
+  ImageFault fault = s.judgeAlone(numbers);
+  if (fault == ImageFault::none && !s.last.empty())
+    fault = s.judgeQuality(numbers);
+  const bool has_picture = fault == ImageFault::none || fault == ImageFault::blurred;
+  if (!has_picture)
+    return fault;
+  const cv::Mat small = thumbOf(image);
+  if (fault == ImageFault::none && !s.last.empty()) {
+    fault = s.judgeFrozen(image, small);
+    if (fault == ImageFault::frozen)
+      return fault;
+    fault = s.judgeOrder(small, motion);
+    s.previous = small;
+    s.gyro = s.odometry = Eigen::Vector3d::Zero();
   }
-  m_may_repeat = false;
-  const Numbers numbers = measure(I);
-  std::copy(I.bitmap, I.bitmap + I.getSize(), m_last.bitmap);
-  if (numbers.deviation < m_options.min_deviation)
-    return ImageFault::black;
-  if (numbers.roughness > m_options.max_roughness)
-    return ImageFault::noise;
-  if (same)
-    return ImageFault::frozen;
-  if (numbers.repeated > m_good_repeated + m_options.max_repeated)
-    return ImageFault::smeared;
-  m_good_repeated = numbers.repeated;
-  return ImageFault::none;
+  s.may_repeat = false;
+  if (fault == ImageFault::none)
+    s.accept(image, small, numbers);
+  if (s.previous.empty())
+    s.previous = small;
+  return fault;
 }
 } // namespace bole

@@ -53,7 +53,7 @@ SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &kno
   std::set<std::string> seen;
   for (const auto &entry : m_root) {
     const auto key = entry.first.as<std::string>();
-    if (known_keys.count(key) == 0)
+    if (!known_keys.empty() && known_keys.count(key) == 0)
       failAt(path, entry.first.Mark(), fmt::format("unknown key \"{}\"", key));
     if (!seen.insert(key).second)
       failAt(path, entry.first.Mark(), fmt::format("repeated key \"{}\"", key));
@@ -95,7 +95,7 @@ std::vector<double> SensorYaml::numbers(const std::string &key) const
   return values;
 }
 
-Pose SensorYaml::rigidMotion(const std::string &key) const
+std::vector<double> SensorYaml::matrix(const std::string &key) const
 {
   std::vector<double> values;
   const YAML::Node node = at(key);
@@ -105,6 +105,12 @@ Pose SensorYaml::rigidMotion(const std::string &key) const
   catch (const YAML::Exception &) {
     fail(key, "finite numbers");
   }
+  return values;
+}
+
+Pose SensorYaml::rigidMotion(const std::string &key) const
+{
+  const std::vector<double> values = matrix(key);
   if (values.size() != 16)
     fail(key, "16 numbers");
   const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());

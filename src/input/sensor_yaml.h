@@ -12,7 +12,8 @@
 
 namespace bole
 {
-/// A YAML map of which every key is known. Errors are "file:line: key = value, must be ...".
+/// A YAML map of which every key is known (any key where none is given). Errors are "file:line: key = value, must be
+/// ...".
 class SensorYaml
 {
 public:
@@ -21,6 +22,8 @@ public:
   bool has(const std::string &key) const { return static_cast<bool>(m_root[key]); }
   std::string text(const std::string &key) const;
   std::vector<double> numbers(const std::string &key) const;
+  /// Numbers of a matrix of any shape, as {cols, rows, data: [...]} or a list, row by row.
+  std::vector<double> matrix(const std::string &key) const;
   /// 4x4 rigid motion under \p key, as {cols, rows, data: [16 numbers]} or a list of four rows.
   Pose rigidMotion(const std::string &key) const;
   [[noreturn]] void fail(const std::string &key, const std::string &must_be) const;
@@ -31,4 +34,7 @@ private:
   std::string m_path;
   YAML::Node m_root;
 };
+
+/// `T_BS` of an EuRoC `sensor.yaml` of any sensor; identity when the file is absent or has no such key.
+Pose readSensorPose(const std::string &path);
 } // namespace bole

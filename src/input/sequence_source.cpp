@@ -130,7 +130,9 @@ bool SequenceSource::next(Frame &frame)
   if (state.at > state.numbers.last)
     return false;
   const long number = state.at++;
-  state.builder->build(state.stampOf(number), readImageFile(imagePath(state.pattern, number)), frame);
+  FrameBuilder &builder = *state.builder;
+  builder.build(state.stampOf(number),
+                readImageFile(imagePath(state.pattern, number), builder.inputWidth(), builder.inputHeight()), frame);
   return true;
 }
 

@@ -4,7 +4,7 @@
 /// Numbered images as a video.
 
 #include <bole/frame.h>
-#include <bole/source_options.h>
+#include <bole/open_source.h>
 
 namespace bole
 {

@@ -27,6 +27,25 @@ Pose readPose(const CsvReader &csv, const std::array<std::size_t, 4> &order)
   return Pose::fromQuaternion(qw, qx, qy, qz, t);
 }
 
+/// Adds a pose that a body can have had after the one before.
+void append(Trajectory &trajectory, const StampedPose &pose, const CsvReader &csv)
+{
+  constexpr double kFarthest_m = 1e6, kFastest_m_s = 300; // of anything that flies among trees, with its filter's jumps
+  if (pose.wMb.t.norm() > kFarthest_m)
+    csv.fail(
+        fmt::format("position = {:.3g} m from the origin, must be at most {:g} m", pose.wMb.t.norm(), kFarthest_m));
+  if (!trajectory.empty()) {
+    const StampedPose &before = trajectory.back();
+    const double elapsed_s = static_cast<double>(pose.stamp_ns - before.stamp_ns) * 1e-9;
+    const double moved_m = (pose.wMb.t - before.wMb.t).norm();
+    if (moved_m > kFastest_m_s * std::max(elapsed_s, 0.02))
+      csv.fail(fmt::format("speed = {:.3g} m in {:.3g} s, must be at most {:g} m/s (millimetres, or stamps in another "
+                           "unit?)",
+                           moved_m, elapsed_s, kFastest_m_s));
+  }
+  trajectory.push_back(pose);
+}
+
 Trajectory nonEmpty(Trajectory trajectory, const std::string &path)
 {
   if (trajectory.empty())
@@ -57,8 +76,10 @@ Trajectory readAslTrajectory(const std::string &path)
 {
   Trajectory trajectory;
   CsvReader csv(path, {8});
-  while (csv.next())
-    trajectory.push_back({csv.risingStampNs(0), readPose(csv, {4, 5, 6, 7})});
+  while (csv.next()) {
+    const std::int64_t stamp_ns = csv.risingStampNs(0);
+    append(trajectory, {stamp_ns, readPose(csv, {4, 5, 6, 7})}, csv);
+  }
   return nonEmpty(std::move(trajectory), path);
 }
 
@@ -66,8 +87,10 @@ Trajectory readTumTrajectory(const std::string &path)
 {
   Trajectory trajectory;
   CsvReader csv(path, {8, ' ', {}});
-  while (csv.next())
-    trajectory.push_back({csv.risingStampFromSeconds(0), readPose(csv, {7, 4, 5, 6})});
+  while (csv.next()) {
+    const std::int64_t stamp_ns = csv.risingStampFromSeconds(0);
+    append(trajectory, {stamp_ns, readPose(csv, {7, 4, 5, 6})}, csv);
+  }
   return nonEmpty(std::move(trajectory), path);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
-#include "input/video_decoder.h"
+#include "input/video_file.h"
 
 #include "input/video_source.h"
 
@@ -13,7 +13,7 @@ namespace bole
 {
 struct VideoSource::State
 {
-  State(const std::string &path, const SourceOptions &options) : name(path), decoder(path)
+  State(const std::string &path, const SourceOptions &options) : name(path), file(path)
   {
     readAhead();
     const Picture &first = ahead.back();
@@ -25,7 +25,7 @@ struct VideoSource::State
   void readAhead()
   {
     Picture picture;
-    while (decoder.next(picture)) {
+    while (file.next(picture)) {
       ahead.push_back(std::move(picture));
       if (!ahead.back().is_damaged)
         return;
@@ -37,7 +37,7 @@ struct VideoSource::State
   bool take(Picture &picture)
   {
     if (ahead.empty())
-      return decoder.next(picture);
+      return file.next(picture);
     picture = std::move(ahead.front());
     ahead.pop_front();
     return true;
@@ -45,7 +45,7 @@ struct VideoSource::State
 
   std::string name;
   std::string note;
-  VideoDecoder decoder;
+  VideoFile file;
   std::deque<Picture> ahead;
   MountedCamera camera;
   std::unique_ptr<FrameBuilder> builder;
@@ -58,7 +58,7 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
-  const std::int64_t duration_ns = m_state->decoder.duration_ns();
+  const std::int64_t duration_ns = m_state->file.duration_ns();
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_state->builder = std::make_unique<FrameBuilder>(m_state->camera, options, std::move(recording));
@@ -81,7 +81,7 @@ bool VideoSource::next(Frame &frame)
 
 PinholeCamera VideoSource::camera() const { return m_state->builder->camera(); }
 Pose VideoSource::bMc() const { return m_state->builder->bMc(); }
-std::size_t VideoSource::size() const { return m_state->decoder.frames(); }
+std::size_t VideoSource::size() const { return m_state->file.frames(); }
 std::string VideoSource::name() const { return m_state->name; }
 bool VideoSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
 bool VideoSource::hasGyro() const { return false; }

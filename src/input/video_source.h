@@ -4,7 +4,7 @@
 /// Video files.
 
 #include <bole/frame.h>
-#include <bole/source_options.h>
+#include <bole/open_source.h>
 
 namespace bole
 {
@@ -32,6 +32,7 @@ public:
   bool hasOdometry() const override;
   bool hasGyro() const override;
   bool isCameraKnown() const override;
+  bool isCompressed() const override { return true; }
   std::string note() const override;
 
 private:

@@ -26,12 +26,18 @@ vpMbTrunkTracker::Status statusOf(ImageFault fault)
   case ImageFault::wrong_size:
     return Status::wrong_size;
   case ImageFault::black:
+  case ImageFault::saturated:
     return Status::black;
   case ImageFault::noise:
     return Status::noise;
   case ImageFault::frozen:
     return Status::frozen;
   case ImageFault::smeared:
+  case ImageFault::blurred:
+  case ImageFault::mirrored:
+  case ImageFault::upside_down:
+  case ImageFault::out_of_order:
+  case ImageFault::late:
     return Status::smeared;
   case ImageFault::none:
     break;

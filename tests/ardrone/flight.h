@@ -3,6 +3,7 @@
 /// \file
 /// A made-up flight with known motion, and an emulator that flies it.
 
+#include "ardrone/drone_link.h"
 #include "geometry/so3.h"
 #include "lab/emulator/emulator.h"
 #include <bole/ardrone_source.h>
@@ -42,7 +43,7 @@ public:
     for (unsigned v = 0; v < m_height; ++v)
       for (unsigned u = 0; u < m_width; ++u)
         frame.image[v][u] = static_cast<unsigned char>(
-            128 + 80 * std::sin(0.13 * (u + 3.0 * static_cast<double>(m_index))) * std::cos(0.1 * v));
+            128 + 80 * std::sin(0.13 * (u - 1.2 * static_cast<double>(m_index))) * std::cos(0.1 * v)); // as it yaws
     const double t = static_cast<double>(m_index) * 0.05;
     frame.wMb_odometry = pose(t);
     for (int i = 1; i <= 10 && m_index > 0; ++i) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_clock.h"
+#include "ardrone/video_stamps.h"
 
 #include <gtest/gtest.h>
 #include <random>
@@ -65,4 +66,31 @@ TEST(ClockFit, IsNotReadyBeforeAFastPacketMayHaveCome)
   fit.add(400'000'000, 1'400'000'000 + 30'000'000);
   EXPECT_TRUE(fit.isReady());
   EXPECT_NEAR(static_cast<double>(fit.toHost(400'000'000)), 1.401e9, 1e5);
+}
+
+TEST(VideoStamps, AClockThatJumpsBackByASecondGoesOnFromWhereItWas)
+{
+  VideoStamps stamps;
+  std::int64_t arrival_ns = 0, last_ns = 0;
+  int unmeasured = 0;
+  for (int k = 0; k < 60; ++k, arrival_ns += 50'000'000) {
+    const auto stamp = stamps.next(static_cast<std::uint32_t>(10'000 + 50 * k - (k >= 30 ? 1000 : 0)), arrival_ns);
+    if (k > 0) {
+      EXPECT_NEAR(static_cast<double>(stamp.ns - last_ns), 50e6, 1e6) << k;
+    }
+    unmeasured += stamp.is_measured ? 0 : 1;
+    last_ns = stamp.ns;
+  }
+  EXPECT_EQ(unmeasured, 1);
+  EXPECT_EQ(stamps.jumps(), 1u);
+}
+
+TEST(ClockRate, TellsAClockThatRunsTwiceAsFast)
+{
+  ClockRate rate;
+  for (int k = 0; k < 100; ++k) {
+    rate.add(std::int64_t{2} * k * 40'000'000, std::int64_t{k} * 40'000'000 + (k % 7) * 10'000'000);
+    EXPECT_EQ(rate.rate().has_value(), k > 76) << k;
+  }
+  EXPECT_NEAR(*rate.rate(), 2, 0.1);
 }

@@ -22,7 +22,7 @@ std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t>
   ArDroneSource::Options options;
   options.give_up_s = 2; // longer than the reboot below
   options.grabber.open_timeout_s = test::kPatience_s;
-  ArDroneSource source(address, options);
+  ArDroneSource source(address.toString(), options);
   std::vector<Frame> frames;
   frames.reserve(1000); // ViSP copies empty images by memcpy from null
   for (;;) {
@@ -288,10 +288,10 @@ TEST(LiveSource, SaysWhenNobodyAnswersOrTheCameraDoesNotFit)
   nobody.navdata_port = nobody.video_port = nobody.at_port = 1;
   ArDroneSource::Options options;
   options.grabber.open_timeout_s = 0.3;
-  EXPECT_THROW(ArDroneSource(nobody, options), vpException);
+  EXPECT_THROW(ArDroneSource(nobody.toString(), options), vpException);
   const auto emulator = emulate(2, 40);
   options.grabber.open_timeout_s = test::kPatience_s;
-  EXPECT_THROW(ArDroneSource(emulator->address(), options),
+  EXPECT_THROW(ArDroneSource(emulator->address().toString(), options),
                vpException); // 160x120 is not the shape of 640x360
 }
 
@@ -303,7 +303,7 @@ TEST(LiveSource, FindsTheGenerationOut)
     address.generation = 0;
     vpArDroneGrabber::Options options;
     options.open_timeout_s = test::kPatience_s;
-    vpArDroneGrabber grabber(address, options);
+    vpArDroneGrabber grabber(address.toString(), options);
     vpImage<vpRGBa> image;
     grabber.open(image);
     EXPECT_EQ(grabber.getLink().generation(), generation);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
+#include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
+#include "lab/emulator/h264_encoder.h"
 
 #include "flight.h"
 
@@ -73,7 +75,7 @@ Bytes damaged(Bytes frame, Damage damage)
 /// Numbers of the frames that are `ok` when \p frames come one by one.
 std::vector<std::uint32_t> whole(const std::vector<Bytes> &frames)
 {
-  VideoDecoder decoder(2);
+  DroneVideoDecoder decoder(2);
   std::vector<std::uint32_t> numbers;
   for (const Bytes &bytes : frames)
     for (const DecodedFrame &frame : decoder.decode(bytes.data(), bytes.size()))
@@ -83,7 +85,7 @@ std::vector<std::uint32_t> whole(const std::vector<Bytes> &frames)
 }
 } // namespace
 
-TEST(VideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
+TEST(DroneVideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
 {
   const auto good = encodedFlight(50);
   ASSERT_EQ(whole(good).size(), 50u);
@@ -105,4 +107,29 @@ TEST(VideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWherever)
   RecordProperty("most_frames_lost", static_cast<int>(longest));
   EXPECT_LE(longest, kKeyInterval);
   EXPECT_GT(longest, 0u);
+}
+
+TEST(DroneVideoDecoder, DatagramsThatCannotBeAPictureAreNoFrames)
+{
+  DroneVideoDecoder decoder(1);
+  const Bytes tiny(12, 0xA5);
+  for (int k = 0; k < 10'000; ++k)
+    EXPECT_TRUE(decoder.decode(tiny.data(), tiny.size()).empty());
+  EXPECT_EQ(decoder.counters().refused, 10'000u);
+  EXPECT_EQ(decoder.counters().frames, 0u);
+}
+
+TEST(DroneVideoDecoder, ADatagramThatWasOvertakenIsNoFrame)
+{
+  test::MadeUpFlight flight(4);
+  std::vector<Bytes> pictures;
+  for (Frame frame; flight.next(frame);)
+    pictures.push_back(encodeUvlc(frame.image, static_cast<std::uint32_t>(frame.index + 1)));
+  DroneVideoDecoder decoder(1);
+  std::vector<std::uint32_t> numbers;
+  for (const std::size_t k : {0u, 2u, 1u, 2u, 3u})
+    for (const DecodedFrame &frame : decoder.decode(pictures[k].data(), pictures[k].size()))
+      numbers.push_back(frame.number);
+  EXPECT_EQ(numbers, (std::vector<std::uint32_t>{1, 3, 4}));
+  EXPECT_EQ(decoder.counters().refused, 2u);
 }

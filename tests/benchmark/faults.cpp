@@ -5,6 +5,7 @@
 //
 //   benchmark_faults [loss]     about six minutes, or the rows that say so; BOLE_FAULT_SECONDS=8
 //   flies only the first 8 s
+#include "ardrone/drone_link.h"
 #include "lab/emulator/emulator.h"
 #include <bole/ardrone_source.h>
 #include <bole/open_source.h>
@@ -145,7 +146,7 @@ Outcome fly(int generation, const Fault &fault, std::size_t frames)
   address.camera_path = kFlight + "/mav0/cam0/sensor.yaml";
   ArDroneSource::Options options;
   options.give_up_s = kGiveUp_s;
-  ArDroneSource source(address, options);
+  ArDroneSource source(address.toString(), options);
   Outcome outcome;
   std::map<FrameStatus, int> since_last; // those of the silence after the flight do not count
   const std::int64_t end_ns = nowNs() + static_cast<std::int64_t>(kDeadline_s * 1e9);

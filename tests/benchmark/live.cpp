@@ -32,7 +32,7 @@ void LiveFrameAge(benchmark::State &state)
     emulator.start();
     bole::ArDroneAddress address = emulator.address();
     address.camera_path = flight + "/mav0/cam0/sensor.yaml";
-    bole::ArDroneSource source(address, {});
+    bole::ArDroneSource source(address.toString(), {});
     std::vector<double> ages_ms;
     const std::int64_t end_ns = nowNs() + static_cast<std::int64_t>(seconds * 1e9);
     for (bole::Frame frame; nowNs() < end_ns && source.next(frame);) {

@@ -4,11 +4,11 @@
 #include "ardrone/files.h"
 
 #include "ardrone/at_command.h"
-#include "ardrone/h264.h"
 #include "ardrone/navdata.h"
 #include "ardrone/pave.h"
 #include "ardrone/recording.h"
 #include "ardrone/uvlc.h"
+#include "lab/emulator/h264_encoder.h"
 #include "smoothing/g2o.h"
 
 #include "support/flight.h"

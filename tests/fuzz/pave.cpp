@@ -9,7 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size
   if (size == 0)
     return 0;
   const std::size_t piece = 1 + data[0] * 8u;
-  bole::VideoDecoder decoder(2);
+  bole::DroneVideoDecoder decoder(2);
   bole::PaveParser parser;
   std::size_t used = 0;
   for (std::size_t at = 1; at < size; at += piece) {

@@ -2,6 +2,8 @@
 #include "flight_folder.h"
 #include "messages.h"
 
+#include "input/image_file.h"
+
 #include "input/asl_source.h"
 
 #include <gmock/gmock.h>
@@ -76,6 +78,44 @@ TEST(AslSource, EveryTruncationOfAPngIsCorrupt)
   }
 }
 
+TEST(AslSource, AHugePictureAmongSmallOnesIsNotDecoded)
+{
+  FlightFolder flight(3);
+  std::fstream file(flight.imagePath(1), std::ios::in | std::ios::out | std::ios::binary);
+  const char header[] = {0, 0, 0x7D, 0, 0, 0, 0x7D, 0, 8, 0, 0, 0, 0}; // IHDR of 32000x32000, 8 bit, grey
+  std::string chunk = std::string("IHDR") + std::string(header, sizeof header);
+  std::uint32_t crc = 0xFFFFFFFFu;
+  for (const char byte : chunk) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int k = 0; k < 8; ++k)
+      crc = (crc & 1) ? 0xEDB88320u ^ (crc >> 1) : crc >> 1;
+  }
+  crc = ~crc;
+  file.seekp(12);
+  file.write(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+  for (int k = 3; k >= 0; --k)
+    file.put(static_cast<char>(crc >> (8 * k)));
+  file.close();
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+  EXPECT_EQ(frames[1].status, FrameStatus::resized);
+  EXPECT_THAT(frames[1].message, HasSubstr("image of 32000x32000 px, must be 64x48"));
+  EXPECT_EQ(frames[2].status, FrameStatus::ok);
+}
+
+TEST(AslSource, ATiffThatWasCutOffIsCorrupt)
+{
+  FlightFolder flight(2);
+  const std::string path = flight.path() + "/whole.tiff";
+  ASSERT_TRUE(cv::imwrite(path, cv::imread(flight.imagePath(1), cv::IMREAD_GRAYSCALE)));
+  EXPECT_EQ(readImageFile(path).status, FrameStatus::ok) << readImageFile(path).message;
+  const auto size = std::filesystem::file_size(path);
+  for (const double share : {0.95, 0.5, 0.1}) {
+    std::filesystem::resize_file(path, static_cast<std::uintmax_t>(share * static_cast<double>(size)));
+    EXPECT_EQ(readImageFile(path).status, FrameStatus::corrupt) << share;
+  }
+}
+
 TEST(AslSource, AFlippedByteInAPngIsCorrupt)
 {
   FlightFolder flight(2);
@@ -114,6 +154,17 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
       {"mav0/odom0/data.csv", "900000000000,0,0,1,1,0,0,0\n", "never meet"},
       {"mav0/imu0/data.csv", "0,0,0,inf\n", "imu0/data.csv:1: w_z = \"inf\""},
       {"mav0/imu0/data.csv", "0.5,0,0,0\n", "imu0/data.csv:1: timestamp = \"0.5\""},
+      {"mav0/imu0/data.csv", "#h\n", "imu0/data.csv: no sample in it"},
+      {"mav0/imu0/data.csv", "0,17,0,0\n5000000,18,2,0\n", "looks like degrees per second"},
+      {"mav0/imu0/data.csv",
+       "0,0,0,0\n5,0,0,0\n10,0,0,0\n15,0,0,0\n20,0,0,0\n25,0,0,0\n30,0,0,0\n35,0,0,0\n40,0,0,0\n45,0,0,0\n",
+       "must be in nanoseconds"},
+      {"mav0/imu0/data.csv", "0,0,142302,0,282068,-0,176885\n",
+       "imu0/data.csv:1: the decimals look as if written with a comma"},
+      {"mav0/imu0/data.csv", "900000000000,0,0,0\n", "never meet those of the images"},
+      {"mav0/odom0/data.csv", "0;0;0;1;1;0;0;0\n", "semicolons"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,1e9,0,1,1,0,0,0\n", "odom0/data.csv:2: position"},
+      {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,900,0,1,1,0,0,0\n", "odom0/data.csv:2: speed"},
       {"mav0/cam0/data.csv", "100,a.png\n50,b.png\n", "cam0/data.csv:2: timestamp = 50 ns"},
       {"mav0/cam0/data.csv", "#nothing\n", "cam0/data.csv: no image"},
       {"mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\nfoo: 1\n",
@@ -129,6 +180,16 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
     flight.write(c.file, c.text);
     EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message)) << c.text;
   }
+}
+
+TEST(AslSource, ReadsAByteOrderMarkAndAHeaderWithoutItsSign)
+{
+  FlightFolder flight(3);
+  flight.write("mav0/odom0/data.csv",
+               "\xEF\xBB\xBFtimestamp,x,y,z,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n200000000,0.2,0,1,1,0,0,0\n");
+  flight.write("mav0/imu0/data.csv", "\xEF\xBB\xBF#timestamp\n0,0,0,0\n100000000,0,0,0\n");
+  AslSource source(flight.path());
+  EXPECT_TRUE(readAll(source)[1].wMb_odometry);
 }
 
 TEST(AslSource, RefusesFoldersThatAreNoFlight)

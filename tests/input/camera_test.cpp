@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "messages.h"
 
-#include "input/camera_file.h"
 #include "input/rectifier.h"
+#include <bole/open_source.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -101,6 +101,60 @@ TEST_F(CameraFile, ReadsTheModelOfTheArDrone1)
                                  "distortion_model: fov\ndistortion_coefficients: [0.272]\n"));
   EXPECT_EQ(camera.model.distortion, Distortion::fov);
   EXPECT_DOUBLE_EQ(camera.model.coefficients[0], 0.272);
+}
+
+TEST_F(CameraFile, ReadsCalibrationsOfOpenCvAndRos)
+{
+  const std::string opencv = R"(%YAML:1.0
+image_width: 320
+image_height: 240
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 205.4, 0., 161.2, 0., 205.0, 111.9, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ -0.2, 0.05, -0.003, 0.002, 0.01 ]
+avg_reprojection_error: 1.1
+)";
+  const MountedCamera camera = readCamera(write("opencv.yml", opencv));
+  EXPECT_EQ(camera.model.pinhole.height, 240);
+  EXPECT_DOUBLE_EQ(camera.model.pinhole.cy, 111.9);
+  EXPECT_DOUBLE_EQ(camera.model.coefficients[2], -0.003);
+  // The third radial coefficient is in the other two: at the corner to a fifth of a pixel.
+  const double r2 = std::pow(161.2 / 205.4, 2) + std::pow(128.1 / 205.0, 2);
+  const double full = 1 - 0.2 * r2 + 0.05 * r2 * r2 + 0.01 * r2 * r2 * r2;
+  const double folded = 1 + camera.model.coefficients[0] * r2 + camera.model.coefficients[1] * r2 * r2;
+  EXPECT_NEAR(full * std::sqrt(r2) * 205, folded * std::sqrt(r2) * 205, 0.2);
+  const std::string ros = "image_width: 320\nimage_height: 240\ncamera_name: front\n"
+                          "camera_matrix: {rows: 3, cols: 3, data: [200, 0, 160, 0, 201, 120, 0, 0, 1]}\n"
+                          "distortion_model: plumb_bob\n"
+                          "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n";
+  EXPECT_DOUBLE_EQ(readCamera(write("ros.yaml", ros)).model.pinhole.fy, 201);
+}
+
+TEST_F(CameraFile, RefusesCamerasThatCannotBe)
+{
+  const auto refusal = [this](const std::string &text) {
+    return messageOf([&] { readCamera(write("c.yaml", "resolution: [320, 240]\n" + text)); });
+  };
+  EXPECT_THAT(refusal("intrinsics: [1.0e-9, 1.0e-9, 160, 120]\n"), HasSubstr("field of view"));
+  EXPECT_THAT(refusal("intrinsics: [1.0e+9, 1.0e+9, 160, 120]\n"), HasSubstr("field of view"));
+  EXPECT_THAT(refusal("intrinsics: [200, 2000, 160, 120]\n"), HasSubstr("fx / fy"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 400, 120]\n"), HasSubstr("principal point"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\ndistortion_model: radtan\n"
+                      "distortion_coefficients: [1.0e+300, 0, 0, 0]\n"),
+              HasSubstr("folds"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\ndistortion_model: radtan\n"
+                      "distortion_coefficients: [-2.5, 0, 0, 0]\n"),
+              HasSubstr("folds"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [0,0,1,1.0e+9, -1,0,0,0, 0,-1,0,0, 0,0,0,1]\n"),
+              HasSubstr("from the body"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"),
+              HasSubstr("no rotation"));
 }
 
 TEST_F(CameraFile, NamesFileLineAndKeyOfAMistake)

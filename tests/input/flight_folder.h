@@ -3,6 +3,7 @@
 /// \file
 /// A small ASL folder on disk that tests may damage.
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
@@ -53,7 +54,10 @@ public:
   std::string imagePath(std::size_t i) const { return m_path + "/mav0/cam0/data/" + imageName(i); }
   static unsigned char pixel(std::size_t frame, int row, int column)
   {
-    return static_cast<unsigned char>((column * 31 + row * row * 17 + static_cast<int>(frame) * 57) % 251);
+    const double f = static_cast<double>(frame);
+    return static_cast<unsigned char>(128 + 40 * std::sin(0.31 * column + 0.2 * f) +
+                                      40 * std::sin(0.23 * row + 0.11 * column + 0.1 * f) +
+                                      30 * std::sin(0.47 * column - 0.19 * row + 0.25 * f));
   }
 
   void write(const std::string &file, const std::string &text) const

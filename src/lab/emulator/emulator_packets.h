@@ -3,8 +3,8 @@
 /// \file
 /// What an emulated drone says: pictures and navdata as bytes, numbered and stamped by its clocks.
 
-#include "ardrone/h264.h"
 #include "ardrone/navdata.h"
+#include "lab/emulator/h264_encoder.h"
 
 #include <memory>
 #include <vector>

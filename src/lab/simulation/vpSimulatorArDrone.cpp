@@ -3,8 +3,8 @@
 #include "geometry/body_velocity.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
-#include "input/camera_file.h"
 #include "lab/simulation/h264_link.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <cmath>

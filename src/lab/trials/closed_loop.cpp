@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/closed_loop.h"
 #include "geometry/require_range.h"
-#include "input/image_health.h"
+#include "input/frame_health.h"
 
 #include <algorithm>
 #include <ctime>
@@ -46,19 +46,6 @@ void takeOff(vpSimulatorArDrone &robot, const LoopOptions &options)
   }
 }
 
-void markBroken(Frame &frame, ImageHealth &health)
-{
-  if (frame.status != FrameStatus::ok)
-    return;
-  if (frame.index == 0)
-    return health.start(frame.image);
-  const ImageFault fault = health.check(frame.image);
-  if (fault == ImageFault::none)
-    return;
-  frame.status = fault == ImageFault::frozen ? FrameStatus::stale : FrameStatus::corrupt;
-  frame.message = toString(fault);
-}
-
 void give(vpSimulatorArDrone &robot, const TaskCommand &command)
 {
   if (command.is_hovering)
@@ -95,7 +82,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
 {
   options.validate();
   LoopRecord record;
-  ImageHealth health;
+  FrameHealth health(robot.camera(), robot.bMc());
   FaultInjector injector(options.fault);
   takeOff(robot, options);
   const double begin_s = robot.time();
@@ -112,7 +99,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
     sample.is_spoilt = injector.apply(frame, servoing_s);
 
     const double start_ms = processMs();
-    markBroken(frame, health);
+    health.judge(frame);
     const FrameReport report = pipeline.process(frame);
     const TaskCommand command = task.step(report);
     sample.loop_ms = processMs() - start_ms;

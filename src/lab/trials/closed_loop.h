@@ -61,7 +61,7 @@ using Judge = std::function<ServoTask::Values(const Pose &truth, const FrameRepo
 /// Called after each frame; false ends the flight.
 using LoopWatcher = std::function<bool(const Frame &, const FrameReport &, const LoopSample &)>;
 
-/// Takes off and flies. \p robot stands on the ground. Frames whose pixels cannot be believed (ImageHealth) reach the
+/// Takes off and flies. \p robot stands on the ground. Frames whose pixels cannot be believed (FrameHealth) reach the
 /// pipeline as corrupt or stale, as those of a live source do.
 LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
                          const Judge &judge = {}, const LoopWatcher &watcher = {});

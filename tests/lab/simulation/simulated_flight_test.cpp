@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 #include "input/truth.h"
 #include "lab/simulation/simulated_flight.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 #include "lab/tasks/servo_task.h"
 
 #include <Eigen/Geometry>
@@ -42,7 +42,7 @@ protected:
 TEST_F(Safety, HoversAtOnceWhereAFrameIsNotOk)
 {
   for (const FrameStatus status :
-       {FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized}) {
+       {FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized, FrameStatus::doubtful}) {
     Ahead task;
     for (int k = 0; k < 5; ++k)
       ASSERT_FALSE(hovers(task));

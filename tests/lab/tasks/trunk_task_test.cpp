@@ -3,7 +3,7 @@
 #include "support/drawn_trunks.h"
 
 #include "geometry/so3.h"
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 #include "lab/tasks/trunk_task.h"
 #include <bole/pipeline.h>
 

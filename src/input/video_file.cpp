@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/video_decoder.h"
+#include "input/video_file.h"
+#include "input/codec.h"
 #include "input/libav.h"
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <visp3/core/vpException.h>
 
 extern "C" {
@@ -23,38 +25,10 @@ namespace bole
 {
 namespace
 {
-template <typename Object, void (*release)(Object **)> struct Release
+struct CloseFormat
 {
-  void operator()(Object *object) const { release(&object); }
+  void operator()(AVFormatContext *format) const { avformat_close_input(&format); }
 };
-void releaseScaler(SwsContext **scaler) { sws_freeContext(*scaler); }
-
-using Format = std::unique_ptr<AVFormatContext, Release<AVFormatContext, avformat_close_input>>;
-using Codec = std::unique_ptr<AVCodecContext, Release<AVCodecContext, avcodec_free_context>>;
-using Packet = std::unique_ptr<AVPacket, Release<AVPacket, av_packet_free>>;
-using FramePtr = std::unique_ptr<AVFrame, Release<AVFrame, av_frame_free>>;
-using Scaler = std::unique_ptr<SwsContext, Release<SwsContext, releaseScaler>>;
-
-/// Keeps libav from writing to the terminal while it lives: its faults become exceptions or
-/// statuses.
-class Quiet
-{
-public:
-  Quiet() : m_level(av_log_get_level()) { av_log_set_level(AV_LOG_QUIET); }
-  ~Quiet() { av_log_set_level(m_level); }
-  Quiet(const Quiet &) = delete;
-  Quiet &operator=(const Quiet &) = delete;
-
-private:
-  int m_level;
-};
-
-[[noreturn]] void fail(const std::string &path, const char *what, int code)
-{
-  std::array<char, AV_ERROR_MAX_STRING_SIZE> reason{};
-  av_strerror(code, reason.data(), reason.size());
-  throw vpException(vpException::ioError, fmt::format("{}: {}: {}", path, what, reason.data()));
-}
 
 /// Quarter turns, clockwise, that bring the picture upright.
 int quarterTurns(AVStream &stream)
@@ -106,20 +80,19 @@ const std::array<unsigned char, 256> &fullRangeTable()
 }
 } // namespace
 
-struct VideoDecoder::Libav
+struct VideoFile::Libav
 {
-  Format format;
-  Codec codec;
-  Packet packet{av_packet_alloc()};
-  FramePtr frame{av_frame_alloc()};
-  Scaler scaler;
+  std::unique_ptr<AVFormatContext, CloseFormat> format;
+  std::optional<PictureDecoder> decoder;
+  LibavPtr<AVPacket> packet{av_packet_alloc()};
+  LibavPtr<SwsContext> scaler;
   int stream = 0;
   int quarter_turns = 0;
 
   cv::Mat grey(const AVFrame &picture);
 };
 
-cv::Mat VideoDecoder::Libav::grey(const AVFrame &picture)
+cv::Mat VideoFile::Libav::grey(const AVFrame &picture)
 {
   const auto pixel_format = static_cast<AVPixelFormat>(picture.format);
   cv::Mat image(picture.height, picture.width, CV_8UC1);
@@ -149,46 +122,37 @@ cv::Mat VideoDecoder::Libav::grey(const AVFrame &picture)
   return image;
 }
 
-VideoDecoder::VideoDecoder(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
+VideoFile::VideoFile(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
 {
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
-  const Quiet quiet;
+  const QuietLibav quiet;
   AVFormatContext *format = nullptr;
-  int code = avformat_open_input(&format, path.c_str(), nullptr, nullptr);
-  if (code < 0)
-    fail(path, "no video", code);
+  checkLibav(avformat_open_input(&format, path.c_str(), nullptr, nullptr), path + ": no video");
   m_libav->format.reset(format);
-  code = avformat_find_stream_info(format, nullptr);
-  if (code < 0)
-    fail(path, "no video", code);
-  const AVCodec *decoder = nullptr;
-  m_libav->stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
-  if (m_libav->stream < 0)
-    fail(path, "no video stream that can be decoded", m_libav->stream);
+  checkLibav(avformat_find_stream_info(format, nullptr), path + ": no video");
+  m_libav->stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+  checkLibav(m_libav->stream, path + ": no video stream that can be decoded");
 
   AVStream &stream = *format->streams[m_libav->stream];
-  m_libav->codec.reset(avcodec_alloc_context3(decoder));
-  AVCodecContext &codec = *m_libav->codec;
-  avcodec_parameters_to_context(&codec, stream.codecpar);
-  codec.thread_count = 1;
-  codec.pkt_timebase = stream.time_base;
-  codec.err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
-  code = avcodec_open2(&codec, decoder, nullptr);
-  if (code < 0)
-    fail(path, "its codec cannot be opened", code);
+  try {
+    m_libav->decoder.emplace(*stream.codecpar);
+  }
+  catch (const vpException &error) {
+    throw vpException(vpException::ioError, fmt::format("{}: {}", path, error.getStringMessage()));
+  }
   m_libav->quarter_turns = quarterTurns(stream);
 }
 
-VideoDecoder::~VideoDecoder() = default;
+VideoFile::~VideoFile() = default;
 
-std::size_t VideoDecoder::frames() const
+std::size_t VideoFile::frames() const
 {
   const std::int64_t count = m_libav->format->streams[m_libav->stream]->nb_frames;
   return count > 0 ? static_cast<std::size_t>(count) : 0;
 }
 
-std::int64_t VideoDecoder::duration_ns() const
+std::int64_t VideoFile::duration_ns() const
 {
   const AVFormatContext &format = *m_libav->format;
   const AVStream &stream = *format.streams[m_libav->stream];
@@ -198,7 +162,7 @@ std::int64_t VideoDecoder::duration_ns() const
   return format.duration > 0 ? av_rescale_q(format.duration, {1, AV_TIME_BASE}, nanoseconds) : 0;
 }
 
-bool VideoDecoder::next(Picture &picture)
+bool VideoFile::next(Picture &picture)
 {
   while (m_ready.empty() && !m_is_at_end)
     decodeMore();
@@ -210,11 +174,10 @@ bool VideoDecoder::next(Picture &picture)
 }
 
 /// Feeds one packet of the stream, or the end of it, and takes what comes out.
-void VideoDecoder::decodeMore()
+void VideoFile::decodeMore()
 {
-  const Quiet quiet;
+  const QuietLibav quiet;
   AVPacket &packet = *m_libav->packet;
-  AVCodecContext &codec = *m_libav->codec;
   const bool has_packet = av_read_frame(m_libav->format.get(), &packet) >= 0;
   if (has_packet && packet.stream_index != m_libav->stream) {
     av_packet_unref(&packet);
@@ -226,12 +189,10 @@ void VideoDecoder::decodeMore()
     m_pending.insert(packet.pts);
   // A damaged packet is an error here; its place in m_pending is reported when a later picture
   // comes.
-  avcodec_send_packet(&codec, has_packet ? &packet : nullptr);
+  m_libav->decoder->send(has_packet ? &packet : nullptr);
   av_packet_unref(&packet);
-  while (avcodec_receive_frame(&codec, m_libav->frame.get()) >= 0) {
-    take(*m_libav->frame);
-    av_frame_unref(m_libav->frame.get());
-  }
+  while (const AVFrame *frame = m_libav->decoder->receive())
+    take(*frame);
   if (!has_packet) {
     reportLost(std::numeric_limits<std::int64_t>::max());
     reportMissing();
@@ -239,7 +200,7 @@ void VideoDecoder::decodeMore()
   }
 }
 
-std::int64_t VideoDecoder::stampOf(std::int64_t pts)
+std::int64_t VideoFile::stampOf(std::int64_t pts)
 {
   const AVStream &stream = *m_libav->format->streams[m_libav->stream];
   const AVRational nanoseconds{1, 1'000'000'000};
@@ -260,7 +221,7 @@ std::int64_t VideoDecoder::stampOf(std::int64_t pts)
   return stamp_ns;
 }
 
-void VideoDecoder::reportLost(std::int64_t before)
+void VideoFile::reportLost(std::int64_t before)
 {
   while (!m_pending.empty() && *m_pending.begin() < before) {
     Picture lost;
@@ -273,7 +234,7 @@ void VideoDecoder::reportLost(std::int64_t before)
 }
 
 /// A file that was cut off: its container counts more pictures than came.
-void VideoDecoder::reportMissing()
+void VideoFile::reportMissing()
 {
   constexpr std::size_t kMostBelievable = 10'000'000; // four days at 30 Hz: the count itself is damaged
   if (frames() > kMostBelievable)
@@ -287,13 +248,13 @@ void VideoDecoder::reportMissing()
   }
 }
 
-void VideoDecoder::emit(Picture picture)
+void VideoFile::emit(Picture picture)
 {
   m_ready.push_back(std::move(picture));
   ++m_counted;
 }
 
-void VideoDecoder::take(const AVFrame &frame)
+void VideoFile::take(const AVFrame &frame)
 {
   const std::int64_t pts = frame.best_effort_timestamp;
   if (pts != AV_NOPTS_VALUE) {
@@ -302,7 +263,7 @@ void VideoDecoder::take(const AVFrame &frame)
   }
   Picture picture;
   picture.stamp_ns = stampOf(pts);
-  picture.is_damaged = (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
+  picture.is_damaged = PictureDecoder::isDamaged(frame);
   if (picture.is_damaged)
     picture.message = "damaged data, concealed by the decoder";
   const cv::Mat grey = m_libav->grey(frame);

@@ -11,7 +11,6 @@
 #include <visp3/core/vpImage.h>
 
 struct AVFrame;
-struct AVPacket;
 
 namespace bole
 {
@@ -32,14 +31,14 @@ struct Picture
 /// decoder had to conceal are damaged too. A file that was cut off goes on with missing pictures up
 /// to the count of its container (AVI, MP4; Matroska has none). A rotation by quarter turns that the
 /// file asks for is applied.
-class VideoDecoder
+class VideoFile
 {
 public:
   /// Throws vpException when the file is no video that can be decoded.
-  explicit VideoDecoder(const std::string &path);
-  ~VideoDecoder();
-  VideoDecoder(const VideoDecoder &) = delete;
-  VideoDecoder &operator=(const VideoDecoder &) = delete;
+  explicit VideoFile(const std::string &path);
+  ~VideoFile();
+  VideoFile(const VideoFile &) = delete;
+  VideoFile &operator=(const VideoFile &) = delete;
 
   /// False at the end.
   bool next(Picture &picture);

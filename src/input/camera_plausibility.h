@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Whether a camera can be one, and calibrations of other programs in the terms of CameraModel.
+
+#include <bole/open_source.h>
+
+#include <string>
+#include <vector>
+
+namespace bole
+{
+/// What cannot be true of \p camera, with the limit: field of view, shape of the pixels, principal point, a distortion
+/// that folds the picture, the place in the body. Empty when all is well.
+std::string implausibility(const MountedCamera &camera);
+
+/// k1 and k2 that come closest to k1, k2, k3 over the picture of \p pinhole (OpenCV's calibrations have a third radial
+/// coefficient, CameraModel two). \return the largest difference that is left [px].
+double foldThirdCoefficient(const PinholeCamera &pinhole, double k3, double &k1, double &k2);
+} // namespace bole

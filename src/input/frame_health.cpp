@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/frame_health.h"
+
+#include "geometry/so3.h"
+
+namespace bole
+{
+namespace
+{
+constexpr double kLargestGyroGap_s = 0.05; // beyond, the rotation between two samples is a guess
+
+/// Rotation vector of the body over (\p from_ns, \p to_ns]; nothing where the samples do not cover it.
+std::optional<Eigen::Vector3d> integrated(const std::vector<GyroSample> &gyro, std::int64_t from_ns, std::int64_t to_ns)
+{
+  Eigen::Vector3d angle = Eigen::Vector3d::Zero();
+  std::int64_t last_ns = from_ns;
+  for (const GyroSample &sample : gyro) {
+    const double elapsed_s = static_cast<double>(sample.stamp_ns - last_ns) * 1e-9;
+    if (elapsed_s > kLargestGyroGap_s || elapsed_s < 0)
+      return std::nullopt;
+    angle += elapsed_s * sample.rate;
+    last_ns = sample.stamp_ns;
+  }
+  const double rest_s = static_cast<double>(to_ns - last_ns) * 1e-9;
+  if (gyro.empty() || rest_s > kLargestGyroGap_s)
+    return std::nullopt;
+  return (angle + rest_s * gyro.back().rate).eval();
+}
+} // namespace
+
+FrameHealth::FrameHealth(const PinholeCamera &camera, const Pose &bMc) : m_focal_px(camera.fx), m_bMc(bMc) {}
+
+MeasuredRotation FrameHealth::motionTo(const Frame &frame) const
+{
+  MeasuredRotation motion;
+  motion.focal_px = m_focal_px;
+  if (!m_last_stamp_ns)
+    return motion;
+  const Eigen::Matrix3d cRb = m_bMc.R.transpose();
+  if (const auto angle = integrated(frame.gyro, *m_last_stamp_ns, frame.stamp_ns))
+    motion.gyro = cRb * *angle;
+  if (m_last_odometry && frame.wMb_odometry)
+    motion.odometry = cRb * logSo3(orthonormalized(m_last_odometry->R.transpose() * frame.wMb_odometry->R));
+  return motion;
+}
+
+void FrameHealth::judge(Frame &frame)
+{
+  const MeasuredRotation motion = motionTo(frame);
+  m_last_stamp_ns = frame.stamp_ns;
+  m_last_odometry = frame.wMb_odometry;
+  if (frame.status != FrameStatus::ok || frame.image.getSize() == 0)
+    return m_health.skip(motion);
+  const ImageFault fault = m_health.check(frame.image, motion);
+  if (fault == ImageFault::none)
+    return;
+  frame.status = fault == ImageFault::frozen       ? FrameStatus::stale
+                 : fault == ImageFault::wrong_size ? FrameStatus::resized
+                                                   : FrameStatus::doubtful;
+  frame.message = m_health.reason();
+}
+} // namespace bole

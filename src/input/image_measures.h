@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What is counted in an image to judge its health. Private to ImageHealth.
+
+#include <opencv2/core.hpp>
+
+namespace bole
+{
+constexpr double kSearchShare = 0.15; ///< of the width: how far two frames are searched for each other
+
+struct ImageNumbers
+{
+  double deviation = 0;    ///< of the grey levels
+  double roughness = 0;    ///< mean difference of neighbours over the deviation
+  double repeated = 0;     ///< share of the rows or columns that repeat their neighbour
+  double noise = 0;        ///< standard deviation of what looks like noise [grey levels]
+  double sharpness = 0;    ///< mean curvature over two pixels, over the deviation
+  double bright_share = 0; ///< share of the pixels at the upper end
+  int level_99 = 255;      ///< 99 % of the pixels are at or below
+};
+/// One pass over every fourth column.
+ImageNumbers measureImage(const cv::Mat &image);
+
+/// A small copy in floating point, 80 px wide: a trunk is still a column of it.
+cv::Mat thumbOf(const cv::Mat &image);
+
+struct ImageMatch
+{
+  double correlation = -1;
+  double x = 0, y = 0; ///< shift s [px of the thumb] at which now(u) = before(u + s)
+};
+ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now);
+
+/// Standard deviation of the difference: an exposure that changes is no motion.
+double changeBetween(const cv::Mat &a, const cv::Mat &b);
+} // namespace bole
