@@ -8,12 +8,27 @@
 
 namespace bole::apps
 {
+/// A number in [\p low, \p high]; unlike CLI::Range not NaN, and not -1 as the largest unsigned number.
+inline CLI::Validator within(double low, double high)
+{
+  return CLI::Validator(
+      [low, high](const std::string &text) {
+        double value = 0;
+        const bool is_good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+        return is_good
+                   ? std::string()
+                   : text + ", must be in [" + CLI::detail::to_string(low) + ", " + CLI::detail::to_string(high) + "]";
+      },
+      "", "");
+}
+
 void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
 void addServo(CLI::App &app);             ///< tasks in the closed loop
 void addBenchmark(CLI::App &app);         ///< many simulated flights, medians with intervals
+void addOptions(CLI::App &app);           ///< every option with its range and effect
 void addRecord(CLI::App &app);            ///< a live flight to disk
 void addReplay(CLI::App &app);            ///< a recorded flight, served again
 void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone would

@@ -29,6 +29,7 @@ int main(int argc, char **argv)
   app.require_subcommand(1);
   bole::apps::addTrack(app);
   bole::apps::addEvaluate(app);
+  bole::apps::addOptions(app);
   bole::apps::addRecord(app);
   bole::apps::addGraph(app);
   bole::apps::addSolve(app);

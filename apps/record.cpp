@@ -83,7 +83,7 @@ void addRecord(CLI::App &app)
   command->footer("Examples:\n"
                   "  bole record ardrone://192.168.1.1 -o flight\n"
                   "  bole record 'ardrone://127.0.0.1?offset=10000&camera=my.yaml' -o flight --seconds 60\n"
-                  "Then: bole track flight --config config/compressed.yaml, or bole replay flight");
+                  "Then: bole track flight --set camera.compressed=true, or bole replay flight");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

@@ -64,15 +64,15 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments, std::string &
   return std::make_unique<ArDroneSource>(arguments.input, options);
 }
 
-StageOptions readOptions(const Arguments &arguments, bool is_compressed)
+Options readOptions(const Arguments &arguments, bool is_compressed)
 {
-  StageOptions options = is_compressed ? forCompressedVideo() : StageOptions();
+  Options options;
+  options.camera.compressed = is_compressed;
   if (!arguments.config.empty())
     readConfig(arguments.config, options);
-  for (const std::string &setting : arguments.settings)
-    setOption(setting, options);
+  setOptions(arguments.settings, options);
   if (arguments.camera_height > 0)
-    options.visual.camera_height = arguments.camera_height;
+    options.camera.height = arguments.camera_height;
   return options;
 }
 
@@ -142,15 +142,14 @@ void track(const Arguments &arguments)
   readOptions(arguments, false); // a mistake in them is said before the input is waited for
   std::string note;
   const auto source = openInput(arguments, note);
-  StageOptions options = readOptions(arguments, source->isCompressed());
+  Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
-  options.visual.focal_known = options.visual.focal_known && source->isCameraKnown();
+  options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
   if (!note.empty())
     std::fprintf(stderr, "bole: %s\n", note.c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
-  const std::string preset = arguments.config.empty() && source->isCompressed() ? "compressed" : arguments.config;
-  TrackOutput output(arguments.run, arguments.input, preset, *source, note, arguments.has_video);
+  TrackOutput output(arguments.run, arguments.input, arguments.config, *source, note, arguments.has_video);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   Progress progress(source->size(), stderr);
@@ -194,8 +193,8 @@ void addTrack(CLI::App &app)
   command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
   command
       ->add_option("--config", arguments->config,
-                   "YAML file of options (config/paper.yaml: the paper's method; videos and live drones start from "
-                   "config/compressed.yaml)")
+                   "YAML file of options or a preset by its name (paper: the paper's method); `bole options` lists them. "
+                   "Videos and live drones start with camera.compressed=true")
       ->transform(findPreset);
   command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
@@ -204,7 +203,8 @@ void addTrack(CLI::App &app)
   command
       ->add_option("--odometry-offset", arguments->source.odometry_offset_s,
                    "Added to the stamps of --odometry so that they count as the video's do [s]")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(within(-1e10, 1e10));
   CLI::Option *view =
       command->add_option("--field-of-view", arguments->source.field_of_view_deg,
                           "Horizontal, where there is no camera file [degrees]; else a pan in the video "
@@ -212,7 +212,7 @@ void addTrack(CLI::App &app)
   command
       ->add_option("--camera-height", arguments->camera_height,
                    "Height of the camera over the ground [m], which gives a plain video its metre")
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(within(0.1, 100));
   const auto without = std::make_shared<std::vector<std::string>>();
   command->add_option("--without", *without, "Withhold one sensor: gyro or odometry (may be given twice)")
       ->check(CLI::IsMember({"gyro", "odometry"}));
@@ -220,9 +220,10 @@ void addTrack(CLI::App &app)
       ->capture_default_str();
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();
-  command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)");
+  command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)")->check(within(0, 1e9));
   command->add_option("--give-up", arguments->give_up_s, "Silence of a live drone that ends its flight [s]")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(within(0.1, 86400));
   command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
   command->footer(

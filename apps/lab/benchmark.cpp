@@ -172,11 +172,10 @@ void report(const Arguments &arguments, const std::vector<Flight> &flights)
 
 void run(const Arguments &arguments)
 {
-  StageOptions options;
+  Options options;
   if (!arguments.config.empty())
     readConfig(arguments.config, options);
-  for (const std::string &setting : arguments.settings)
-    setOption(setting, options);
+  setOptions(arguments.settings, options);
   for (const double density : arguments.densities) // before any work
     sceneOf(arguments, arguments.first_seed, density, "sun");
   if (!arguments.folder.empty()) {

@@ -141,7 +141,7 @@ void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult>
                       {"contacts", contacts(results)},
                       {"other gaps", otherGaps(results)},
                       {"failures", failures(results)},
-                      {"gated", arguments.trial.pipeline.flow.use_saliency},
+                      {"gated", arguments.trial.pipeline.stages.saliency},
                       {"fault", arguments.fault},
                       {"version", BOLE_VERSION}};
   for (const Column &column : kColumns) {
@@ -222,10 +222,9 @@ void run(Arguments &arguments)
 {
   if (!arguments.config.empty())
     readConfig(arguments.config, arguments.trial.pipeline);
-  for (const std::string &setting : arguments.settings)
-    setOption(setting, arguments.trial.pipeline);
+  setOptions(arguments.settings, arguments.trial.pipeline);
   if (arguments.is_ungated)
-    arguments.trial.pipeline.flow.use_saliency = false;
+    arguments.trial.pipeline.stages.saliency = false;
   arguments.trial.loop.fault.kind = faultKindFromString(arguments.fault);
   arguments.trial.loop.validate();
   OverlayWindow window(arguments.is_shown, "bole servo");
@@ -251,7 +250,6 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   const auto arguments = std::make_shared<Arguments>();
   ServoTrialOptions &trial = arguments->trial;
   trial.scenario.kind = kind;
-  trial.pipeline = ServoTrialOptions::defaultPipeline(kind);
   CLI::App *task = servo.add_subcommand(toString(kind), what);
   task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
   task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();

@@ -1,39 +1,36 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Options from YAML files: strict, with the line of every mistake.
+/// Options from YAML files and from the command line: strict, with the place of every mistake.
 ///
-/// A file has one map a stage (`flow`, `motion`, `points`, `gyro`, `relative_pose`, `gradient`, `saliency`,
-/// `detection`, `energy`, `tracking`, `smoothing`, `map`) whose keys are the names of the members of that stage's
-/// options. Keys that are not given keep their value. Unknown, repeated, mistyped and out-of-range keys are errors.
+/// A file has one map a section whose keys are those of `bole options`. Keys that are not given keep their value.
+/// Unknown, repeated, mistyped and out-of-range keys are errors.
 ///
-/// Laws (each a test): config/default.yaml gives the defaults of the code; readConfig(toYaml(x)) == x.
+/// Laws (each a test): config/default.yaml is toYaml(Options()); reading toYaml(x) gives x.
 
-#include "pipeline/stage_options.h"
+#include <bole/options.h>
 
 #include <string>
-#include <variant>
 #include <vector>
 
 namespace bole
 {
-/// One option by name ("stage.name") with the place of its value.
-struct OptionEntry
-{
-  std::string name;
-  std::variant<double *, int *, bool *, std::vector<int> *, EnergyForm *, LossKind *> value;
-};
-
-/// Every option of \p options, in the order of the stages. Points into \p options.
-std::vector<OptionEntry> optionEntries(StageOptions &options);
-
-/// Reads \p path over \p options and validates the result.
+/// Reads \p path over \p options.
 /// \throw vpException "file:line: key = value, must be ..."; \p options is then unchanged.
-void readConfig(const std::string &path, StageOptions &options);
+void readConfig(const std::string &path, Options &options);
 
-/// Sets one option from "stage.name=value". \throw vpException naming it.
-void setOption(const std::string &assignment, StageOptions &options);
+/// Sets options from assignments "section.name=value", each option at most once.
+/// \throw vpException "--set assignment: ..."; \p options is then unchanged.
+void setOptions(const std::vector<std::string> &assignments, Options &options);
 
-/// All options as YAML.
-std::string toYaml(const StageOptions &options);
+/// All options as YAML, with what they do.
+std::string toYaml(const Options &options);
+
+/// What one option is, for people.
+struct OptionDescription
+{
+  std::string key, unit, range, value, effect;
+};
+/// Every option with its value in \p options, in the order of the sections.
+std::vector<OptionDescription> describeOptions(const Options &options = {});
 } // namespace bole

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/detector.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
@@ -15,26 +13,10 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-void DetectorOptions::validate() const
-{
-  requireRange("detection.window", window, 4, 100);
-  requireRange("detection.range_min", range_min, 0.3, 5);
-  requireRange("detection.range_max", range_max, 2, 50);
-  requireRange("detection.radius_min", radius_min, 0.005, 2);
-  requireRange("detection.radius_max", radius_max, radius_min, 5);
-  requireRange("detection.agreement_min", agreement_min, 0, 1);
-  requireRange("detection.inliers_min", inliers_min, 0, 1);
-  requireRange("detection.inlier_px", inlier_px, 0.5, 20);
-  requireRange("detection.rms_max_px", rms_max_px, 0.1, 20);
-  requireRange("detection.parallax_min", parallax_min, 0, 1);
-  requireRange("detection.range_sigma_max", range_sigma_max, 0.01, 1);
-  requireRange("detection.views_min", views_min, 2, 100);
-  requireRange("detection.near_range", near_range, 0, 100);
-  requireRange("detection.foreground_min", foreground_min, 0, 1);
-}
-
 namespace
 {
+constexpr int kLeastViews = 5; ///< views within the window that see both borders: fewer let chance pairs agree
+
 /// A view reduced to the ground plane.
 struct PlaneView
 {
@@ -132,7 +114,7 @@ std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &lef
 {
   const auto score = [&](std::size_t i) {
     const int seen = left.seen[i] + right.seen[i];
-    const bool is_seen = std::min(left.seen[i], right.seen[i]) >= options.views_min;
+    const bool is_seen = std::min(left.seen[i], right.seen[i]) >= kLeastViews;
     const double r = pair.s * ranges[i];
     return is_seen && r >= options.radius_min && r <= options.radius_max ? (left.sum[i] + right.sum[i]) / seen : -1.0;
   };
@@ -209,7 +191,7 @@ Fit refine(const std::vector<PlaneView> &views, const PairHypothesis &pair, doub
     }
     fit.rms_px = fit.inliers ? std::sqrt(squares / fit.inliers) : 1e9;
     fit.information = H;
-    const bool is_hopeless = fit.inliers < options.views_min || fit.inliers < 0.8 * options.inliers_min * fit.views;
+    const bool is_hopeless = fit.inliers < kLeastViews || fit.inliers < 0.8 * options.inliers_min * fit.views;
     if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
@@ -261,8 +243,7 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairH
                                 const SweepResult &sweep, double px_per_q, const DetectorOptions &options)
 {
   const Fit fit = refine(views, pair, sweep.range, px_per_q, options);
-  if (fit.inliers < options.views_min || fit.inliers < options.inliers_min * fit.views ||
-      fit.rms_px > options.rms_max_px)
+  if (fit.inliers < kLeastViews || fit.inliers < options.inliers_min * fit.views || fit.rms_px > options.rms_max_px)
     return std::nullopt;
 
   Detection detection;
@@ -323,7 +304,7 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
                                     const DetectorOptions &options)
 {
   std::vector<Detection> found;
-  if (static_cast<int>(views.size()) < options.views_min)
+  if (static_cast<int>(views.size()) < kLeastViews)
     return found;
   std::vector<PlaneView> plane;
   for (const DetectorView &view : views) {

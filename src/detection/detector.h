@@ -32,11 +32,8 @@ struct DetectorOptions
   double rms_max_px = 0.85;      ///< of the inliers, [px]
   double parallax_min = 0.03;    ///< angle between the first and the last line of sight, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
-  int views_min = 5;             ///< views within the window that see both borders
   double near_range = 5.5;       ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
   double foreground_min = 0.15;  ///< mean of 1 - p(background) between its borders then, 0 to 1
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// One frame of the window: its profile and its pose as it is known now.

@@ -30,6 +30,9 @@ double LevelProfile::nearestPeak(double q, double contrast) const
 
 namespace
 {
+/// Least part of the line inside the image, or of the image that it crosses: a shorter one says little.
+constexpr double kLeastRows = 0.4;
+
 /// Extremes within two samples, a pixel.
 void findExtremes(LevelProfile &profile)
 {
@@ -102,7 +105,7 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
     const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
     const double rows_full =
         std::min(camera.fy * (options.range.high - options.range.low) * horizontal, double(camera.height));
-    if (line.rows() >= options.rows_min * rows_full)
+    if (line.rows() >= kLeastRows * rows_full)
       profile.mean[static_cast<std::size_t>(i + half)] = static_cast<float>(meanAlongOnly(g, line));
   }
   findExtremes(profile);

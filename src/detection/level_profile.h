@@ -45,7 +45,6 @@ struct ProfileOptions
 {
   ElevationRange range;        ///< of the lines, tan of elevation
   double contrast_min = 0.008; ///< weaker maxima are no peaks [full scale/px], 0.001 to 0.5
-  double rows_min = 0.4;       ///< least part of the line inside the image, or of the image that it crosses, 0.1 to 1
 };
 
 /// Profile of the gradient \p g seen by \p camera with the rotation \p wRc. Cost: about 0.5 ms at 320x240.

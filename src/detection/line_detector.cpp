@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/line_detector.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -10,21 +8,11 @@
 
 namespace bole
 {
-void LineDetectorOptions::validate() const
-{
-  requireRange("lines.border_a", border_a, -1e4, 0);
-  requireRange("lines.border_b", border_b, -100, 100);
-  requireRange("lines.foreground_a", foreground_a, -1e3, 0);
-  requireRange("lines.foreground_b", foreground_b, -100, 100);
-  requireRange("lines.inhibition_px", inhibition_px, 0.5, 100);
-  requireRange("lines.threshold", threshold, 0, 1);
-  requireRange("lines.turning_threshold", turning_threshold, 0, 1);
-  requireRange("lines.width_min_px", width_min_px, 2, 1000);
-  requireRange("lines.width_max_px", width_max_px, width_min_px, 5000);
-}
-
 namespace
 {
+constexpr double kBorderB = 4;                         ///< of Q for the mean gradient along a border (Eq. 19)
+constexpr double kForegroundA = -12, kForegroundB = 3; ///< of Q for the mean of 1 - p(background) along it (Eq. 20)
+
 double logistic(double x, double a, double b) { return 1 / (1 + std::exp(a * x + b)); }
 
 /// Eq. 21 put right; distances in the image from the column to the nearest bark.
@@ -106,11 +94,11 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
   for (std::size_t i = 0; i < falling.mean.size(); ++i) {
     const double q = falling.q_first + falling.step * static_cast<double>(i);
     const double foreground = background ? 1 - static_cast<double>(background->mean[i]) : 1;
-    const double gate = logistic(foreground, options.foreground_a, options.foreground_b) * // Eq. 20
-                        notInhibited(q, known, camera.fx, options.inhibition_px);          // Eq. 21
+    const double gate = logistic(foreground, kForegroundA, kForegroundB) *        // Eq. 20
+                        notInhibited(q, known, camera.fx, options.inhibition_px); // Eq. 21
     const double fall = -falling.mean[i], rise = rising.mean[i];
-    p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, options.border_b);
-    p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, options.border_b);
+    p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, kBorderB);
+    p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, kBorderB);
   }
 
   const auto lefts = maxima(p_left, falling, options.threshold, 6);

@@ -21,17 +21,12 @@ struct LineDetectorOptions
 {
   bool either_polarity = true;     ///< false: dark trunks on bright background only, the paper's
   double border_a = -200;          ///< of Q for the mean gradient along a border (Eq. 19), -1e4 to 0
-  double border_b = 4;             ///< -100 to 100
-  double foreground_a = -12;       ///< of Q for the mean of 1 - p(background) along it (Eq. 20), -1e3 to 0
-  double foreground_b = 3;         ///< -100 to 100
   double inhibition_px = 6;        ///< sigma_R of Eq. 21, 0.5 to 100
   double threshold = 0.75;         ///< on the probability of each border, 0 to 1; the paper's value
   double turning_threshold = 0.12; ///< the same for a camera that only turns: a pan blurs, and there is no saliency to
                                    ///< keep out what is not near, only how evenly borders run (MapOptions)
   double width_min_px = 6;         ///< of a trunk in the image, 2 to 1000
   double width_max_px = 90;        ///< 3 to 5000
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 struct LineDetection

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trajectory_metrics.h"
+
 #include "geometry/so3.h"
+#include "geometry/yaw.h"
 
 #include <cmath>
 #include <limits>
@@ -9,7 +11,6 @@ namespace bole
 {
 namespace
 {
-double yawOf(const Eigen::Matrix3d &R) { return std::atan2(R(1, 0), R(0, 0)); }
 
 double rms(double sum_of_squares, std::size_t count)
 {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trunk_metrics.h"
+
 #include "evaluation/assignment.h"
+#include "geometry/median.h"
 
 #include <Eigen/LU>
 
@@ -14,17 +16,6 @@ namespace bole
 {
 namespace
 {
-double median(std::vector<double> values)
-{
-  if (values.empty())
-    return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1)
-    return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
 double halfNees(const TrunkRecord &estimate, const TruthTrunk &truth, const PlanarTransform &gauge)
 {
   const Eigen::Matrix2d L = gauge.linear();
@@ -78,7 +69,7 @@ TrunkErrors summarize(const TrunkMetrics &metrics, const std::function<bool(cons
     for (const double distance : distances[a])
       sum += distance * distance;
     errors.rmse[a] = std::sqrt(sum / count);
-    errors.median[a] = median(distances[a]);
+    errors.median[a] = centreOf(distances[a]);
   }
   errors.nees_half /= count;
   errors.predicted_sigma = std::sqrt(sigma2 / count);

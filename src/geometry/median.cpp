@@ -2,6 +2,7 @@
 #include "geometry/median.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bole
 {
@@ -12,5 +13,23 @@ double medianOf(std::vector<double> values)
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+double centreOf(std::vector<double> values)
+{
+  if (values.empty())
+    return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+double quantileOf(std::vector<double> values, double share)
+{
+  if (values.empty())
+    return 0;
+  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 } // namespace bole

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "gradient/gradient.h"
 
-#include "geometry/require_range.h"
-
 #include <opencv2/imgproc.hpp>
 #include <string>
 
@@ -10,6 +8,8 @@ namespace bole
 {
 namespace
 {
+constexpr double kSplitSigma_px = 3; ///< blur of the parts of Eq. 3: the value of the paper
+
 /// A cv::Mat header over the pixels of a vpImage: no copy.
 cv::Mat view(vpImage<float> &I)
 {
@@ -30,12 +30,6 @@ cv::Mat derivativeKernel(double sigma, int radius)
 
 } // namespace
 
-void GradientOptions::validate() const
-{
-  requireRange("gradient.sigma_px", sigma_px, 0.5, 5);
-  requireRange("gradient.split_sigma_px", split_sigma_px, 0.5, 10);
-}
-
 Gradient computeGradient(const vpImage<unsigned char> &I, const GradientOptions &options)
 {
   const int rows = static_cast<int>(I.getRows()), cols = static_cast<int>(I.getCols());
@@ -54,8 +48,8 @@ Gradient computeGradient(const vpImage<unsigned char> &I, const GradientOptions 
     gradient.negative.resize(I.getRows(), I.getCols());
     gradient.positive.resize(I.getRows(), I.getCols());
     cv::Mat negative = view(gradient.negative), positive = view(gradient.positive);
-    cv::GaussianBlur(cv::min(sobel, 0.f), negative, {}, options.split_sigma_px, 0, cv::BORDER_REPLICATE);
-    cv::GaussianBlur(cv::max(sobel, 0.f), positive, {}, options.split_sigma_px, 0, cv::BORDER_REPLICATE);
+    cv::GaussianBlur(cv::min(sobel, 0.f), negative, {}, kSplitSigma_px, 0, cv::BORDER_REPLICATE);
+    cv::GaussianBlur(cv::max(sobel, 0.f), positive, {}, kSplitSigma_px, 0, cv::BORDER_REPLICATE);
   }
   return gradient;
 }

@@ -15,11 +15,8 @@ namespace bole
 {
 struct GradientOptions
 {
-  double sigma_px = 1.0;       ///< blur, [px], 0.5 to 5; 1 px: sharpest optimum that noise allows at 320x240
-  bool split = false;          ///< also make the negative and positive parts of Eq. 3
-  double split_sigma_px = 3.0; ///< blur of the parts, [px], 0.5 to 10; the paper's value
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
+  double sigma_px = 1.0; ///< blur, [px], 0.5 to 5; 1 px: sharpest optimum that noise allows at 320x240
+  bool split = false;    ///< also make the negative and positive parts of Eq. 3
 };
 
 /// Gradients in units of full scale (0..1) a pixel, positive where brightness rises to the right.

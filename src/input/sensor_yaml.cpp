@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/sensor_yaml.h"
 
+#include "input/yaml_file.h"
+
 #include <Eigen/LU>
 #include <cmath>
-#include <filesystem>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
 
@@ -13,7 +14,7 @@ namespace
 {
 [[noreturn]] void failAt(const std::string &path, const YAML::Mark &mark, const std::string &message)
 {
-  throw vpException(vpException::ioError, fmt::format("{}:{}: {}", path, mark.line + 1, message));
+  throw vpException(vpException::ioError, fmt::format("{}: {}", placeOf(path, mark), message));
 }
 
 std::string dumped(const YAML::Node &node)
@@ -40,14 +41,7 @@ void appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
 
 SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &known_keys) : m_path(path)
 {
-  if (!std::filesystem::is_regular_file(path))
-    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
-  try {
-    m_root = YAML::LoadFile(path);
-  }
-  catch (const YAML::Exception &error) {
-    failAt(path, error.mark, error.msg);
-  }
+  m_root = loadYaml(path);
   if (!m_root.IsMap())
     failAt(path, m_root.Mark(), "the file must be a map of keys");
   std::set<std::string> seen;

@@ -67,9 +67,7 @@ double bulkSigma(std::vector<double> residuals)
   for (double &r : residuals) {
     r = std::abs(r);
   }
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  double sigma = 1.4826 * *middle;
+  double sigma = 1.4826 * medianOf(residuals);
   for (int round = 0; round < 3; ++round) {
     double sum = 0;
     int n = 0;
@@ -124,7 +122,7 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
     for (std::size_t i = 0; i < rays.size(); ++i) {
       Eigen::Matrix<double, 2, 3> J;
       const Eigen::Vector2d e = transferResidual(rays.a[i], rays.b[i], fit.aRb, &J);
-      const double w = weightOf(e.norm() / std::sqrt(variance), options.kernel);
+      const double w = weightOf(e.norm() / std::sqrt(variance), kKernel);
       fit.weights[i] = w;
       H += (w / variance / options.inflation) * J.transpose() * J;
       g += (w / variance / options.inflation) * J.transpose() * e;
@@ -160,7 +158,7 @@ double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, 
   double cost = 0;
   const Epipolar epipolar(motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    cost += epipolar.trust(rays.a[i]) * costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, options.kernel);
+    cost += epipolar.trust(rays.a[i]) * costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, kKernel);
   }
   return cost / options.inflation + priorCost(motion, prior);
 }
@@ -187,7 +185,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
   fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     Vector5d g;
-    linearize(rays, fit.motion, fit.sigma, options.kernel, fit.information, g);
+    linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
     Matrix5d H = fit.information / options.inflation;
     g /= options.inflation;
     H.topLeftCorner<3, 3>() += prior.rotation_information;
@@ -242,7 +240,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   }
   fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
   Vector5d g;
-  linearize(rays, fit.motion, fit.sigma, options.kernel, fit.information, g);
+  linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
   return fit;
 }
 
@@ -311,7 +309,7 @@ Rays drawn(const Rays &rays, std::mt19937 &random, std::size_t n)
 std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
                                  const RelativePoseOptions &options)
 {
-  std::mt19937 random(options.seed);
+  std::mt19937 random(kSeed);
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   const bool rotation_known = prior.has_rotation;
   RelativePoseOptions few = options;
@@ -319,8 +317,7 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
-  for (int hypothesis = 0; hypothesis < (rotation_known ? (options.hypotheses + 1) / 2 : options.hypotheses);
-       ++hypothesis) {
+  for (int hypothesis = 0; hypothesis < (rotation_known ? (kHypotheses + 1) / 2 : kHypotheses); ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
       motion.direction = *d;

@@ -14,6 +14,10 @@
 
 namespace bole::motion
 {
+constexpr double kKernel = 3;   ///< residuals lose half their weight near this many sigmas
+constexpr int kHypotheses = 48; ///< two-point directions tried without a prior
+constexpr unsigned kSeed = 1;   ///< of the draws
+
 /// Matches as (x, y, 1) of both frames.
 struct Rays
 {

@@ -4,8 +4,6 @@
 #include "geometry/median.h"
 
 #include "motion/epipolar.h"
-#include "motion/require.h"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -60,21 +58,9 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &curv
 }
 } // namespace
 
-void FocalOptions::validate() const
-{
-  using motion::require;
-  require(frames_back >= 1 && frames_back <= 31, "focal.frames_back", frames_back, "in 1 .. 31");
-  require(every >= 1 && every <= 100, "focal.every", every, "in 1 .. 100");
-  require(min_flow >= 0.005 && min_flow <= 1, "focal.min_flow", min_flow, "in 0.005 .. 1");
-  require(max_residual >= 0.001 && max_residual <= 1, "focal.max_residual", max_residual, "in 0.001 .. 1");
-  require(min_pairs >= 2 && min_pairs <= 1000, "focal.min_pairs", min_pairs, "in 2 .. 1000");
-  require(max_sigma >= 0.01 && max_sigma <= 1, "focal.max_sigma", max_sigma, "in 0.01 .. 1");
-}
-
 FocalFromTurning::FocalFromTurning(const PinholeCamera &guess, const FocalOptions &options)
     : m_guess(guess), m_options(options)
 {
-  m_options.validate();
 }
 
 void FocalFromTurning::add(const PointTracker &tracker)

@@ -29,9 +29,6 @@ struct FocalOptions
                                ///< video that pans leaves 0.01, flights through trees 0.02 to 0.1
   int min_pairs = 5;           ///< that are rotations, and no fewer than half of those that moved, 2 to 1000
   double max_sigma = 0.15;     ///< of the log of the focal length, by leaving parts of the video out, 0.01 to 1
-
-  /// Throws vpException: "focal.name = value, must be ...".
-  void validate() const;
 };
 
 struct FocalEstimate

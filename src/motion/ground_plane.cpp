@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/ground_plane.h"
 
-#include "motion/require.h"
-
 #include "geometry/degree.h"
 #include "geometry/median.h"
 
@@ -36,17 +34,6 @@ double weightedMean(const std::vector<Height> &heights, double centre, double ga
   return weights > 0 ? sum / weights : centre;
 }
 } // namespace
-
-void GroundOptions::validate() const
-{
-  using motion::require;
-  require(min_depression_deg >= 1 && min_depression_deg <= 80, "ground.min_depression_deg", min_depression_deg,
-          "in 1 .. 80");
-  require(max_relative_sigma > 0, "ground.max_relative_sigma", max_relative_sigma, "above 0");
-  require(up_sigma_deg > 0, "ground.up_sigma_deg", up_sigma_deg, "above 0");
-  require(roughness > 0, "ground.roughness", roughness, "above 0");
-  require(min_points >= 4, "ground.min_points", min_points, "4 or more");
-}
 
 GroundHeight heightOverGround(const std::vector<PointDepth> &points, const PinholeCamera &camera,
                               const Eigen::Vector3d &up, const GroundOptions &options)

@@ -22,9 +22,6 @@ struct GroundOptions
   double max_relative_sigma = 0.15; ///< of a point's depth, > 0
   double roughness = 0.06;          ///< of the ground, in heights of the camera, > 0: bumps
   int min_points = 8;               ///< >= 4
-
-  /// Throws vpException: "ground.name = value, must be ...".
-  void validate() const;
 };
 
 struct GroundHeight

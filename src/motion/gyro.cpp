@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/gyro.h"
 
-#include "motion/require.h"
-
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -11,6 +9,9 @@ namespace bole
 {
 namespace
 {
+constexpr double kMostGap_s = 0.1;    ///< a longer gap between samples is not bridged as known
+constexpr double kGapRateSigma = 0.5; ///< of the rate in such a gap [rad/s]
+
 /// Rate at a stamp: linear between the samples around it, held before the first and after the last.
 Eigen::Vector3d rateAt(const std::vector<GyroSample> &samples, std::size_t next, std::int64_t stamp_ns)
 {
@@ -44,15 +45,6 @@ double longestGap(const std::vector<GyroSample> &samples, std::int64_t from_ns, 
 }
 } // namespace
 
-void GyroOptions::validate() const
-{
-  motion::require(noise_density > 0, "gyro.noise_density", noise_density, "above 0");
-  motion::require(bias_sigma >= 0, "gyro.bias_sigma", bias_sigma, "0 or more");
-  motion::require(bias_walk >= 0, "gyro.bias_walk", bias_walk, "0 or more");
-  motion::require(max_gap > 0, "gyro.max_gap", max_gap, "above 0");
-  motion::require(gap_rate_sigma > 0, "gyro.gap_rate_sigma", gap_rate_sigma, "above 0");
-}
-
 GyroBias GyroBias::unknown(const GyroOptions &options)
 {
   return {Eigen::Vector3d::Zero(), options.bias_sigma * options.bias_sigma * Eigen::Matrix3d::Identity()};
@@ -80,11 +72,11 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   result.duration = 1e-9 * double(to_ns - from_ns);
   const double dt_all = result.duration;
   const double gap = samples.empty() ? dt_all : longestGap(samples, from_ns, to_ns);
-  result.complete = !samples.empty() && gap <= options.max_gap;
+  result.complete = !samples.empty() && gap <= kMostGap_s;
   result.white = options.noise_density * options.noise_density * dt_all * Eigen::Matrix3d::Identity();
   result.bias = bias.covariance * dt_all * dt_all;
   if (!result.complete) {
-    result.white += options.gap_rate_sigma * options.gap_rate_sigma * gap * gap * Eigen::Matrix3d::Identity();
+    result.white += kGapRateSigma * kGapRateSigma * gap * gap * Eigen::Matrix3d::Identity();
   }
   if (samples.empty()) {
     return result;

@@ -30,13 +30,6 @@ struct GyroOptions
   double bias_sigma = 0.008;
   /// Random walk of the bias [rad/s/sqrt(s)], >= 0.
   double bias_walk = 1e-4;
-  /// A gap between samples longer than this [s], > 0, is not bridged as known: the rate in it is
-  /// taken to have the standard deviation gap_rate_sigma.
-  double max_gap = 0.1;
-  double gap_rate_sigma = 0.5; ///< [rad/s], > 0
-
-  /// Throws vpException: "gyro.name = value, must be ...".
-  void validate() const;
 };
 
 /// Bias of the gyro [rad/s] in the body frame.

@@ -1,29 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_motion.h"
 
-#include "motion/require.h"
-
 #include <algorithm>
 
 namespace bole
 {
-void PointMotionOptions::validate() const
-{
-  points.validate();
-  relative_pose.validate();
-  gyro.validate();
-  for (int back : frames_back) {
-    motion::require(back >= 1 && back < points.history, "motion.frames_back", back, "in 1 .. points.history - 1");
-  }
-  motion::require(odometry_walk > 0, "motion.odometry_walk", odometry_walk, "above 0");
-  motion::require(odometry_height_sigma > 0, "motion.odometry_height_sigma", odometry_height_sigma, "above 0");
-  motion::require(odometry_relative_sigma > 0, "motion.odometry_relative_sigma", odometry_relative_sigma, "above 0");
-}
-
 PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc, const PointMotionOptions &options)
-    : m_camera(camera), m_bMc(bMc), m_options(options), m_tracker(camera, options.points)
+    : m_camera(camera), m_bMc(bMc), m_options(options), m_tracker(camera)
 {
-  options.validate();
   m_bias = GyroBias::unknown(options.gyro);
 }
 
@@ -44,7 +28,7 @@ void PointMotion::track(const Frame &frame)
   }
   m_tracker.track(frame.image, expected);
   m_seen.push_back({frame.stamp_ns, number, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
-  if (m_seen.size() > static_cast<std::size_t>(m_options.points.history)) {
+  if (m_seen.size() > static_cast<std::size_t>(PointTracker::kHistory)) {
     m_seen.pop_front();
   }
   const auto recent = std::find_if(m_gyro.begin(), m_gyro.end(), [this](const GyroSample &sample) {

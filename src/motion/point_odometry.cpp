@@ -6,8 +6,6 @@
 #include "geometry/degree.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
-#include "motion/require.h"
-
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -105,26 +103,8 @@ const char *toString(PointOdometryStatus status)
   return "?";
 }
 
-void PointOdometryOptions::validate() const
-{
-  using motion::require;
-  require(key_frames >= 3 && key_frames <= 30, "point_odometry.key_frames", key_frames, "in 3 .. 30");
-  require(held_key_frames >= 2 && held_key_frames < key_frames, "point_odometry.held_key_frames", held_key_frames,
-          "in 2 .. key_frames - 1");
-  require(key_parallax_deg > 0, "point_odometry.key_parallax_deg", key_parallax_deg, "above 0");
-  require(key_shared >= 0 && key_shared <= 1, "point_odometry.key_shared", key_shared, "in 0 .. 1");
-  require(start_parallax_deg > 0, "point_odometry.start_parallax_deg", start_parallax_deg, "above 0");
-  require(start_sigma_deg > 0, "point_odometry.start_sigma_deg", start_sigma_deg, "above 0");
-  require(min_points >= 6, "point_odometry.min_points", min_points, "6 or more");
-  require(iterations >= 1 && iterations <= 100, "point_odometry.iterations", iterations, "in 1 .. 100");
-  require(min_sigma_px > 0, "point_odometry.min_sigma_px", min_sigma_px, "above 0");
-  require(inflation >= 1, "point_odometry.inflation", inflation, "1 or more");
-  relative_pose.validate();
-}
-
 PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options) : m_state(new State)
 {
-  options.validate();
   m_state->camera = camera;
   m_state->options = options;
 }
@@ -220,7 +200,7 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     return result;
   }
   // Too little is left of what the first key frame saw: go on from here.
-  if (matches.size() < static_cast<std::size_t>(std::max(2 * options.relative_pose.min_matches, 30))) {
+  if (matches.size() < std::max<std::size_t>(2 * RelativePoseEstimate::kLeastMatches, 30)) {
     restart();
   }
   return result;

@@ -44,9 +44,6 @@ struct PointOdometryOptions
   double min_sigma_px = 0.1;         ///< floor of the observation noise, > 0
   double inflation = 3;              ///< as RelativePoseOptions::inflation, >= 1
   RelativePoseOptions relative_pose; ///< of the start
-
-  /// Throws vpException: "point_odometry.name = value, must be ...".
-  void validate() const;
 };
 
 enum class PointOdometryStatus

@@ -1,20 +1,33 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
-#include "motion/require.h"
-
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
+#include <visp3/core/vpException.h>
 
 namespace bole
 {
+namespace
+{
+constexpr int kMostPoints = 150;         ///< tracks at a time: more cost time and add little below 0.1 px
+constexpr int kColumns = 8, kRows = 6;   ///< cells of the grid that spreads the corners over the image
+constexpr double kLeastDistance_px = 8;  ///< between a new corner and any other
+constexpr double kQuality = 0.01;        ///< of a corner against the strongest of the image
+constexpr double kLeastResponse = 1e-5;  ///< smallest eigenvalue of the gradient moments of a corner, grey 0 to 1
+constexpr int kWindow_px = 11;           ///< side of the Lucas-Kanade window, odd
+constexpr int kLevels = 3;               ///< pyramid levels above the image: 3 follow 20 px a frame and more
+constexpr int kIterations = 10;          ///< of Lucas-Kanade a level
+constexpr double kMostBackward_px = 0.3; ///< forward-backward error above which a track ends
+constexpr double kMargin_px = 4;         ///< from the border of the image
+} // namespace
+
 struct PointTracker::State
 {
   PinholeCamera camera;
-  PointOptions options;
   std::vector<cv::Mat> pyramid; ///< of the last image
   std::vector<PointTrack> tracks;
   std::uint64_t next_id = 1;
@@ -69,29 +82,7 @@ Eigen::Vector2d refined(const cv::Mat &response, const cv::Point &at)
 }
 } // namespace
 
-void PointOptions::validate() const
-{
-  using motion::require;
-  require(max_points >= 8 && max_points <= 5000, "points.max_points", max_points, "in 8 .. 5000");
-  require(columns >= 1, "points.columns", columns, "1 or more");
-  require(rows >= 1, "points.rows", rows, "1 or more");
-  require(min_distance_px >= 1, "points.min_distance_px", min_distance_px, "1 or more");
-  require(quality >= 0 && quality <= 1, "points.quality", quality, "in 0 .. 1");
-  require(min_response >= 0, "points.min_response", min_response, "0 or more");
-  require(window_px >= 5 && window_px <= 51 && window_px % 2 == 1, "points.window_px", window_px, "odd and in 5 .. 51");
-  require(levels >= 0 && levels <= 6, "points.levels", levels, "in 0 .. 6");
-  require(iterations >= 1 && iterations <= 100, "points.iterations", iterations, "in 1 .. 100");
-  require(max_backward_px > 0, "points.max_backward_px", max_backward_px, "above 0");
-  require(margin_px >= 0, "points.margin_px", margin_px, "0 or more");
-  require(history >= 2 && history <= 1000, "points.history", history, "in 2 .. 1000");
-}
-
-PointTracker::PointTracker(const PinholeCamera &camera, const PointOptions &options) : m_state(new State)
-{
-  options.validate();
-  m_state->camera = camera;
-  m_state->options = options;
-}
+PointTracker::PointTracker(const PinholeCamera &camera) : m_state(new State) { m_state->camera = camera; }
 PointTracker::~PointTracker() = default;
 PointTracker::PointTracker(PointTracker &&) noexcept = default;
 PointTracker &PointTracker::operator=(PointTracker &&) noexcept = default;
@@ -104,10 +95,9 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
                       fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
                                   m_state->camera.width, m_state->camera.height));
   }
-  const PointOptions &options = m_state->options;
   std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(current, pyramid, cv::Size(options.window_px, options.window_px), options.levels, true,
-                              cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+  cv::buildOpticalFlowPyramid(current, pyramid, cv::Size(kWindow_px, kWindow_px), kLevels, true, cv::BORDER_REFLECT_101,
+                              cv::BORDER_CONSTANT, false);
   if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
     m_state->follow(pyramid, aRb);
   }
@@ -125,27 +115,27 @@ void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::
     const Eigen::Vector3d turned = aRb.transpose() * camera.ray(tracks[i].current());
     to[i] = turned.z() > 0.1 ? toCv(camera.project(turned)) : from[i];
   }
-  const cv::Size window(options.window_px, options.window_px);
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options.iterations, 0.01);
+  const cv::Size window(kWindow_px, kWindow_px);
+  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kIterations, 0.01);
   std::vector<unsigned char> found, found_back;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(pyramid, next, from, to, found, error, window, options.levels, stop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  cv::calcOpticalFlowPyrLK(pyramid, next, from, to, found, error, window, kLevels, stop, cv::OPTFLOW_USE_INITIAL_FLOW,
+                           1e-4);
   // Back again from where it arrived, started at where it came from: one level settles whether it
   // is the same corner.
   back = from;
-  cv::calcOpticalFlowPyrLK(next, pyramid, to, back, found_back, error, window, std::min(1, options.levels), stop,
+  cv::calcOpticalFlowPyrLK(next, pyramid, to, back, found_back, error, window, std::min(1, kLevels), stop,
                            cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   std::vector<PointTrack> kept;
   kept.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const Eigen::Vector2d at = toEigen(to[i]);
-    if (!found[i] || !found_back[i] || !camera.contains(at, options.margin_px) ||
-        cv::norm(back[i] - from[i]) > options.max_backward_px) {
+    if (!found[i] || !found_back[i] || !camera.contains(at, kMargin_px) ||
+        cv::norm(back[i] - from[i]) > kMostBackward_px) {
       continue;
     }
     PointTrack track = std::move(tracks[i]);
-    if (track.positions_px.size() >= static_cast<std::size_t>(options.history)) {
+    if (track.positions_px.size() >= static_cast<std::size_t>(PointTracker::kHistory)) {
       track.positions_px.erase(track.positions_px.begin());
     }
     track.positions_px.push_back(at);
@@ -156,30 +146,30 @@ void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::
 
 void PointTracker::State::replenish(const cv::Mat &image)
 {
-  int missing = options.max_points - static_cast<int>(tracks.size());
-  if (missing <= options.max_points / 6) {
+  int missing = kMostPoints - static_cast<int>(tracks.size());
+  if (missing <= kMostPoints / 6) {
     return;
   }
   cv::cornerMinEigenVal(image, response, 5, 3);
   cv::dilate(response, dilated, cv::Mat());
   double strongest = 0;
   cv::minMaxLoc(response, nullptr, &strongest);
-  const float threshold = float(std::max(options.quality * strongest, options.min_response));
+  const float threshold = float(std::max(kQuality * strongest, kLeastResponse));
 
-  Occupancy occupied(image.size(), options.min_distance_px);
-  const int cells = options.columns * options.rows;
+  Occupancy occupied(image.size(), kLeastDistance_px);
+  const int cells = kColumns * kRows;
   std::vector<int> held(static_cast<std::size_t>(cells), 0);
   const auto cellOf = [&](double x, double y) {
-    const int column = std::clamp(int(x * options.columns / image.cols), 0, options.columns - 1);
-    const int row = std::clamp(int(y * options.rows / image.rows), 0, options.rows - 1);
-    return static_cast<std::size_t>(row * options.columns + column);
+    const int column = std::clamp(int(x * kColumns / image.cols), 0, kColumns - 1);
+    const int row = std::clamp(int(y * kRows / image.rows), 0, kRows - 1);
+    return static_cast<std::size_t>(row * kColumns + column);
   };
   for (const PointTrack &track : tracks) {
     occupied.add(toCv(track.current()));
     ++held[cellOf(track.current().x(), track.current().y())];
   }
   std::vector<std::vector<Corner>> corners(static_cast<std::size_t>(cells));
-  const int margin = std::max(2, cvCeil(options.margin_px) + 1);
+  const int margin = std::max(2, cvCeil(kMargin_px) + 1);
   for (int y = margin; y < image.rows - margin; ++y) {
     const float *r = response.ptr<float>(y), *d = dilated.ptr<float>(y);
     for (int x = margin; x < image.cols - margin; ++x) {

@@ -23,24 +23,6 @@
 
 namespace bole
 {
-struct PointOptions
-{
-  int max_points = 150;         ///< tracks at a time, 8 .. 5000; more cost time and add little below 0.1 px
-  int columns = 8, rows = 6;    ///< cells of the grid that spreads the corners, >= 1
-  double min_distance_px = 8;   ///< between a new corner and any other, >= 1
-  double quality = 0.01;        ///< of a corner against the strongest of the image, 0 .. 1
-  double min_response = 1e-5;   ///< smallest eigenvalue of the gradient moments of a corner, grey 0 .. 1, >= 0
-  int window_px = 11;           ///< side of the Lucas-Kanade window, odd, 5 .. 51
-  int levels = 3;               ///< pyramid levels above the image, 0 .. 6: 3 follow 20 px a frame and more
-  int iterations = 10;          ///< of Lucas-Kanade a level, 1 .. 100
-  double max_backward_px = 0.3; ///< forward-backward error above which a track ends, > 0
-  double margin_px = 4;         ///< from the border of the image, >= 0
-  int history = 32;             ///< frames a track remembers, 2 .. 1000
-
-  /// Throws vpException: "points.name = value, must be ...".
-  void validate() const;
-};
-
 /// A corner over the last frames.
 struct PointTrack
 {
@@ -71,7 +53,9 @@ struct PointMatch
 class PointTracker
 {
 public:
-  explicit PointTracker(const PinholeCamera &camera, const PointOptions &options = {});
+  static constexpr int kHistory = 32; ///< frames that a track remembers
+
+  explicit PointTracker(const PinholeCamera &camera);
   ~PointTracker();
   PointTracker(PointTracker &&) noexcept;
   PointTracker &operator=(PointTracker &&) noexcept;

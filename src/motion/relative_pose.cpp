@@ -2,7 +2,6 @@
 #include "motion/relative_pose.h"
 
 #include "motion/epipolar.h"
-#include "motion/require.h"
 
 #include <Eigen/Dense>
 
@@ -21,6 +20,8 @@ using motion::Rays;
 using motion::RotationFit;
 
 constexpr double kSharedError = 0.1;
+constexpr double kMostSigma_px = 1.5;     ///< above it the matches do not agree on one motion
+constexpr double kLeastParallaxRatio = 2; ///< variance of the flow along over across the epipolar lines
 constexpr double kUnknownDirection = 1e2; // variance of a direction that nobody has seen [rad^2]
 
 void takePrior(RelativePoseEstimate &estimate, const RelativePosePrior &given, const MotionPrior &prior)
@@ -65,7 +66,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
-    if (motion::parallaxOf(rays, start, sigma, options.kernel).score < 0) {
+    if (motion::parallaxOf(rays, start, sigma, motion::kKernel).score < 0) {
       start.direction = -start.direction;
     }
     fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
@@ -78,7 +79,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
   for (const JointFit &fit : fits) {
     const double angle = std::acos(std::clamp(std::abs(fit.motion.direction.dot(best->motion.direction)), 0.0, 1.0));
     const double excess = fit.cost * fit.sigma * fit.sigma / (best->sigma * best->sigma) - best->cost;
-    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, options.kernel);
+    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
     ambiguous = ambiguous || (angle > 0.2 && excess < 4 && std::abs(parallax.score) > 3);
   }
   return *best;
@@ -102,19 +103,6 @@ const char *toString(RelativePoseStatus status)
   return "?";
 }
 
-void RelativePoseOptions::validate() const
-{
-  using motion::require;
-  require(min_matches >= 6, "relative_pose.min_matches", min_matches, "6 or more");
-  require(min_sigma_px > 0, "relative_pose.min_sigma_px", min_sigma_px, "above 0");
-  require(max_sigma_px > min_sigma_px, "relative_pose.max_sigma_px", max_sigma_px, "above min_sigma_px");
-  require(kernel > 0, "relative_pose.kernel", kernel, "above 0");
-  require(iterations >= 1 && iterations <= 100, "relative_pose.iterations", iterations, "in 1 .. 100");
-  require(hypotheses >= 1 && hypotheses <= 10000, "relative_pose.hypotheses", hypotheses, "in 1 .. 10000");
-  require(min_parallax_ratio > 1, "relative_pose.min_parallax_ratio", min_parallax_ratio, "above 1");
-  require(inflation >= 1, "relative_pose.inflation", inflation, "1 or more");
-}
-
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
                                           const RelativePosePrior &given, const RelativePoseOptions &options)
 {
@@ -122,7 +110,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const MotionPrior prior(given);
   takePrior(estimate, given, prior);
   estimate.weights.assign(matches.size(), 0);
-  if (matches.size() < static_cast<std::size_t>(options.min_matches)) {
+  if (matches.size() < RelativePoseEstimate::kLeastMatches) {
     return estimate;
   }
   const double focal = std::sqrt(camera.fx * camera.fy);
@@ -134,7 +122,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma, options);
   bool ambiguous = false;
   JointFit fit = bestFit(rays, starts, prior, start_sigma, min_sigma, options, ambiguous);
-  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, options.kernel);
+  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
   if (parallax.score < -3) {
     fit.motion.direction = -fit.motion.direction;
     parallax.score = -parallax.score;
@@ -142,11 +130,11 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.sigma_px = fit.sigma * focal;
   estimate.parallax_px = parallax.median * focal;
   estimate.parallax_ratio = parallax.ratio;
-  if (estimate.sigma_px > options.max_sigma_px) {
+  if (estimate.sigma_px > kMostSigma_px) {
     estimate.status = RelativePoseStatus::inconsistent;
     return estimate;
   }
-  if (parallax.ratio < options.min_parallax_ratio || parallax.score < 3) {
+  if (parallax.ratio < kLeastParallaxRatio || parallax.score < 3) {
     estimate.status = RelativePoseStatus::no_parallax;
     takeRotation(estimate, motion::fitRotation(rays, prior, min_sigma, options));
     return estimate;
@@ -161,7 +149,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
   const motion::Epipolar epipolar(fit.motion);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    estimate.weights[i] = motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, options.kernel);
+    estimate.weights[i] = motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, motion::kKernel);
   }
   return estimate;
 }

@@ -36,21 +36,11 @@ namespace bole
 {
 struct RelativePoseOptions
 {
-  int min_matches = 12;          ///< below it nothing is estimated, >= 6
-  double min_sigma_px = 0.05;    ///< floor of the residual noise, > 0
-  double max_sigma_px = 1.5;     ///< above it the matches do not agree on one motion, > min_sigma_px
-  double kernel = 3;             ///< residuals lose half their weight near this many sigmas, > 0
-  int iterations = 12;           ///< of Gauss-Newton, 1 .. 100
-  int hypotheses = 48;           ///< two-point directions tried without a prior, 1 .. 10000
-  double min_parallax_ratio = 2; ///< variance of the flow along over across the epipolar lines for a translation, > 1
-  /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent.
-  /// Chosen so that the normalised error squared of the rendered flights is near its degrees of
-  /// freedom.
+  double min_sigma_px = 0.05; ///< floor of the residual noise, > 0
+  /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent. Chosen so that the
+  /// normalised error squared of the rendered flights is near its degrees of freedom.
   double inflation = 3;
-  unsigned seed = 1; ///< of the draws
-
-  /// Throws vpException: "relative_pose.name = value, must be ...".
-  void validate() const;
+  int iterations = 12; ///< of Gauss-Newton
 };
 
 /// What is known before the matches are looked at.
@@ -75,6 +65,8 @@ const char *toString(RelativePoseStatus status);
 
 struct RelativePoseEstimate
 {
+  static constexpr std::size_t kLeastMatches = 12; ///< below it nothing is estimated
+
   RelativePoseStatus status = RelativePoseStatus::too_few_points;
   Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();

@@ -3,8 +3,6 @@
 
 #include "geometry/degree.h"
 #include "motion/epipolar.h"
-#include "motion/require.h"
-
 #include <Eigen/Dense>
 #include <opencv2/imgproc.hpp>
 
@@ -77,22 +75,9 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, co
 }
 } // namespace
 
-void VerticalOptions::validate() const
-{
-  using motion::require;
-  require(max_tilt_deg >= 1 && max_tilt_deg <= 60, "vertical.max_tilt_deg", max_tilt_deg, "in 1 .. 60");
-  require(min_gradient > 0, "vertical.min_gradient", min_gradient, "above 0");
-  require(cell_px >= 4 && cell_px <= 64, "vertical.cell_px", cell_px, "in 4 .. 64");
-  require(min_coherence >= 0 && min_coherence <= 1, "vertical.min_coherence", min_coherence, "in 0 .. 1");
-  require(sigma_deg > 0, "vertical.sigma_deg", sigma_deg, "above 0");
-  require(min_edges >= 3, "vertical.min_edges", min_edges, "3 or more");
-  require(inflation >= 1, "vertical.inflation", inflation, "1 or more");
-}
-
 VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
                                       const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
 {
-  options.validate();
   VerticalEstimate estimate;
   const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
   estimate.up = expected;

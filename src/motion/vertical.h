@@ -33,9 +33,6 @@ struct VerticalOptions
   double sigma_deg = 1.5;     ///< of the direction of a patch's edge (trunks lean, bark is rough), > 0
   int min_edges = 12;         ///< patches, >= 3
   double inflation = 4;       ///< of the covariance, >= 1: patches of one trunk share its lean
-
-  /// Throws vpException: "vertical.name = value, must be ...".
-  void validate() const;
 };
 
 enum class VerticalStatus

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/timing_csv.h"
+
+#include "geometry/median.h"
 #include "output/atomic_file.h"
 
 #include <algorithm>
@@ -10,15 +12,6 @@ namespace bole
 {
 namespace
 {
-double quantile(std::vector<double> values, double part)
-{
-  if (values.empty())
-    return 0;
-  const auto at = static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
-  return values[at];
-}
-
 std::vector<double> totals(const std::vector<FrameTiming> &frames)
 {
   std::vector<double> values;
@@ -28,9 +21,9 @@ std::vector<double> totals(const std::vector<FrameTiming> &frames)
 }
 } // namespace
 
-double TimingTable::medianTotal_ms() const { return quantile(totals(frames), 0.5); }
+double TimingTable::medianTotal_ms() const { return quantileOf(totals(frames), 0.5); }
 
-double TimingTable::percentile95_ms() const { return quantile(totals(frames), 0.95); }
+double TimingTable::percentile95_ms() const { return quantileOf(totals(frames), 0.95); }
 
 double TimingTable::medianStage_ms(std::size_t stage) const
 {
@@ -38,7 +31,7 @@ double TimingTable::medianStage_ms(std::size_t stage) const
   for (const FrameTiming &frame : frames)
     if (stage < frame.stages_ms.size())
       values.push_back(frame.stages_ms[stage]);
-  return quantile(std::move(values), 0.5);
+  return quantileOf(std::move(values), 0.5);
 }
 
 std::optional<double> TimingTable::age_ms(double part) const
@@ -47,7 +40,7 @@ std::optional<double> TimingTable::age_ms(double part) const
   for (const FrameTiming &frame : frames)
     if (frame.age_ms)
       values.push_back(*frame.age_ms);
-  return values.empty() ? std::nullopt : std::optional<double>(quantile(std::move(values), part));
+  return values.empty() ? std::nullopt : std::optional<double>(quantileOf(std::move(values), part));
 }
 
 void writeTiming(const std::string &path, const TimingTable &timing)

@@ -48,7 +48,6 @@ PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sig
 MotionModel::MotionModel(const MotionModelOptions &options, const GyroOptions &gyro) : m_options(options), m_gyro(gyro)
 {
   m_options.validate();
-  m_gyro.validate();
 }
 
 PosePrior MotionModel::first(const Frame &frame) const

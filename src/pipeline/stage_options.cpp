@@ -10,8 +10,10 @@ namespace bole
 {
 namespace
 {
-constexpr double kCompressedSigma_px = 0.2; ///< of a corner in pictures that went through a lossy codec, at best
-}
+/// What a corner is believed to at best in pictures that went through a lossy codec: where it leaves blocks standing,
+/// corners stand too, an error that many share and that their residuals do not show.
+constexpr double kCompressedSigma_px = 0.2;
+} // namespace
 
 void FlowOptions::validate() const
 {
@@ -19,7 +21,7 @@ void FlowOptions::validate() const
   requireRange("flow.detect_every", detect_every, 1, 100);
   requireRange("flow.view_spacing", view_spacing, 0, 1);
   requireRange("flow.trunk_low", trunk_low, 0, 5);
-  requireRange("flow.trunk_high", trunk_high, trunk_low + 0.1, 20);
+  requireRange("flow.trunk_high", trunk_high, trunk_low, 20);
   requireRange("flow.track_range", track_range, 1, 100);
   requireRange("flow.gate", gate, 1, 100);
   requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
@@ -33,12 +35,7 @@ void StageOptions::validate() const
 {
   flow.validate();
   motion.validate();
-  points.validate();
   visual.validate();
-  gradient.validate();
-  saliency.validate();
-  detection.validate();
-  lines.validate();
   tracking.validate();
   smoothing.validate();
   map.validate();
@@ -107,8 +104,11 @@ void setRange(StageOptions &o, const Options::Range &range)
   constexpr double kParallax = 0.04; // rad: least that two views of the window differ by at the nearest trunk
   o.flow.view_spacing = kParallax * range.detect_min;
   o.smoothing.relinearise_position *= range.detect_min / Options::Range().detect_min;
-  if (range.near > 0)
-    o.saliency.near_range = range.near;
+  if (range.near > 0) {
+    constexpr double kNearest = 0.5; // m
+    o.saliency.near_range = std::max(range.near, kNearest);
+    o.saliency.min_range = std::min(o.saliency.min_range, o.saliency.near_range / 2);
+  }
   constexpr double kInside = 0.5; // m: at near itself the labels are undecided
   o.detection.near_range = o.map.near_range = std::max(0.0, range.near - kInside);
   o.map.through_range = range.through;
@@ -183,15 +183,4 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   o.validate();
   return o;
 }
-
-/// Where a codec leaves blocks standing corners stand too, an error that many share and that their residuals do not
-/// show: so corners are believed to 0.2 px at best.
-StageOptions forCompressedVideo()
-{
-  StageOptions options;
-  options.points.relative_pose.min_sigma_px = kCompressedSigma_px;
-  return options;
-}
-
-void Options::validate() const {}
 } // namespace bole

@@ -83,9 +83,4 @@ struct StageOptions
 /// The stages' options for a user's, with thresholds in the pixels of \p camera.
 /// \throw vpException naming the option, its value and the range.
 StageOptions stageOptions(const Options &options, const PinholeCamera &camera);
-
-/// The defaults for images that went through a lossy video codec (a drone's or phone's H.264): where it leaves texture
-/// standing, corners seem to stand too, an error that many share and that their residuals do not show. So corners are
-/// believed to 0.2 px at best. The same stands in config/compressed.yaml.
-StageOptions forCompressedVideo();
 } // namespace bole

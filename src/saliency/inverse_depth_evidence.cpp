@@ -5,6 +5,8 @@
 #include "saliency/flow_matrix.h"
 #include "saliency/inverse_depth_evidence.h"
 
+#include "geometry/median.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,6 +14,8 @@ namespace bole
 {
 namespace
 {
+constexpr int kInverseDepths = 16;   // steps of the sweep from infinity to min_range
+constexpr double kNearPrior = 0.3;   // p(nearer than near_range) before looking
 constexpr float kOutside = 1;        // residual where the older image ends: as bad as any, so that it says nothing
 constexpr double kUnrelatedPx = 2.5; // two unrelated places of the same texture differ as if so far apart
 
@@ -25,7 +29,7 @@ std::size_t index(int i, int j, int width, int count)
 InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int level, const SaliencyOptions &options)
     : m_camera(camera),
       m_options(options),
-      m_count(options.inverse_depths),
+      m_count(kInverseDepths),
       m_rows((camera.height + kRowStep - 1) / kRowStep),
       m_window_rows(options.window_height_px / kRowStep | 1)
 {
@@ -39,9 +43,9 @@ InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int leve
   }
   const double far_count = static_cast<double>(m_first_near), near_count = m_count - far_count;
   for (std::size_t k = 0; k < m_rho.size(); ++k)
-    m_log_prior.push_back(static_cast<float>(k < m_first_near ? std::log((1 - options.near_prior) / far_count)
-                                                              : std::log(options.near_prior / near_count)));
-  m_prior_log_odds = static_cast<float>(std::log(options.near_prior / (1 - options.near_prior)));
+    m_log_prior.push_back(static_cast<float>(k < m_first_near ? std::log((1 - kNearPrior) / far_count)
+                                                              : std::log(kNearPrior / near_count)));
+  m_prior_log_odds = static_cast<float>(std::log(kNearPrior / (1 - kNearPrior)));
   clear();
 }
 
@@ -226,7 +230,7 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   }
   // log of the likelihood of the window's residual, a Student's t, over that of an unrelated window; never below 0:
   // where no step matches (the place was hidden, or left the image) none is preferred.
-  const float weight = static_cast<float>(m_options.evidence_scale * 2.5);
+  const float weight = 2.5f;
   const float intensity = static_cast<float>(m_intensity_variance);
   constexpr float kUnrelated = static_cast<float>(kUnrelatedPx * kUnrelatedPx);
   for (std::size_t p = 0; p < g2.size(); ++p) {
@@ -274,7 +278,6 @@ double medianParallax(const PinholeCamera &camera, const Pose &oMc, double range
       const Eigen::Vector2d u((j + 0.5) * camera.width / 8, (i + 0.5) * camera.height / 8);
       flows.push_back((translationFlowMatrix(camera, u) * ct).norm() / range);
     }
-  std::nth_element(flows.begin(), flows.begin() + 32, flows.end());
-  return flows[32];
+  return medianOf(std::move(flows));
 }
 } // namespace bole

@@ -3,6 +3,8 @@
 
 #include "saliency/noise_learner.h"
 
+#include "geometry/median.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -20,16 +22,13 @@ double deviation(std::vector<float> magnitudes, double otherwise)
 {
   if (magnitudes.size() < kLeastCount)
     return otherwise;
-  const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
-  std::nth_element(magnitudes.begin(), middle, magnitudes.end());
-  return 1.4826 * *middle;
+  return 1.4826 * medianOf({magnitudes.begin(), magnitudes.end()});
 }
 } // namespace
 
 SaliencyNoiseLearner::SaliencyNoiseLearner(const PinholeCamera &camera, const SaliencyOptions &start)
     : m_camera(camera), m_start(start)
 {
-  start.validate();
 }
 
 void SaliencyNoiseLearner::add(const vpImage<unsigned char> &previous, const vpImage<unsigned char> &current,

@@ -13,13 +13,11 @@ namespace bole
 namespace
 {
 constexpr double kLeastTexture = 0.002;  // share of textured pixels that a rotation needs
+constexpr float kUnknownBelow = 0.7f;    // |change of the log-odds| under which a pixel is unknown
+constexpr double kEnoughParallax_px = 3; // a pair of frames suffices when a point at near_range moves so much
+constexpr double kTranslationNoiseScale =
+    0.5;                                 // of the prior's deviation in the sweep: its error moves all depths alike
 constexpr double kMaxTurnOffGyro = 0.05; // [rad]; further than any gyro errs within a frame
-
-const SaliencyOptions &validated(const SaliencyOptions &options)
-{
-  options.validate();
-  return options;
-}
 
 int workingLevel(const PinholeCamera &camera, const SaliencyOptions &options)
 {
@@ -117,7 +115,7 @@ const char *toString(SaliencyStatus status)
 
 SaliencyEstimator::SaliencyEstimator(const PinholeCamera &camera, const SaliencyOptions &options)
     : m_camera(camera),
-      m_options(validated(options)),
+      m_options(options),
       m_evidence(workingCamera(camera, workingLevel(camera, options)), workingLevel(camera, options), options)
 {
 }
@@ -149,7 +147,7 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
     return result;
   }
   Saliency result;
-  result.unknown_below = static_cast<float>(m_options.unknown_below);
+  result.unknown_below = kUnknownBelow;
   View view{ImagePyramid(image, m_camera, m_options.levels, m_options.finest_level), {}};
   if (m_views.empty()) {
     vpImage<float> none(static_cast<unsigned>(m_camera.height), static_cast<unsigned>(m_camera.width));
@@ -240,15 +238,14 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
   const int level = workingLevel(m_camera, m_options);
   const PyramidLevel &now = current[level];
   m_evidence.predict(m_views[1].vMc.inverse() * m_views[0].vMc);
-  const double enough = m_options.min_parallax_px;
   for (std::size_t apart = 1; apart < m_views.size(); ++apart) {
     const Pose oMc = m_views[apart].vMc.inverse() * m_views[0].vMc;
     result.frames_apart = static_cast<int>(apart);
     result.parallax_px = medianParallax(m_camera, oMc, m_options.near_range);
-    if (result.parallax_px < enough && apart + 1 < m_views.size())
+    if (result.parallax_px < kEnoughParallax_px && apart + 1 < m_views.size())
       continue;
     const MotionNoise noise{meanDeviation(result.covariance) * std::sqrt(static_cast<double>(apart)),
-                            m_options.translation_noise_scale * meanDeviation(m_translation->covariance)};
+                            kTranslationNoiseScale * meanDeviation(m_translation->covariance)};
     m_evidence.add(m_views[apart].pyramid[level], now, oMc, noise);
     break;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Options of the saliency stage. The names are the keys `saliency.*` of a configuration file.
+/// Options of the saliency stage.
 
 namespace bole
 {
@@ -30,28 +30,17 @@ struct SaliencyOptions
   // --- labels that ask about inverse depth, where the translation is given
   bool use_translation = true;  ///< off: labels by EM alone even where odometry gives the translation
   double sigma_residual = 0.05; ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
-  double translation_noise_scale =
-      0.5;                     ///< of the prior's deviation in the sweep; [0, 10]. Its error moves all depths alike
-  double near_range = 6;       ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
-  double min_range = 2;        ///< nearest range of the sweep [m]; (0.05, near_range)
-  int inverse_depths = 16;     ///< steps of the sweep from infinity to min_range; [4, 64]
-  int window_width_px = 3;     ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
-  int window_height_px = 9;    ///< trunks are upright: taller than wide; odd, [1, 31]
-  double min_parallax_px = 3;  ///< a pair of frames suffices when a point at near_range moves so much [px]; [0.1, 50]
-  int max_frames_apart = 5;    ///< oldest frame that is tried; [1, 20]
-  double evidence_decay = 0.8; ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
-  double near_prior = 0.3;     ///< p(nearer than near_range) before looking; (0, 1)
+  double near_range = 6;        ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
+  double min_range = 2;         ///< nearest range of the sweep [m]; (0.05, near_range)
+  int window_width_px = 3;      ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
+  int window_height_px = 9;     ///< trunks are upright: taller than wide; odd, [1, 31]
+  int max_frames_apart = 5;     ///< oldest frame that is tried; [1, 20]
+  double evidence_decay = 0.8;  ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
   bool relative_evidence =
       true; ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
-  double evidence_scale =
-      1; ///< weight of a window's residuals as log-likelihood; (0, 100]. 1 = the noise model is right
-  double unknown_below = 0.7; ///< |change of the log odds| under which a pixel is unknown; [0, 20]
 
   /// Eq. 10 to 17 as printed, with the constants of the original form: isotropic Sigma_b and Sigma_f, consecutive
   /// frames, full resolution, no prior on the rotation beyond its start, no translation.
   static SaliencyOptions paper();
-
-  /// Throws vpException "saliency.name = value, must be ...".
-  void validate() const;
 };
 } // namespace bole

@@ -7,7 +7,7 @@
 #include "input/asl_source.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
-#include <bole/config.h>
+#include "pipeline/stage_options.h"
 #include <bole/evaluation.h>
 #include <bole/pipeline.h>
 
@@ -15,6 +15,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <unistd.h>
 #include <vector>
@@ -26,34 +27,45 @@ using namespace bole;
 struct Step
 {
   const char *name;
-  std::vector<std::string> settings; ///< as those of bole track --set
+  std::function<void(StageOptions &)> take_away;
 };
 
 const std::vector<Step> kSteps = {
-    {"everything (default)", {}},
-    {"saliency off", {"flow.use_saliency=false"}},
-    {"saliency by EM alone", {"saliency.use_translation=false"}},
-    {"points off", {"flow.use_points=false"}},
-    {"gyro's bias not learnt", {"gyro.bias_sigma=0", "gyro.bias_walk=0"}},
-    {"upright trunks (lean off)", {"smoothing.prior_lean_sigma=0.0001"}},
-    {"detector: foreground not asked", {"detection.foreground_min=0"}},
-    {"detector: agreement and inliers not asked", {"detection.agreement_min=0", "detection.inliers_min=0"}},
-    {"detector: range not asked", {"detection.range_sigma_max=1", "detection.parallax_min=0"}},
-    {"odds not asked before confirmation",
-     {"map.confirm_evidence=-20", "map.doubt_candidate=-50", "map.doubt_confirmed=-50"}},
-    {"saliency inside a trunk not asked", {"map.near_range=0"}},
-    {"points behind a trunk not asked", {"map.through_range=0"}},
-    {"merging off", {"map.merge_distance=0"}},
-    {"scan off: minimised from the prediction", {"tracking.scan=false"}},
-    {"blurred minimum and maximum (Eq. 3)", {"gradient.split=true", "energy.form=paper"}},
+    {"everything (default)", [](StageOptions &) {}},
+    {"saliency off", [](StageOptions &o) { o.flow.use_saliency = false; }},
+    {"saliency by EM alone", [](StageOptions &o) { o.saliency.use_translation = false; }},
+    {"points off", [](StageOptions &o) { o.flow.use_points = false; }},
+    {"gyro's bias not learnt", [](StageOptions &o) { o.points.gyro.bias_sigma = o.points.gyro.bias_walk = 0; }},
+    {"upright trunks (lean off)", [](StageOptions &o) { o.smoothing.prior_lean_sigma = 0.0001; }},
+    {"detector: foreground not asked", [](StageOptions &o) { o.detection.foreground_min = 0; }},
+    {"detector: agreement and inliers not asked",
+     [](StageOptions &o) { o.detection.agreement_min = o.detection.inliers_min = 0; }},
+    {"detector: range not asked",
+     [](StageOptions &o) {
+       o.detection.range_sigma_max = 1;
+       o.detection.parallax_min = 0;
+     }},
+    {"log-odds not asked before confirmation",
+     [](StageOptions &o) {
+       o.map.confirm_evidence = -20;
+       o.map.doubt_candidate = o.map.doubt_confirmed = -50;
+     }},
+    {"saliency inside a trunk not asked", [](StageOptions &o) { o.map.near_range = 0; }},
+    {"points behind a trunk not asked", [](StageOptions &o) { o.map.through_range = 0; }},
+    {"merging off", [](StageOptions &o) { o.map.merge_distance = 0; }},
+    {"scan off: minimised from the prediction", [](StageOptions &o) { o.tracking.scan = false; }},
+    {"blurred minimum and maximum (Eq. 3)",
+     [](StageOptions &o) {
+       o.gradient.split = true;
+       o.tracking.energy.form = EnergyForm::paper;
+     }},
 };
 
 Evaluation fly(const std::string &sequence, const Step &step)
 {
-  StageOptions options;
-  for (const std::string &setting : step.settings)
-    setOption(setting, options);
   AslSource source(sequence);
+  StageOptions options = stageOptions(Options(), source.camera());
+  step.take_away(options);
   Pipeline pipeline(source.camera(), source.bMc(), options);
   for (;;) {
     Frame frame;

@@ -116,17 +116,4 @@ TEST(Gradient, SplitPartsAddUpToTheBlurredSobelDerivative)
   EXPECT_NEAR(gradient.negative[30][30] + gradient.positive[30][30], sum / weight, 1e-4);
   EXPECT_NEAR(gradient.negative[30][30], negative / weight, 5e-4);
 }
-
-TEST(GradientOptions, AnOptionOutOfRangeIsNamed)
-{
-  GradientOptions options;
-  options.sigma_px = 0.1;
-  try {
-    options.validate();
-    FAIL() << "no exception";
-  }
-  catch (const vpException &error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("gradient.sigma_px = 0.1, must be in [0.5, 5]"));
-  }
-}
 } // namespace

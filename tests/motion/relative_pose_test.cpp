@@ -191,17 +191,4 @@ TEST(RelativePose, APlaneInViewNeedsTheGyro)
   EXPECT_TRUE(without.status == RelativePoseStatus::ambiguous || directionErrorDeg(without.direction, aMb.t) < 8)
       << toString(without.status) << " " << without.direction.transpose();
 }
-
-TEST(RelativePose, OptionsNameTheFault)
-{
-  RelativePoseOptions options;
-  options.inflation = 0.5;
-  try {
-    options.validate();
-    FAIL();
-  }
-  catch (const vpException &e) {
-    EXPECT_NE(std::string(e.what()).find("relative_pose.inflation = 0.5, must be 1 or more"), std::string::npos);
-  }
-}
 } // namespace

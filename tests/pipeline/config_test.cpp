@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/open_source.h>
+#include "input/camera_file.h"
+#include "pipeline/option_table.h"
 #include <bole/config.h>
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <fmt/format.h>
 #include <fstream>
 #include <sstream>
 #include <visp3/core/vpException.h>
@@ -12,95 +14,161 @@
 namespace
 {
 using namespace bole;
+using testing::AllOf;
 using testing::HasSubstr;
 
-std::string messageOf(const std::string &yaml)
+std::string written(const std::string &yaml)
 {
   const std::string path = testing::TempDir() + "config_test.yaml";
   std::ofstream(path) << yaml;
-  StageOptions options;
+  return path;
+}
+
+/// What is said of a file of \p yaml; "" where it is taken.
+std::string messageOf(const std::string &yaml)
+{
+  Options options;
   try {
-    readConfig(path, options);
+    readConfig(written(yaml), options);
   }
   catch (const vpException &error) {
+    EXPECT_EQ(toYaml(options), toYaml(Options())) << "an error must leave the options as they were";
     return error.getStringMessage();
   }
   return "";
 }
 
-TEST(Config, DefaultPresetIsWhatTheCodeHas)
+/// What is said of --set \p assignments.
+std::string messageOfSet(const std::vector<std::string> &assignments)
 {
-  std::ifstream file(BOLE_SOURCE_DIR "/config/default.yaml");
-  std::stringstream text;
-  for (std::string line; std::getline(file, line);)
-    if (line.empty() || line[0] != '#')
-      text << line << "\n";
-  EXPECT_EQ(text.str(), toYaml(StageOptions()));
+  Options options;
+  try {
+    setOptions(assignments, options);
+  }
+  catch (const vpException &error) {
+    EXPECT_EQ(toYaml(options), toYaml(Options()));
+    return error.getStringMessage();
+  }
+  return "";
 }
 
-TEST(Config, PaperPresetIsRead)
+std::string textOf(const std::string &path)
 {
-  StageOptions options;
-  readConfig(BOLE_SOURCE_DIR "/config/paper.yaml", options);
-  EXPECT_EQ(options.tracking.energy.form, EnergyForm::paper);
-  EXPECT_FALSE(options.flow.use_points);
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+TEST(Config, DefaultPresetIsWhatTheCodeHas)
+{
+  EXPECT_THAT(textOf(BOLE_SOURCE_DIR "/config/default.yaml"), testing::EndsWith(toYaml(Options())));
+}
+
+TEST(Config, HasNoMoreThanFortyOptionsAndSaysOfEachWhatItDoes)
+{
+  const std::vector<OptionDescription> all = describeOptions();
+  EXPECT_LE(all.size(), 40u);
+  for (const OptionDescription &option : all) {
+    EXPECT_FALSE(option.effect.empty()) << option.key;
+    EXPECT_FALSE(option.range.empty()) << option.key;
+  }
 }
 
 /// Every file of config/ is a preset, and the cameras of the drones stand beside theirs.
 TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
 {
-  const std::string defaults = toYaml(StageOptions());
+  const std::string defaults = toYaml(Options());
   std::vector<std::string> names;
   for (const auto &entry : std::filesystem::directory_iterator(BOLE_SOURCE_DIR "/config")) {
     if (!entry.is_regular_file())
       continue;
-    StageOptions options;
+    Options options;
     EXPECT_NO_THROW(readConfig(entry.path().string(), options)) << entry.path();
     names.push_back(entry.path().stem().string());
     EXPECT_EQ(toYaml(options) == defaults, names.back() == "default") << names.back();
   }
-  EXPECT_THAT(names, testing::IsSupersetOf({"default", "paper", "ardrone1", "ardrone2", "tabletop"}));
+  EXPECT_THAT(names, testing::UnorderedElementsAre("default", "paper", "ardrone1", "ardrone2", "tabletop"));
   EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone1.yaml").model.pinhole.width, 320);
   EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone2.yaml").model.pinhole.width, 640);
 }
 
-TEST(Config, CompressedPresetIsWhatTheCodeHas)
-{
-  StageOptions options;
-  readConfig(BOLE_SOURCE_DIR "/config/compressed.yaml", options);
-  EXPECT_EQ(toYaml(options), toYaml(forCompressedVideo()));
-  EXPECT_NE(toYaml(options), toYaml(StageOptions()));
-}
-
 TEST(Config, ReadingWhatWasWrittenChangesNothing)
 {
-  StageOptions options;
-  setOption("detection.window=31", options);
-  setOption("points.frames_back=[1, 2, 5]", options);
-  const std::string path = testing::TempDir() + "config_round.yaml";
-  std::ofstream(path) << toYaml(options);
-  StageOptions read;
-  readConfig(path, read);
+  Options options;
+  for (OptionEntry &entry : optionTable(options)) // another value in each than its default
+    if (auto *const *flag = std::get_if<bool *>(&entry.value))
+      **flag = !**flag;
+    else
+      EXPECT_TRUE(entry.assign(std::get_if<int *>(&entry.value) ? "31" : fmt::format("{}", entry.high.value)))
+          << entry.key;
+  Options read;
+  readConfig(written(toYaml(options)), read);
   EXPECT_EQ(toYaml(read), toYaml(options));
   EXPECT_EQ(read.detection.window, 31);
+  EXPECT_FALSE(read.stages.points);
 }
 
-TEST(Config, MistakesAreNamedWithTheirLine)
+/// Each option with each mistake, in the third line of a file and on the command line.
+TEST(Config, EveryMistakeInEveryOptionIsNamedWithItsLine)
 {
-  EXPECT_THAT(messageOf("detection:\n  widow: 3\n"), HasSubstr("config_test.yaml:2: detection.widow is no option"));
-  EXPECT_THAT(messageOf("dection:\n  window: 3\n"), HasSubstr(":1: dection is no stage"));
-  EXPECT_THAT(messageOf("map:\n  radius_min: thin\n"), HasSubstr(":2: map.radius_min = thin, must be a number"));
-  EXPECT_THAT(messageOf("detection:\n  window: 10.7\n"), HasSubstr("must be a whole number"));
-  EXPECT_THAT(messageOf("detection:\n  window: 10\n  window: 11\n"), HasSubstr("twice"));
-  EXPECT_THAT(messageOf("flow:\n  use_points: true\n  gate: 1e9\n"), HasSubstr(":3: flow.gate = 1e+09, must be in"));
+  Options options;
+  for (const OptionEntry &entry : optionTable(options)) {
+    const bool is_flag = std::holds_alternative<bool *>(entry.value);
+    std::vector<std::string> wrong = {"thin", "[1, 2]", "nan", ".inf", "1e999", "0,5", "", "{a: 1}", "1 2"};
+    if (!is_flag) {
+      wrong.push_back(fmt::format("{}", std::floor(entry.low.value - 1)));
+      wrong.push_back(fmt::format("{}", std::ceil(entry.high.value + 1)));
+    }
+    else
+      wrong.push_back("1");
+    if (std::holds_alternative<int *>(entry.value))
+      wrong.insert(wrong.end(), {"10.7", "99999999999"});
+    const std::string line = fmt::format("# a comment\n{}:\n  {}: ", entry.section(), entry.name());
+    for (const std::string &value : wrong) {
+      EXPECT_THAT(messageOf(line + value + "\n"),
+                  AllOf(HasSubstr(std::string("config_test.yaml:3: ") + entry.key + " = "),
+                        HasSubstr("must be " + entry.allowed())))
+          << value;
+      EXPECT_THAT(messageOfSet({std::string(entry.key) + "=" + value}),
+                  AllOf(HasSubstr(std::string("--set ") + entry.key + "=" + value + ": " + entry.key + " = "),
+                        HasSubstr("must be " + entry.allowed())));
+    }
+    const std::string good = entry.text();
+    EXPECT_EQ(messageOf(line + good + "\n"), "");
+    EXPECT_THAT(messageOf(line + good + "\n  " + entry.name() + ": " + good + "\n"),
+                HasSubstr(std::string("config_test.yaml:4: ") + entry.key + " is given twice"));
+    EXPECT_THAT(messageOfSet({std::string(entry.key) + "=" + good, std::string(entry.key) + "=" + good}),
+                HasSubstr(std::string(entry.key) + " is given twice"));
+    EXPECT_THAT(messageOf(fmt::format("{}:\n  {}x: 1\n", entry.section(), entry.name())),
+                HasSubstr(fmt::format(":2: {0}x is no option; did you mean {0}?", entry.key)));
+  }
 }
 
-TEST(Config, AMistakeLeavesTheOptionsAsTheyWere)
+TEST(Config, NamesTheKeyThatWasMeant)
 {
-  StageOptions options;
-  const std::string before = toYaml(options);
-  EXPECT_THROW(setOption("detection.window=1000", options), vpException);
-  EXPECT_THROW(setOption("detection.nothing=1", options), vpException);
-  EXPECT_EQ(toYaml(options), before);
+  EXPECT_THAT(messageOf("detection:\n  widow: 3\n"),
+              HasSubstr("config_test.yaml:2: detection.widow is no option; did you mean detection.window?"));
+  EXPECT_THAT(messageOf("dection:\n  window: 3\n"), HasSubstr(":1: dection is no section; did you mean detection?"));
+  EXPECT_THAT(messageOf("map:\n  window: 3\n"), HasSubstr("map.window is no option; did you mean detection.window?"));
+  EXPECT_THAT(messageOf("map:\n  quite_something_else: 3\n"), HasSubstr("is no option; bole options lists them"));
+  EXPECT_THAT(messageOfSet({"window=3"}), HasSubstr("window is no option; did you mean detection.window?"));
+  EXPECT_THAT(messageOfSet({"detection.window"}), HasSubstr("must be section.name=value"));
+}
+
+TEST(Config, RangesThatDependOnAnotherOptionAreThoseWhenAllIsSet)
+{
+  EXPECT_EQ(messageOf("trunks:\n  radius_min: 0.5\n  radius_max: 0.9\n"), "");
+  EXPECT_EQ(messageOfSet({"trunks.radius_min=0.5", "trunks.radius_max=0.9"}), "");
+  EXPECT_THAT(messageOf("trunks:\n  radius_min: 0.5\n"),
+              HasSubstr(":2: trunks.radius_min = 0.5, must be a number in [0.005, trunks.radius_max = 0.38]"));
+}
+
+TEST(Config, AFileThatIsNoMapOfSectionsIsRefusedWithItsLine)
+{
+  EXPECT_THAT(messageOf("- 1\n"), HasSubstr("config_test.yaml:1: must be a map of sections"));
+  EXPECT_THAT(messageOf("map: 3\n"), HasSubstr(":1: map = 3, must be a map of options"));
+  EXPECT_THAT(messageOf("map:\n"), HasSubstr(":1: map = (nothing), must be a map of options"));
+  EXPECT_EQ(messageOf("# nothing but a comment\n"), "");
 }
 } // namespace

@@ -164,20 +164,5 @@ TEST(Saliency, RefusesAnImageOfAnotherSize)
   SaliencyEstimator estimator(kCamera);
   EXPECT_THROW(estimator.update(vpImage<unsigned char>(10, 10)), vpException);
 }
-
-TEST(SaliencyOptions, AnOptionOutOfRangeIsNamed)
-{
-  SaliencyOptions options;
-  options.evidence_decay = 1.5;
-  try {
-    SaliencyEstimator estimator(kCamera, options);
-    FAIL() << "accepted";
-  }
-  catch (const vpException &error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("saliency.evidence_decay = 1.5, must be within [0, 1]"));
-  }
-}
-
-TEST(SaliencyOptions, ThePaperPresetIsValid) { EXPECT_NO_THROW(SaliencyOptions::paper().validate()); }
 } // namespace
 } // namespace bole

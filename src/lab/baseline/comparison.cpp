@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/comparison.h"
+
+#include "geometry/median.h"
 #include "geometry/so3.h"
 
 #include <algorithm>
@@ -16,15 +18,6 @@ double rootMeanSquare(const std::vector<FrameError> &errors, std::size_t n, doub
   for (std::size_t k = 0; k < n; ++k)
     sum += errors[k].*member * errors[k].*member;
   return n > 0 ? std::sqrt(sum / double(n)) : 0;
-}
-
-double quantile(std::vector<double> values, double q)
-{
-  if (values.empty())
-    return 0;
-  const std::size_t k = std::min(values.size() - 1, std::size_t(q * double(values.size())));
-  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(k), values.end());
-  return values[k];
 }
 
 void summarise(Score &score)
@@ -44,8 +37,8 @@ void summarise(Score &score)
   score.rotation_rmse_deg = rootMeanSquare(score.errors, held, &FrameError::rotation_deg);
   score.all_position_rmse_m = rootMeanSquare(score.errors, all, &FrameError::position_m);
   score.all_rotation_rmse_deg = rootMeanSquare(score.errors, all, &FrameError::rotation_deg);
-  score.median_ms = quantile(times, 0.5);
-  score.p95_ms = quantile(times, 0.95);
+  score.median_ms = quantileOf(times, 0.5);
+  score.p95_ms = quantileOf(times, 0.95);
 }
 } // namespace
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/test_flight.h"
+
 #include "geometry/so3.h"
+#include "geometry/yaw.h"
 #include "input/asl_source.h"
 #include "input/csv_reader.h"
 
@@ -20,7 +22,6 @@ using Eigen::Vector3d;
 
 namespace
 {
-double yawOf(const Eigen::Matrix3d &R) { return std::atan2(R(1, 0), R(0, 0)); }
 
 Eigen::Matrix3d turned(double yaw) { return expSo3({0, 0, yaw}); }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/flight_path.h"
 
+#include "geometry/require_range.h"
+
 #include "geometry/so3.h"
 #include "lab/simulation/random.h"
 
@@ -17,13 +19,6 @@ namespace
 {
 constexpr double kGravity = 9.81;
 constexpr double kTwoPi = 2 * M_PI;
-
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
-  }
-}
 } // namespace
 
 const char *toString(PathKind kind)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/flight_sensors.h"
 
+#include "geometry/require_range.h"
+
 #include "geometry/so3.h"
 
 #include <fmt/format.h>
@@ -10,12 +12,6 @@ namespace bole
 {
 namespace
 {
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
-  }
-}
 } // namespace
 
 void SensorOptions::validate() const

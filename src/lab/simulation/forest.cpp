@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/forest.h"
 
+#include "geometry/require_range.h"
+
 #include "lab/simulation/random.h"
 
 #include <algorithm>
@@ -114,13 +116,6 @@ void placeSun(Forest &forest)
   const double azimuth = random.uniform(0, 2 * M_PI), elevation = random.uniform(0.3, 0.8);
   forest.to_sun = {std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
                    std::sin(elevation)};
-}
-
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
-  }
 }
 } // namespace
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/forest_renderer.h"
 
+#include "geometry/require_range.h"
+
 #include "lab/simulation/light_maps.h"
 #include "lab/simulation/noise_texture.h"
 #include "lab/simulation/sensor_image.h"
@@ -18,13 +20,6 @@ namespace
 {
 constexpr std::uint16_t kNothing = 65535;
 constexpr double kDepthReach = 65; ///< [m]
-
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
-  }
-}
 
 /// Directions (x, y, 1) through the corners of the pixels of a camera with its lens.
 class RayTable

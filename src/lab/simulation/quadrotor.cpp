@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/quadrotor.h"
 
+#include "geometry/require_range.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -33,23 +35,19 @@ void wander(Eigen::Vector2d &value, Random &random, double sigma, double tau, do
 
 void QuadrotorOptions::validate() const
 {
-  const auto require = [](const char *name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw vpException(vpException::badValue, "%s = %g, must be %g to %g", name, value, low, high);
-  };
-  require("largest_tilt", largest_tilt, 0.02, 1);
-  require("tilt_frequency", tilt_frequency, 1, 60);
-  require("tilt_damping", tilt_damping, 0.2, 3);
-  require("drag", drag, 0, 5);
-  require("climb_lag", climb_lag, 0.02, 5);
-  require("turn_lag", turn_lag, 0.02, 5);
-  require("command_delay", command_delay, 0, 1);
-  require("hover_gain", hover_gain, 0, 10);
-  require("takeoff_height", takeoff_height, 0.3, 5);
-  require("gust", gust, 0, 5);
-  require("gust_time", gust_time, 0.05, 60);
-  require("velocity_noise", velocity_noise, 0, 1);
-  require("velocity_noise_time", velocity_noise_time, 0.01, 10);
+  requireRange("largest_tilt", largest_tilt, 0.02, 1);
+  requireRange("tilt_frequency", tilt_frequency, 1, 60);
+  requireRange("tilt_damping", tilt_damping, 0.2, 3);
+  requireRange("drag", drag, 0, 5);
+  requireRange("climb_lag", climb_lag, 0.02, 5);
+  requireRange("turn_lag", turn_lag, 0.02, 5);
+  requireRange("command_delay", command_delay, 0, 1);
+  requireRange("hover_gain", hover_gain, 0, 10);
+  requireRange("takeoff_height", takeoff_height, 0.3, 5);
+  requireRange("gust", gust, 0, 5);
+  requireRange("gust_time", gust_time, 0.05, 60);
+  requireRange("velocity_noise", velocity_noise, 0, 1);
+  requireRange("velocity_noise_time", velocity_noise_time, 0.01, 10);
 }
 
 Quadrotor::Quadrotor(const QuadrotorOptions &options, const Eigen::Vector2d &xy, double heading, double ground)

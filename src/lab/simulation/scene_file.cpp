@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/simulated_flight.h"
 
+#include "input/yaml_file.h"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <set>
 #include <visp3/core/vpException.h>
-#include <yaml-cpp/yaml.h>
 
 namespace bole
 {
@@ -250,16 +250,7 @@ void readTrunks(const std::string &path, const YAML::Node &node, std::vector<Sim
 
 SceneOptions readScene(const std::string &path)
 {
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(path);
-  }
-  catch (const YAML::BadFile &) {
-    throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
-  }
-  catch (const YAML::ParserException &error) {
-    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", path, error.mark.line + 1, error.msg));
-  }
+  const YAML::Node root = loadYaml(path);
   SceneOptions scene;
   if (!root.IsMap()) {
     throw vpException(vpException::badValue, fmt::format("{}:1: a scene must be a mapping of sections", path));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/simulated_flight.h"
 
+#include "geometry/require_range.h"
+
 #include "lab/simulation/h264_link.h"
 #include "lab/simulation/sequence_writer.h"
 
@@ -13,12 +15,6 @@ namespace bole
 {
 namespace
 {
-void requireRange(const char *name, double value, double low, double high)
-{
-  if (!(value >= low && value <= high)) {
-    throw vpException(vpException::badValue, fmt::format("{} = {}, must be {} to {}", name, value, low, high));
-  }
-}
 
 void recordImu(const FlightPath &path, const SensorOptions &options, double duration, SequenceWriter &writer)
 {

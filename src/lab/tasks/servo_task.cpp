@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/servo_task.h"
 
+#include "geometry/require_range.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -33,13 +35,9 @@ const char *toString(TaskPhase phase)
 
 void SafetyOptions::validate() const
 {
-  const auto require = [](const char *name, int value, int high) {
-    if (value < 1 || value > high)
-      throw vpException(vpException::badValue, "%s = %d, must be in [1, %d]", name, value, high);
-  };
-  require("lost_frames", lost_frames, 100);
-  require("sure_frames", sure_frames, 100);
-  require("patience_frames", patience_frames, 10000);
+  requireRange("lost_frames", lost_frames, 1, 100);
+  requireRange("sure_frames", sure_frames, 1, 100);
+  requireRange("patience_frames", patience_frames, 1, 10000);
 }
 
 ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
@@ -71,8 +69,6 @@ TaskCommand ServoTask::step(const FrameReport &report)
   }
   return act(report);
 }
-
-double yawOf(const Pose &wMb) { return std::atan2(wMb.R(1, 0), wMb.R(0, 0)); }
 
 Eigen::Vector2d limited(const Eigen::Vector2d &v, double largest)
 {

@@ -11,6 +11,7 @@
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
+#include "geometry/yaw.h"
 #include <bole/report.h>
 
 #include <string>
@@ -100,8 +101,6 @@ private:
   Pose m_start;
 };
 
-/// Yaw of a level body [rad].
-double yawOf(const Pose &wMb);
 /// Velocity of the body that is \p velocity [m/s] in the world and turns towards \p heading [rad].
 Eigen::Vector4d towards(const Pose &wMb, const Eigen::Vector2d &velocity, double heading);
 /// \p v with its length at most \p largest.

@@ -104,7 +104,7 @@ std::vector<TruthTrunk> truthOf(const Forest &forest)
   return truth;
 }
 
-AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, const StageOptions &options,
+AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, const Options &options,
                                      const std::function<bool()> &is_cancelled)
 {
   scene.validate();

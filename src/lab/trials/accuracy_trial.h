@@ -24,7 +24,7 @@ struct AccuracyTrialResult
 
 /// Renders \p frames of \p scene, tracks them with \p options and compares map and trajectory with the truth.
 /// \p is_cancelled is asked before each frame.
-AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, const StageOptions &options,
+AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, const Options &options,
                                      const std::function<bool()> &is_cancelled = {});
 
 /// The trunks of \p forest as ground truth: at breast height.

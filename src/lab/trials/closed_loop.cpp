@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/closed_loop.h"
+
+#include "geometry/median.h"
 #include "geometry/require_range.h"
 #include "input/frame_health.h"
 
@@ -22,16 +24,12 @@ double processMs()
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-double quantile(const std::vector<LoopSample> &samples, double share)
+double loopQuantile_ms(const std::vector<LoopSample> &samples, double share)
 {
   std::vector<double> ms;
   for (const LoopSample &sample : samples)
     ms.push_back(sample.loop_ms);
-  if (ms.empty())
-    return 0;
-  const auto at = ms.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(ms.size() - 1));
-  std::nth_element(ms.begin(), at, ms.end());
-  return *at;
+  return quantileOf(std::move(ms), share);
 }
 
 void takeOff(vpSimulatorArDrone &robot, const LoopOptions &options)
@@ -74,8 +72,8 @@ double LoopRecord::leastClearance() const
   return least;
 }
 
-double LoopRecord::medianLoop_ms() const { return quantile(samples, 0.5); }
-double LoopRecord::percentile95Loop_ms() const { return quantile(samples, 0.95); }
+double LoopRecord::medianLoop_ms() const { return loopQuantile_ms(samples, 0.5); }
+double LoopRecord::percentile95Loop_ms() const { return loopQuantile_ms(samples, 0.95); }
 
 LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
                          const Judge &judge, const LoopWatcher &watcher)

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/median_interval.h"
+
+#include "geometry/median.h"
 #include "lab/simulation/random.h"
 
 #include <algorithm>
@@ -8,17 +10,6 @@
 
 namespace bole
 {
-namespace
-{
-double medianOf(std::vector<double> &values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  const double upper = *middle;
-  return values.size() % 2 ? upper : 0.5 * (upper + *std::max_element(values.begin(), middle));
-}
-} // namespace
-
 MedianInterval bootstrapMedian(std::vector<double> values, int resamples, std::uint64_t seed)
 {
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return std::isnan(v); }), values.end());
@@ -34,17 +25,13 @@ MedianInterval bootstrapMedian(std::vector<double> values, int resamples, std::u
   for (int k = 0; k < resamples; ++k) {
     for (double &value : drawn)
       value = values[static_cast<std::size_t>(random.uniform() * static_cast<double>(values.size()))];
-    medians.push_back(medianOf(drawn));
+    medians.push_back(centreOf(drawn));
   }
-  interval.median = medianOf(values);
+  interval.median = centreOf(values);
   if (medians.empty())
     medians.push_back(interval.median);
-  std::sort(medians.begin(), medians.end());
-  const auto quantile = [&medians](double share) {
-    return medians[static_cast<std::size_t>(std::lround(share * static_cast<double>(medians.size() - 1)))];
-  };
-  interval.low = std::min(interval.median, quantile(0.025));
-  interval.high = std::max(interval.median, quantile(0.975));
+  interval.low = std::min(interval.median, quantileOf(medians, 0.025));
+  interval.high = std::max(interval.median, quantileOf(medians, 0.975));
   return interval;
 }
 

@@ -308,13 +308,11 @@ vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
   return robot;
 }
 
-StageOptions ServoTrialOptions::defaultPipeline(ServoKind kind)
+Options ServoTrialOptions::defaultPipeline()
 {
-  StageOptions pipeline;
-  pipeline.flow.search_px = 1;
-  pipeline.flow.view_correlation = 0.05;
-  pipeline.flow.turned_frames = kind == ServoKind::hold ? 0 : 3;
-  pipeline.smoothing.fixed_lag = 150;
+  Options pipeline;
+  pipeline.stages.servoing = true;
+  pipeline.map.lag = 15;
   return pipeline;
 }
 

@@ -11,21 +11,19 @@ namespace bole
 {
 struct ServoTrialOptions
 {
-  ScenarioOptions scenario;                                    ///< with the task and the seed
-  double distance = 3;                                         ///< hold [m], 0.5 to 20
-  double ratio = 0;                                            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
-  double speed = 0;                                            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
-  StageOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
+  ScenarioOptions scenario; ///< with the task and the seed
+  double distance = 3;      ///< hold [m], 0.5 to 20
+  double ratio = 0;         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
+  double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
+  Options pipeline = defaultPipeline();
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
   /// vpSimulatorArDrone's defaults with a stiffer velocity loop (gain 0.6) and 2 samples a pixel.
   static vpSimulatorArDrone::Options defaultRobot();
-  /// The pipeline's defaults, but that a trunk missed is looked for wider from frame to frame: a drone that rests by
-  /// one trunk has little else to correct its heading by; and that poses older than 15 s are closed: what it sees from
-  /// one place would make each frame dearer than the last. That counts but once, and where it goes round trunks (all
-  /// but hold) their borders may turn over.
-  static StageOptions defaultPipeline(ServoKind kind);
+  /// The defaults for a camera that is steered by the trunks, with poses older than 15 s marginalised: what it sees
+  /// from one place would make each frame more costly than the last.
+  static Options defaultPipeline();
 };
 
 /// What came of it. Figures that a task does not have are NaN.

@@ -99,7 +99,7 @@ TEST(Forest, RefusesADensityOutOfRange)
     FAIL() << "accepted";
   }
   catch (const vpException &error) {
-    EXPECT_NE(std::string(error.what()).find("density = -1, must be 0 to 0.3"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("density = -1, must be in [0, 0.3]"), std::string::npos) << error.what();
   }
 }
 

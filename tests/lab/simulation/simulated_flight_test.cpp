@@ -126,7 +126,7 @@ TEST_F(SimulatedFlight, FaultsOfASceneFileNameTheLine)
       {"forest:\n  densty: 1\n", "scene.yaml:2: densty, must be a key of the section forest"},
       {"forst:\n  density: 1\n", "scene.yaml:1: forst, must be one of the sections"},
       {"forest:\n  light: dusk\n", "scene.yaml:2: light = dusk, must be one of sun, overcast"},
-      {"forest:\n  density: 9\n", "density = 9, must be 0 to 0.3"},
+      {"forest:\n  density: 9\n", "density = 9, must be in [0, 0.3]"},
       {"forest:\n  density: .nan\n", "density"},
       {"forest: [\n", "scene.yaml:"},
       {"- 1\n", "scene.yaml:1: a scene must be a mapping"},

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/yaml_file.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr int kDeepest = 32;
+constexpr int kMostNodes = 100000;
+constexpr std::uintmax_t kMostBytes = 1000000; ///< of a file that people write
+
+[[noreturn]] void fail(const std::string &message) { throw vpException(vpException::ioError, "%s", message.c_str()); }
+
+std::string readText(const std::string &path)
+{
+  if (!std::filesystem::is_regular_file(path))
+    fail(fmt::format("{}: no such file", path));
+  if (std::filesystem::file_size(path) > kMostBytes)
+    fail(fmt::format("{}: is larger than {} bytes", path, kMostBytes));
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    fail(fmt::format("{}: cannot be read", path));
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// The encoding, and brackets that the parser would follow into the depth.
+void checkText(const std::string &path, std::string &text)
+{
+  if (text.rfind("\xEF\xBB\xBF", 0) == 0) // of UTF-8: harmless
+    text.erase(0, 3);
+  int line = 1, depth = 0;
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    depth += c == '[' || c == '{' ? 1 : 0;
+    depth -= (c == ']' || c == '}') && depth > 0 ? 1 : 0;
+    if (c == '\0' || c == '\xFE' || c == '\xFF')
+      fail(fmt::format("{}:{}: is no text in UTF-8", path, line));
+    if (depth > kDeepest)
+      fail(fmt::format("{}:{}: is nested deeper than {}", path, line, kDeepest));
+  }
+}
+
+/// Walks the document as its readers do: an alias is a node again wherever it stands.
+class Walk
+{
+public:
+  explicit Walk(const std::string &path) : m_path(path) {}
+
+  void into(const YAML::Node &node, int depth)
+  {
+    if (node.Mark().line > m_line)
+      m_line = node.Mark().line;
+    if (depth > kDeepest)
+      fail(fmt::format("{}:{}: is nested deeper than {}, or holds itself by an alias", m_path, node.Mark().line + 1,
+                       kDeepest));
+    if (++m_nodes > kMostNodes)
+      fail(fmt::format("{}:{}: aliases make more than {} entries of it", m_path, m_line + 1, kMostNodes));
+    if (!node.IsMap() && !node.IsSequence())
+      return;
+    for (const auto &child : node) {
+      if (node.IsSequence()) {
+        into(child, depth + 1);
+        continue;
+      }
+      if (!child.first.IsScalar())
+        fail(fmt::format("{}: a key must be one word", placeOf(m_path, child.first.Mark())));
+      into(child.second, depth + 1);
+    }
+  }
+
+private:
+  std::string m_path;
+  int m_nodes = 0, m_line = 0;
+};
+} // namespace
+
+std::string placeOf(const std::string &path, const YAML::Mark &mark)
+{
+  return mark.line < 0 ? path + ":1" : fmt::format("{}:{}", path, mark.line + 1);
+}
+
+YAML::Node loadYaml(const std::string &path)
+{
+  std::string text = readText(path);
+  checkText(path, text);
+  try {
+    const YAML::Node root = YAML::Load(text);
+    Walk(path).into(root, 0);
+    return root;
+  }
+  catch (const YAML::Exception &error) {
+    fail(fmt::format("{}: {}", placeOf(path, error.mark), error.msg));
+  }
+}
+} // namespace bole

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/option_table.h"
+
+#include <charconv>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace bole
+{
+namespace
+{
+/// The whole of \p text as a number; no locale, no infinity.
+template <typename T> bool parse(const std::string &text, T &value)
+{
+  T read{};
+  const char *first = text.data(), *last = first + text.size();
+  if (first != last && *first == '+')
+    ++first;
+  const auto [end, error] = std::from_chars(first, last, read);
+  if (error != std::errc() || end != last || !std::isfinite(static_cast<double>(read)))
+    return false;
+  value = read;
+  return true;
+}
+
+std::string named(const OptionBound &bound)
+{
+  return bound.key != nullptr ? fmt::format("{} = {}", bound.key, bound.value) : fmt::format("{}", bound.value);
+}
+
+std::string nameOr(const OptionBound &bound)
+{
+  return bound.key != nullptr ? bound.key : fmt::format("{}", bound.value);
+}
+} // namespace
+
+std::string OptionEntry::text() const
+{
+  return std::visit([](const auto *v) { return fmt::format("{}", *v); }, value);
+}
+
+std::string OptionEntry::allowed() const
+{
+  if (std::holds_alternative<bool *>(value))
+    return "true or false";
+  return fmt::format("a {}number in [{}, {}]", std::holds_alternative<int *>(value) ? "whole " : "", named(low),
+                     named(high));
+}
+
+std::string OptionEntry::range() const
+{
+  return std::holds_alternative<bool *>(value) ? "true, false" : fmt::format("{} to {}", nameOr(low), nameOr(high));
+}
+
+bool OptionEntry::isInRange() const
+{
+  if (std::holds_alternative<bool *>(value))
+    return true;
+  const double number = std::holds_alternative<int *>(value) ? *std::get<int *>(value) : *std::get<double *>(value);
+  return number >= low.value && number <= high.value;
+}
+
+bool OptionEntry::assign(const std::string &value_text)
+{
+  if (auto *const *flag = std::get_if<bool *>(&value)) {
+    **flag = value_text == "true";
+    return value_text == "true" || value_text == "false";
+  }
+  if (auto *const *whole = std::get_if<int *>(&value))
+    return parse(value_text, **whole);
+  return parse(value_text, *std::get<double *>(value));
+}
+
+std::vector<OptionEntry> optionTable(Options &o)
+{
+  return {
+      {"camera.height", &o.camera.height, 0, 100, "m",
+       "camera over the ground, 0 unknown: the scale of a video without odometry"},
+      {"camera.focal_known", &o.camera.focal_known, 0, 1, "", "false: the focal length is a guess"},
+      {"camera.rate", &o.camera.rate, 1, 100, "1/s", "frames a second: pairs of frames are as far apart in time"},
+      {"camera.compressed", &o.camera.compressed, 0, 1, "",
+       "the pictures went through a lossy codec: points are believed less"},
+
+      {"stages.points", &o.stages.points, 0, 1, "", "relative poses from point features"},
+      {"stages.saliency", &o.stages.saliency, 0, 1, "", "motion saliency; off: what is far may be taken for a trunk"},
+      {"stages.window_detector", &o.stages.window_detector, 0, 1, "", "new trunks from a window of frames"},
+      {"stages.line_detector", &o.stages.line_detector, 0, 1, "",
+       "new trunks from one frame; always on where no range is known"},
+      {"stages.servoing", &o.stages.servoing, 0, 1, "",
+       "the camera is steered by the trunks: it may rest before one or circle it"},
+
+      {"trunks.radius", &o.trunks.radius, 0.001, 10, "m", "median radius of the trunks to be found"},
+      {"trunks.radius_sigma", &o.trunks.radius_sigma, 0.01, 3, "",
+       "standard deviation of its logarithm: how far a radius may be from it"},
+      {"trunks.radius_min",
+       &o.trunks.radius_min,
+       0.005,
+       {o.trunks.radius_max, "trunks.radius_max"},
+       "m",
+       "thinner trunks are not looked for"},
+      {"trunks.radius_max",
+       &o.trunks.radius_max,
+       {o.trunks.radius_min, "trunks.radius_min"},
+       5,
+       "m",
+       "thicker trunks are not looked for"},
+      {"trunks.lean", &o.trunks.lean, 1e-5, 0.5, "rad", "standard deviation of the lean; 0.0001: upright"},
+      {"trunks.low",
+       &o.trunks.low,
+       0,
+       {o.trunks.high, "trunks.high"},
+       "m",
+       "lower end of the part that is tracked, over the ground"},
+      {"trunks.high", &o.trunks.high, {o.trunks.low, "trunks.low"}, 20, "m", "upper end of it"},
+
+      {"range.track", &o.range.track, 1, 100, "m", "known trunks farther than this are not tracked"},
+      {"range.detect_min",
+       &o.range.detect_min,
+       0.3,
+       {o.range.detect_max, "range.detect_max"},
+       "m",
+       "nearest new trunk"},
+      {"range.detect_max",
+       &o.range.detect_max,
+       {o.range.detect_min, "range.detect_min"},
+       50,
+       "m",
+       "farthest new trunk; farther costs precision"},
+      {"range.near", &o.range.near, 0, 100, "m",
+       "nearer than this a trunk must be foreground in the saliency; 0: it need not"},
+      {"range.through", &o.range.through, 0, 100, "m",
+       "nearer than this points seen through a trunk count against it; 0: never"},
+
+      {"detection.window", &o.detection.window, 4, 100, "frames", "looked at together for new trunks"},
+      {"detection.elevation_low",
+       &o.detection.elevation_low,
+       -5,
+       {o.detection.elevation_high, "detection.elevation_high"},
+       "tan",
+       "lower end of the part that is looked for"},
+      {"detection.elevation_high",
+       &o.detection.elevation_high,
+       {o.detection.elevation_low, "detection.elevation_low"},
+       5,
+       "tan",
+       "upper end of it"},
+
+      {"map.confirm_probability", &o.map.confirm_probability, 1e-6, 1 - 1e-6, "",
+       "that a candidate is a trunk, at which it is confirmed; higher: fewer, and fewer false ones"},
+      {"map.confirm_sigma", &o.map.confirm_sigma, 0.01, 10, "m",
+       "standard deviation of its place at which it may be confirmed"},
+      {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
+      {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
+       "a candidate not seen for longer is no longer looked for"},
+      {"map.lag", &o.map.lag, 0, 1e5, "s",
+       "older poses are fixed, which bounds time and memory of a long flight; 0: never"},
+
+      {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal noise of the pose filter between two frames"},
+      {"odometry.step_vertical", &o.odometry.step_vertical, 1e-4, 1, "m", "vertical noise between two frames"},
+      {"odometry.scale", &o.odometry.scale, 0, 1, "", "its error in proportion to the path"},
+      {"odometry.height", &o.odometry.height, 1e-3, 10, "m", "noise of its height about the truth"},
+      {"odometry.tilt", &o.odometry.tilt, 1e-4, 1, "rad", "noise of its roll and pitch about the truth"},
+      {"odometry.turn", &o.odometry.turn, 1e-5, 1, "rad",
+       "noise of its rotation between two frames, used where there is no gyro"},
+
+      {"gyro.noise", &o.gyro.noise, 1e-7, 1, "rad/s/sqrt(Hz)", "white noise of the rate"},
+      {"gyro.bias", &o.gyro.bias, 0, 1, "rad/s", "standard deviation of the bias at the start"},
+
+      {"paper.energy", &o.paper.energy, 0, 1, "",
+       "Eq. 3 as printed: dark trunks, blurred parts, from the prediction alone"},
+      {"paper.alpha", &o.paper.alpha, 1, 1e6, "", "weight of that energy"},
+      {"paper.saliency", &o.paper.saliency, 0, 1, "", "Eq. 10 to 17 as printed"},
+  };
+}
+} // namespace bole

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/option_table.h"
+#include "pipeline/stage_options.h"
+#include <bole/config.h>
+
+#include <gmock/gmock.h>
+
+#include <fmt/format.h>
+
+namespace
+{
+using namespace bole;
+
+PinholeCamera cameraWith(double f)
+{
+  PinholeCamera camera;
+  camera.fx = camera.fy = f;
+  return camera;
+}
+
+/// Every field of the saliency's options.
+std::vector<double> valuesOf(const SaliencyOptions &o)
+{
+  return {o.sigma_intensity,
+          o.sigma_background_px,
+          o.sigma_foreground_px,
+          double(o.label_window_px),
+          o.background_prior,
+          double(o.foreground_mean_zero),
+          double(o.linear_flow),
+          double(o.iterations),
+          double(o.levels),
+          double(o.finest_level),
+          double(o.use_rotation_prior),
+          o.sigma_rotation_pull,
+          o.sample_correlation,
+          double(o.use_translation),
+          o.near_range,
+          o.min_range};
+}
+
+TEST(StageOptions, OfTheDefaultsAreTheStagesDefaultsForACameraOf200Px)
+{
+  const StageOptions made = stageOptions(Options(), cameraWith(200)), defaults;
+  EXPECT_EQ(made.gradient.sigma_px, defaults.gradient.sigma_px);
+  EXPECT_EQ(made.detection.inlier_px, defaults.detection.inlier_px);
+  EXPECT_EQ(made.tracking.scan_max_px, defaults.tracking.scan_max_px);
+  EXPECT_EQ(made.flow.view_spacing, defaults.flow.view_spacing);
+  EXPECT_EQ(made.points.frames_back, defaults.points.frames_back);
+  EXPECT_EQ(made.smoothing.fixed_lag, 0);
+  EXPECT_NEAR(made.map.confirm_evidence, defaults.map.confirm_evidence, 1e-3);
+  EXPECT_EQ(valuesOf(made.saliency), valuesOf(defaults.saliency));
+}
+
+TEST(StageOptions, ThePaperPresetHasTheSaliencyAsPrinted)
+{
+  Options options;
+  readConfig(BOLE_SOURCE_DIR "/config/paper.yaml", options);
+  const StageOptions paper = stageOptions(options, cameraWith(200));
+  EXPECT_EQ(valuesOf(paper.saliency), valuesOf(SaliencyOptions::paper()));
+  EXPECT_NE(valuesOf(paper.saliency), valuesOf(SaliencyOptions()));
+  EXPECT_EQ(paper.tracking.energy.form, EnergyForm::paper);
+  EXPECT_EQ(paper.tracking.energy.paper_alpha, 1000);
+  EXPECT_FALSE(paper.tracking.scan);
+  EXPECT_TRUE(paper.gradient.split);
+  EXPECT_FALSE(paper.lines.either_polarity);
+  EXPECT_FALSE(paper.flow.use_points);
+  EXPECT_TRUE(paper.flow.detect_lines);
+  EXPECT_FALSE(paper.flow.detect_window);
+  EXPECT_EQ(paper.smoothing.prior_lean_sigma, 1e-4);
+}
+
+/// What `bole options` allows, the stages take: at both ends of every range, for every camera.
+TEST(StageOptions, TakeEveryValueThatARangeAllows)
+{
+  for (const double f : {20.0, 200.0, 570.0, 5000.0})
+    for (const bool is_high : {false, true}) {
+      Options names;
+      for (std::size_t i = 0; i < optionTable(names).size(); ++i) {
+        Options options;
+        OptionEntry entry = optionTable(options)[i];
+        if (std::holds_alternative<bool *>(entry.value))
+          **std::get_if<bool *>(&entry.value) ^= true;
+        else
+          ASSERT_TRUE(entry.assign(fmt::format("{}", is_high ? entry.high.value : entry.low.value)));
+        EXPECT_NO_THROW(stageOptions(options, cameraWith(f))) << entry.key << " = " << entry.text() << ", f = " << f;
+      }
+    }
+}
+
+TEST(StageOptions, ThresholdsOnThePictureFollowTheFocalLength)
+{
+  const StageOptions narrow = stageOptions(Options(), cameraWith(600)),
+                     usual = stageOptions(Options(), cameraWith(200));
+  EXPECT_DOUBLE_EQ(narrow.lines.width_min_px, 3 * usual.lines.width_min_px);
+  EXPECT_DOUBLE_EQ(narrow.tracking.scan_max_px, 2 * usual.tracking.scan_max_px);
+  EXPECT_EQ(narrow.saliency.window_width_px, 9);
+  EXPECT_EQ(narrow.saliency.window_height_px % 2, 1);
+}
+
+TEST(StageOptions, WhatIsCountedInFramesFollowsTheRate)
+{
+  Options options;
+  options.camera.rate = 30;
+  options.map.lag = 30;
+  const StageOptions fast = stageOptions(options, cameraWith(200));
+  EXPECT_THAT(fast.points.frames_back, testing::ElementsAre(3, 9));
+  EXPECT_EQ(fast.smoothing.fixed_lag, 900);
+  EXPECT_EQ(fast.saliency.max_frames_apart, 15);
+  options.camera.rate = 15;
+  EXPECT_THAT(stageOptions(options, cameraWith(200)).points.frames_back, testing::ElementsAre(1, 4));
+  options.camera.rate = 5;
+  EXPECT_THAT(stageOptions(options, cameraWith(200)).points.frames_back, testing::ElementsAre(1, 2));
+}
+} // namespace
