@@ -4,24 +4,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace bole
 {
 namespace
 {
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 double rootMeanSquare(const std::vector<FrameError> &errors, std::size_t n, double FrameError::*member)
 {
   double sum = 0;
   for (std::size_t k = 0; k < n; ++k)
     sum += errors[k].*member * errors[k].*member;
-  return n > 0 ? std::sqrt(sum / double(n)) : 0;
+  return n > 0 ? std::sqrt(sum / double(n)) : kNaN;
 }
 
 double quantile(std::vector<double> values, double q)
 {
   if (values.empty())
-    return 0;
+    return kNaN;
   const std::size_t k = std::min(values.size() - 1, std::size_t(q * double(values.size())));
   std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(k), values.end());
   return values[k];

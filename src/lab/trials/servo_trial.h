@@ -11,10 +11,10 @@ namespace bole
 {
 struct ServoTrialOptions
 {
-  ScenarioOptions scenario;                                    ///< with the task and the seed
-  double distance = 3;                                         ///< hold [m], 0.5 to 20
-  double ratio = 0;                                            ///< hold, circle: r/d; 0: hold by distance, circle 0.07
-  double speed = 0;                                            ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
+  ScenarioOptions scenario;                                 ///< with the task and the seed
+  double distance = 3;                                      ///< hold [m], 0.5 to 20
+  double ratio = 0;                                         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
+  double speed = 0;                                         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
   StageOptions pipeline = defaultPipeline(ServoKind::hold); ///< of another task: to be set from defaultPipeline()
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
@@ -33,17 +33,18 @@ struct ServoTrialResult
 {
   std::uint64_t seed = 0;
   bool is_success = false;
-  std::string outcome; ///< one line: why not, where it failed
-  double servoing_from_s = -1, duration_s = 0;
+  std::string outcome;    ///< one line: why not, where it failed
+  double servoing_from_s; ///< NaN where the task never found what it flies by
+  double duration_s = 0;
   double bearing_rms_deg, distance_rms; ///< hold, circle: true errors over the last 5 s; distance relative
   double distance_mean;                 ///< of the same: what does not average out
   double ratio_rms;                     ///< of r/d against the one asked for: the image's share of distance_rms
   double turned_deg;                    ///< circle: how far round
-  double least_clearance = 0;           ///< body's origin to bark [m]
+  double least_clearance;               ///< body's origin to bark [m]
   double gap_width;                     ///< gap: true free width of the one passed [m]
   bool is_other_gap = false;            ///< gap: not the one that the scenario has set up
   double progress, mean_speed;          ///< slalom [m], [m/s]
-  double median_loop_ms = 0, p95_loop_ms = 0;
+  double median_loop_ms, p95_loop_ms;
   double hover_after_s, drift; ///< fault: until it hovered [s]; how far it moved while it lasted [m]
   LoopRecord record;
 
