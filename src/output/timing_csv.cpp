@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <iterator>
+#include <limits>
 
 namespace bole
 {
@@ -13,7 +14,7 @@ namespace
 double quantile(std::vector<double> values, double part)
 {
   if (values.empty())
-    return 0;
+    return std::numeric_limits<double>::quiet_NaN();
   const auto at = static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
   return values[at];
