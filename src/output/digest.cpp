@@ -74,6 +74,8 @@ std::optional<InputDigest> digestOf(const std::string &input, const std::atomic<
          it.increment(error))
       if (it->is_regular_file(error))
         files.push_back(it->path());
+    if (error || is_cancelled)
+      return std::nullopt;
     std::sort(files.begin(), files.end());
     for (const fs::path &file : files) {
       const std::string name = file.lexically_relative(root).string();
