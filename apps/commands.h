@@ -6,6 +6,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include <string>
+#include <vector>
+
 namespace bole::apps
 {
 /// A number in [\p low, \p high]; unlike CLI::Range not NaN, and not -1 as the largest unsigned number.
@@ -21,6 +24,21 @@ inline CLI::Validator within(double low, double high)
       },
       "", "");
 }
+
+/// What the process returns; `bole --help` tells the same.
+enum class ExitCode
+{
+  good = 0,
+  error = 1,        ///< a mistake of the user's, or a file that cannot be read or written
+  usage = 2,        ///< unknown commands and options
+  doubtful = 3,     ///< done, but the result is not to be trusted
+  interrupted = 130 ///< ended early; what was known is kept
+};
+/// Ends a command that has done and said all, with \p code.
+[[noreturn]] inline void endWith(ExitCode code) { throw CLI::RuntimeError(static_cast<int>(code)); }
+
+/// The program and its arguments, set by main(): what a run is made with.
+inline std::vector<std::string> g_command_line;
 
 void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth

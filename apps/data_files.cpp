@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "data_files.h"
+#include "suggestion.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <initializer_list>
+#include <vector>
+#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -46,7 +52,24 @@ std::string dataFolder()
   return "";
 }
 
-std::string findPreset(const std::string &name) { return find(name, "config", {"", ".yaml"}); }
+std::string findPreset(const std::string &name)
+{
+  std::error_code error;
+  const std::string found = find(name, "config", {"", ".yaml"});
+  if (name.empty() || name.find('/') != std::string::npos || fs::exists(found, error))
+    return found;
+  std::vector<std::string> names;
+  for (const auto &entry : fs::directory_iterator(fs::path(dataFolder()) / "config", error))
+    if (entry.path().extension() == ".yaml")
+      names.push_back(entry.path().stem().string());
+  std::sort(names.begin(), names.end());
+  const std::string meant = nearest(fs::path(name).stem().string(), names);
+  throw vpException(vpException::ioError,
+                    fmt::format("--config {}: no such file, and no preset of that name{}; presets: {}", name,
+                                meant.empty() ? "" : fmt::format(" (did you mean {}?)", meant),
+                                fmt::join(names, ", ")));
+}
+
 std::string findSequence(const std::string &name) { return find(name, "data", {""}); }
 std::string findModel(const std::string &name) { return find(name, "models", {"", ".xml", ".cao"}); }
 } // namespace bole::apps

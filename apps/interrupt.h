@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Ctrl-C ends a live command at the next frame, so that its files are closed.
+/// Ctrl-C, a request to end, a closed terminal and a reader that went away end a command after the present step, so
+/// that what is known by then is kept.
 
 #include <csignal>
 
@@ -9,11 +10,17 @@ namespace bole::apps
 {
 inline volatile std::sig_atomic_t g_interrupted = 0;
 
+/// From here on these signals are noted; interrupted() tells. A second Ctrl-C ends the process at once. SIGXFSZ is
+/// ignored: a file that grows beyond the limit is then an error of writing, which the writer reports.
 inline void endAtInterrupt()
 {
-  const auto handler = [](int) { g_interrupted = 1; };
-  std::signal(SIGINT, handler);
-  std::signal(SIGTERM, handler);
+  struct sigaction action = {};
+  action.sa_handler = [](int) { g_interrupted = 1; };
+  for (const int signal : {SIGTERM, SIGHUP, SIGPIPE})
+    sigaction(signal, &action, nullptr);
+  action.sa_flags = SA_RESETHAND;
+  sigaction(SIGINT, &action, nullptr);
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 inline bool interrupted() { return g_interrupted != 0; }
 } // namespace bole::apps

@@ -1,62 +1,131 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The command `bole`: one subcommand a file, see commands.h.
 #include "commands.h"
+#include "suggestion.h"
 
-#include "version.h"
+#include "output/versions.h"
 
+#include <algorithm>
 #include <cstdio>
-#include <opencv2/core/version.hpp>
 #include <string>
-#include <visp3/core/vpConfig.h>
 #include <visp3/core/vpException.h>
 
 namespace
 {
+using namespace bole::apps;
+
 /// "bole 0.1.0 (9720183abc), ViSP 3.5.0, OpenCV 4.6.0"
-std::string versions()
+std::string versionLine()
 {
-  const std::string commit = BOLE_COMMIT;
-  return "bole " BOLE_VERSION + (commit.empty() ? "" : " (" + commit + ")") + ", ViSP " +
-         std::to_string(VISP_VERSION_MAJOR) + "." + std::to_string(VISP_VERSION_MINOR) + "." +
-         std::to_string(VISP_VERSION_PATCH) + ", OpenCV " CV_VERSION;
+  const auto of = bole::versions();
+  return "bole " + of.at("bole") + " (" + of.at("commit") + "), ViSP " + of.at("visp") + ", OpenCV " + of.at("opencv");
+}
+
+void addCommands(CLI::App &app)
+{
+  addTrack(app);
+  addEvaluate(app);
+  addOptions(app);
+  addRecord(app);
+  addGraph(app);
+  addSolve(app);
+#ifdef BOLE_LAB
+  addCompare(app);
+  addSimulate(app);
+  addServo(app);
+  addBenchmark(app);
+  addReplay(app);
+  addEmulate(app);
+  addCalibrateSaliency(app);
+  addShowSaliency(app);
+#endif
+  addDocumentation(app, "bole " BOLE_VERSION);
+}
+
+/// The innermost command that was named.
+const CLI::App &commandOf(const CLI::App &app)
+{
+  const auto named = app.get_subcommands();
+  return named.empty() ? app : commandOf(*named.front());
+}
+
+std::vector<std::string> commandsOf(const CLI::App &app)
+{
+  std::vector<std::string> names;
+  for (const CLI::App *command : app.get_subcommands([](const CLI::App *) { return true; }))
+    names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> optionsOf(const CLI::App &command)
+{
+  std::vector<std::string> names;
+  for (const CLI::Option *option : command.get_options())
+    for (const std::string &name : option->get_lnames())
+      names.push_back("--" + name);
+  return names;
+}
+
+void sayUnknown(const std::string &word, const char *kind, const std::vector<std::string> &known)
+{
+  const std::string name = word.substr(0, word.find('=')), meant = nearest(name, known);
+  std::fprintf(stderr, "bole: %s: no such %s%s\n", name.c_str(), kind,
+               meant.empty() ? "" : (", did you mean " + meant + "?").c_str());
+}
+
+/// Says what is wrong with the command line, with the name that may have been meant.
+int refuse(const CLI::App &app, const CLI::ParseError &error)
+{
+  const CLI::App &command = commandOf(app);
+  const std::vector<std::string> unknown = app.remaining(true), subcommands = commandsOf(command);
+  const auto option =
+      std::find_if(unknown.begin(), unknown.end(), [](const std::string &word) { return word[0] == '-'; });
+  if (!subcommands.empty() && !unknown.empty() && unknown.front()[0] != '-')
+    sayUnknown(unknown.front(), "command", subcommands);
+  else if (option != unknown.end())
+    sayUnknown(*option, "option", optionsOf(command));
+  else
+    std::fprintf(stderr, "bole: %s\n", error.what());
+  std::fprintf(stderr, "Try `%s --help`.\n", &command == &app ? "bole" : ("bole " + command.get_name()).c_str());
+  return static_cast<int>(ExitCode::usage);
+}
+
+int run(CLI::App &app, int argc, char **argv)
+{
+  try {
+    app.parse(argc, argv);
+  }
+  catch (const CLI::RuntimeError &end) {
+    return end.get_exit_code();
+  }
+  catch (const CLI::ParseError &error) {
+    return error.get_exit_code() == 0 ? app.exit(error) : refuse(app, error);
+  }
+  catch (const vpException &error) {
+    std::fprintf(stderr, "bole: %s\n", error.what());
+    return static_cast<int>(ExitCode::error);
+  }
+  catch (const std::exception &error) {
+    std::fprintf(stderr, "bole: %s\n", error.what());
+    return static_cast<int>(ExitCode::error);
+  }
+  return static_cast<int>(ExitCode::good);
 }
 } // namespace
 
 int main(int argc, char **argv)
 {
+  g_command_line.assign(argv, argv + argc);
   CLI::App app("bole: tree trunks as vertical cylinders, tracked and mapped from a small drone's video", "bole");
-  app.set_version_flag("--version", versions());
+  app.set_version_flag("--version", versionLine());
   app.require_subcommand(1);
-  bole::apps::addTrack(app);
-  bole::apps::addEvaluate(app);
-  bole::apps::addOptions(app);
-  bole::apps::addRecord(app);
-  bole::apps::addGraph(app);
-  bole::apps::addSolve(app);
-#ifdef BOLE_LAB
-  bole::apps::addCompare(app);
-  bole::apps::addSimulate(app);
-  bole::apps::addServo(app);
-  bole::apps::addBenchmark(app);
-  bole::apps::addReplay(app);
-  bole::apps::addEmulate(app);
-  bole::apps::addCalibrateSaliency(app);
-  bole::apps::addShowSaliency(app);
-#endif
-  bole::apps::addDocumentation(app, "bole " BOLE_VERSION);
-  try {
-    app.parse(argc, argv);
+  app.footer("`bole COMMAND --help` tells the options of a command, with examples.\n"
+             "Exit status: 0 good; 1 error; 2 unknown command or option; 3 done, but the result is not to be trusted;\n"
+             "130 interrupted, what was known is kept.");
+  addCommands(app);
+  if (argc == 1) {
+    std::fputs(app.help().c_str(), stdout);
+    return static_cast<int>(ExitCode::good);
   }
-  catch (const CLI::ParseError &error) {
-    return app.exit(error);
-  }
-  catch (const vpException &error) {
-    std::fprintf(stderr, "bole: %s\n", error.what());
-    return 1;
-  }
-  catch (const std::exception &error) {
-    std::fprintf(stderr, "bole: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return run(app, argc, argv);
 }

@@ -21,7 +21,7 @@ public:
   }
   void show(const vpImage<vpRGBa> &picture)
   {
-    if (!m_is_shown)
+    if (!m_is_shown || picture.getSize() == 0)
       return;
     m_picture = picture;
     if (!m_display)

@@ -63,6 +63,8 @@ void run(const Arguments &arguments)
   }
   if (!arguments.quiet)
     report(counts, source.counters(), raw.bytes(), fmt::format(" in {}\n", arguments.folder));
+  if (interrupted()) // what was received is complete: Ctrl-C is how a recording without --seconds ends
+    fmt::print(stderr, "bole: interrupted\n");
 }
 } // namespace
 

@@ -17,6 +17,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
+#include <filesystem>
 #include <fmt/format.h>
 #include <memory>
 
@@ -29,7 +30,7 @@ struct Arguments
   std::string input, run, config;
   std::vector<std::string> settings;
   SourceOptions source;
-  bool is_shown = false, has_video = true, is_without_odometry = false, is_without_gyro = false;
+  bool is_shown = false, has_video = true, is_quiet = false, is_without_odometry = false, is_without_gyro = false;
   std::size_t frames_most = 0;
   double give_up_s = ArDroneSource::Options().give_up_s;
   double camera_height = 0;
@@ -37,11 +38,12 @@ struct Arguments
 };
 
 /// A video without a camera file is looked through for a pan that tells its field of view.
-std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, std::string &note)
+std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, RunSummary &made)
 {
   auto source = openSource(arguments.input, arguments.source);
-  note = source->note();
-  if (source->isCameraKnown() || arguments.is_field_of_view_given)
+  made.note = source->note();
+  made.is_camera_known = source->isCameraKnown() || arguments.is_field_of_view_given;
+  if (made.is_camera_known)
     return source;
   const FieldOfView view = fieldOfView(arguments.input, arguments.source);
   if (view.degrees == 0)
@@ -49,16 +51,17 @@ std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, std::string &
   SourceOptions options = arguments.source;
   options.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
   source = openSource(arguments.input, options);
-  note = fmt::format(
-      "no camera file: the camera turns as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
+  made.is_camera_known = true;
+  made.note = fmt::format(
+      "no camera file: the camera rotates as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
       view.degrees, view.sigma_degrees, source->camera().fx);
   return source;
 }
 
-std::unique_ptr<FrameSource> openInput(const Arguments &arguments, std::string &note)
+std::unique_ptr<FrameSource> openInput(const Arguments &arguments, RunSummary &made)
 {
   if (!ArDroneSource::accepts(arguments.input))
-    return openVideo(arguments, note);
+    return openVideo(arguments, made);
   ArDroneSource::Options options;
   options.give_up_s = arguments.give_up_s;
   return std::make_unique<ArDroneSource>(arguments.input, options);
@@ -69,7 +72,7 @@ Options readOptions(const Arguments &arguments, bool is_compressed)
   Options options;
   options.camera.compressed = is_compressed;
   if (!arguments.config.empty())
-    readConfig(arguments.config, options);
+    readConfig(findPreset(arguments.config), options);
   setOptions(arguments.settings, options);
   if (arguments.camera_height > 0)
     options.camera.height = arguments.camera_height;
@@ -125,39 +128,44 @@ private:
   std::deque<Frame> m_silent;
 };
 
-void report(const Arguments &arguments, const TrackOutput &output, std::size_t count)
+/// The last lines. They come when all is on the disk.
+void report(const Arguments &arguments, const TrackOutput &output, const Verdict &verdict)
 {
-  fmt::print("{} frames, {} trunks confirmed, median {:.1f} ms a frame. Look at {}/overlay.mp4 and {}/map.svg\n", count,
-             output.confirmed(), output.timing().medianTotal_ms(), arguments.run, arguments.run);
+  std::string text = fmt::format("{}{}\n{}", arguments.run, interrupted() ? " (interrupted)" : "", toText(verdict));
   if (const auto median = output.timing().age_ms(0.5))
-    fmt::print("Age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, most "
-               "{:.1f} ms\n",
-               *median, *output.timing().age_ms(0.99), *output.timing().age_ms(1));
+    text +=
+        fmt::format("  age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, "
+                    "most {:.1f} ms\n",
+                    *median, *output.timing().age_ms(0.99), *output.timing().age_ms(1));
+  text += fmt::format("Look at {}{}/map.svg\n", output.hasVideo() ? arguments.run + "/overlay.mp4 and " : "",
+                      arguments.run);
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
 }
 
-void track(const Arguments &arguments)
+/// How the run is made, as far as that is known before it begins.
+RunSummary describeRun(const Arguments &arguments)
 {
-  if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
-    throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
-  readOptions(arguments, false); // a mistake in them is said before the input is waited for
-  std::string note;
-  const auto source = openInput(arguments, note);
-  Options options = readOptions(arguments, source->isCompressed());
-  const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
-  options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
-  if (!note.empty())
-    std::fprintf(stderr, "bole: %s\n", note.c_str());
+  RunSummary made;
+  std::error_code error;
+  made.command = g_command_line;
+  made.working_folder = std::filesystem::current_path(error).string();
+  made.input = arguments.input;
+  made.camera_file = arguments.source.camera_path;
+  made.odometry_file = arguments.source.odometry_path;
+  return made;
+}
 
-  Pipeline pipeline(source->camera(), source->bMc(), options);
-  TrackOutput output(arguments.run, arguments.input, arguments.config, *source, note, arguments.has_video);
-  OverlayWindow window(arguments.is_shown, "bole track");
-  Flight flight(pipeline, output, window);
-  Progress progress(source->size(), stderr);
-  endAtInterrupt();
+/// Frames from \p source until it ends, enough were taken, or somebody interrupts. Returns how many.
+std::size_t fly(const Arguments &arguments, FrameSource &source, Pipeline &pipeline, TrackOutput &output,
+                Flight &flight)
+{
+  constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written
+  Progress progress(arguments.is_quiet ? 0 : source.size(), stderr);
   std::size_t count = 0;
   while (!interrupted() && (arguments.frames_most == 0 || count < arguments.frames_most)) {
     Frame frame;
-    if (!source->next(frame))
+    if (!source.next(frame))
       break;
     if (arguments.is_without_odometry)
       frame.wMb_odometry.reset();
@@ -165,19 +173,54 @@ void track(const Arguments &arguments)
       frame.gyro.clear();
     const FrameStatus status = frame.status;
     flight.take(std::move(frame));
-    progress.update(++count, output.trunksInView(), toString(status));
-    if (count % 50 == 0)
+    ++count;
+    if (!arguments.is_quiet)
+      progress.update(count, fmt::format("{} trunks in view  {}", output.trunksInView(), toString(status)));
+    if (count % kKeepEvery == 0)
       output.keep(pipeline);
   }
-  progress.finish();
-  if (count == 0)
+  return count;
+}
+
+void track(const Arguments &arguments)
+{
+  if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
+    throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
+  readOptions(arguments, false); // a mistake in them is said before the input is waited for
+  RunSummary made = describeRun(arguments);
+  const auto source = openInput(arguments, made);
+  Options options = readOptions(arguments, source->isCompressed());
+  const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
+  options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
+  made.preset = arguments.config.empty() ? "default" : arguments.config;
+  made.options = toYaml(options);
+  if (!made.note.empty() && !arguments.is_quiet)
+    std::fprintf(stderr, "bole: %s\n", made.note.c_str());
+
+  Pipeline pipeline(source->camera(), source->bMc(), options);
+  TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown);
+  OverlayWindow window(arguments.is_shown, "bole track");
+  Flight flight(pipeline, output, window);
+  endAtInterrupt();
+  if (fly(arguments, *source, pipeline, output, flight) == 0) {
+    if (interrupted())
+      endWith(ExitCode::interrupted);
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
+  }
   flight.finish();
   if (live != nullptr)
     output.setLink(live->counters());
   output.write(pipeline, !interrupted());
   output.finish();
-  report(arguments, output, count);
+  const Verdict verdict = output.verdict();
+  if (!arguments.is_quiet)
+    report(arguments, output, verdict);
+  if (interrupted()) {
+    std::fprintf(stderr, "bole: interrupted; what was known is in %s\n", arguments.run.c_str());
+    endWith(ExitCode::interrupted);
+  }
+  if (!verdict.is_trusted)
+    endWith(ExitCode::doubtful);
 }
 } // namespace
 
@@ -191,11 +234,9 @@ void addTrack(CLI::App &app)
       ->transform(findSequence)
       ->required();
   command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
-  command
-      ->add_option("--config", arguments->config,
-                   "YAML file of options or a preset by its name (paper: the paper's method); `bole options` lists them. "
-                   "Videos and live drones start with camera.compressed=true")
-      ->transform(findPreset);
+  command->add_option("--config", arguments->config,
+                      "YAML file of options, or a preset by its name (paper: the paper's method); `bole options` lists "
+                      "them. Videos and live drones start with camera.compressed=true");
   command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
   command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path,
@@ -211,7 +252,7 @@ void addTrack(CLI::App &app)
                           "tells it, or 65 is assumed");
   command
       ->add_option("--camera-height", arguments->camera_height,
-                   "Height of the camera over the ground [m], which gives a plain video its metre")
+                   "Height of the camera over the ground [m], which gives a video without odometry its scale")
       ->check(within(0.1, 100));
   const auto without = std::make_shared<std::vector<std::string>>();
   command->add_option("--without", *without, "Withhold one sensor: gyro or odometry (may be given twice)")
@@ -226,15 +267,20 @@ void addTrack(CLI::App &app)
       ->check(within(0.1, 86400));
   command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
-  command->footer(
-      "Writes trajectory.tum, trajectory_online.tum, trunks.csv, graph.g2o, overlay.mp4, saliency.mp4, map.svg,\n"
-      "timing.csv and summary.json to the folder; Ctrl-C ends the flight and keeps what is known.\n"
-      "Examples:\n"
-      "  bole track data/park-forward -o run\n"
-      "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
-      "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
-      "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
-      "  bole track ardrone://192.168.1.1 -o run --show");
+  command->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors; the exit status tells how it went");
+  command->footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, hypotheses.csv, graph.g2o, overlay.mp4, "
+                  "saliency.mp4,\n"
+                  "map.svg, timing.csv, options.yaml and summary.json to the folder; Ctrl-C ends the flight and keeps "
+                  "what is known.\n"
+                  "Exit status: 0 good; 1 error; 2 unknown option; 3 not to be trusted (the camera never moved, only "
+                  "rotated, or saw\n"
+                  "nothing: summary.json tells); 130 interrupted.\n"
+                  "Examples:\n"
+                  "  bole track data/park-forward -o run\n"
+                  "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
+                  "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
+                  "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
+                  "  bole track ardrone://192.168.1.1 -o run --show");
   command->callback([arguments, view, without] {
     for (const std::string &sensor : *without)
       (sensor == "gyro" ? arguments->is_without_gyro : arguments->is_without_odometry) = true;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "track_output.h"
+#include "interrupt.h"
 
+#include "geometry/so3.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include "output/timing_csv.h"
-#include "output/trajectory_writer.h"
-#include "output/trunks_csv.h"
 #include "smoothing/g2o.h"
 #include <bole/overlay.h>
 
@@ -27,44 +26,48 @@ vpImage<float> foregroundOf(const SaliencyField &saliency)
   return foreground;
 }
 
-void writeFiles(const std::string &run, const MapPicture &picture, const RunSummary &summary)
+/// Path, extent and rotation of \p trajectory.
+void measureMotion(const Trajectory &trajectory, RunSummary &summary)
 {
-  writeTrajectory(run + "/trajectory.tum", picture.smoothed);
-  writeTrajectory(run + "/trajectory_online.tum", picture.online);
-  writeTrunks(run + "/trunks.csv", picture.trunks);
-  writeMap(run + "/map.svg", picture);
-  writeTiming(run + "/timing.csv", summary.timing);
-  writeSummary(run + "/summary.json", summary);
+  summary.path_m = summary.extent_m = summary.rotated_deg = 0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    const Pose &first = trajectory.front().wMb, &now = trajectory[i].wMb;
+    summary.path_m += (now.t - trajectory[i - 1].wMb.t).norm();
+    summary.extent_m = std::max(summary.extent_m, (now.t - first.t).norm());
+    summary.rotated_deg = std::max(summary.rotated_deg, logSo3(first.R.transpose() * now.R).norm() * 180 / M_PI);
+  }
 }
 } // namespace
 
-TrackOutput::TrackOutput(const std::string &run, const std::string &input, const std::string &preset,
-                         const FrameSource &source, const std::string &note, bool has_video)
-    : m_run(run), m_camera(source.camera())
+TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video,
+                         bool has_pictures)
+    : m_folder(run), m_summary(std::move(made)), m_bMc(source.bMc()), m_has_pictures(has_pictures)
 {
-  std::error_code error;
-  std::filesystem::create_directories(run, error);
-  if (error)
-    throw vpException(vpException::ioError, "%s: cannot be made: %s", run.c_str(), error.message().c_str());
-  m_summary.version = BOLE_VERSION;
-  m_summary.input = input;
-  m_summary.preset = preset.empty() ? "default" : preset;
-  m_summary.note = note;
-  m_summary.camera = m_camera;
+  m_summary.camera = source.camera();
   m_summary.has_odometry = source.hasOdometry();
   m_summary.has_gyro = source.hasGyro();
   m_picture.title = source.name();
+  const std::string &input = m_summary.input;
   if (AslSource::accepts(input) && std::filesystem::exists(input + "/trees.csv"))
     m_picture.truth_trunks = readTruthTrunks(input);
-  if (has_video) {
-    m_overlay = std::make_unique<VideoWriter>(run + "/overlay.mp4");
-    m_saliency = std::make_unique<VideoWriter>(run + "/saliency.mp4");
-  }
+  m_digest = std::async(std::launch::async, [this] { return digestOf(m_summary.input, m_is_cancelled); });
+  if (has_video)
+    film([this] {
+      m_overlay = std::make_unique<VideoWriter>(m_folder.file("overlay.mp4"));
+      m_saliency = std::make_unique<VideoWriter>(m_folder.file("saliency.mp4"));
+    });
 }
+
+TrackOutput::~TrackOutput() { m_is_cancelled = true; }
 
 vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms)
 {
   ++m_summary.frames[frame.status];
+  if (frame.status != FrameStatus::ok && !frame.message.empty())
+    m_summary.reasons.emplace(frame.status, frame.message);
+  m_first_ns = m_is_begun ? m_first_ns : frame.stamp_ns;
+  m_is_begun = true;
+  m_last_ns = frame.stamp_ns;
   FrameTiming timing;
   timing.index = frame.index;
   timing.stamp_ns = frame.stamp_ns;
@@ -80,26 +83,57 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
     m_picture.odometry.push_back({frame.stamp_ns, *frame.wMb_odometry});
   if (frame.wMb_truth)
     m_picture.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
+  m_in_view = static_cast<std::size_t>(
+      std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
+        return trunk.is_tracked && trunk.status == TrunkStatus::confirmed;
+      }));
+  const bool has_image =
+      frame.image.getSize() > 0 && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width;
+  return has_image && (m_overlay || m_has_pictures) ? draw(frame, report) : vpImage<vpRGBa>();
+}
 
+vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
+{
   Overlay overlay;
-  for (const TrunkInView &trunk : report.trunks)
+  std::size_t candidates = 0;
+  for (const TrunkInView &trunk : report.trunks) {
     overlay.trunks.push_back(
         {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
-  m_in_view = static_cast<std::size_t>(std::count_if(report.trunks.begin(), report.trunks.end(),
-                                                     [](const TrunkInView &trunk) { return trunk.is_tracked; }));
+    candidates += trunk.is_tracked && trunk.status == TrunkStatus::candidate ? 1 : 0;
+  }
   if (report.saliency)
     overlay.foreground = foregroundOf(*report.saliency);
   overlay.is_warning = frame.status != FrameStatus::ok;
-  overlay.text = fmt::format("{:.1f} s  {} trunks  {}", 1e-9 * static_cast<double>(frame.stamp_ns), m_in_view,
+  overlay.text = fmt::format("{:.1f} s  {} trunk{}, {} candidate{}  {}", 1e-9 * static_cast<double>(frame.stamp_ns),
+                             m_in_view, m_in_view == 1 ? "" : "s", candidates, candidates == 1 ? "" : "s",
                              overlay.is_warning ? toString(frame.status) : "");
-  if (frame.image.getSize() == 0 || static_cast<int>(frame.image.getWidth()) != m_camera.width)
-    return {};
-  const vpImage<vpRGBa> picture = drawOverlay(frame.image, m_camera, overlay);
-  if (m_overlay)
-    m_overlay->write(picture, frame.stamp_ns);
-  if (m_saliency && report.saliency)
-    m_saliency->write(drawSaliency(frame.image, m_camera, overlay.foreground, overlay.text), frame.stamp_ns);
+  vpImage<vpRGBa> picture = drawOverlay(frame.image, m_summary.camera, overlay);
+  film([&] {
+    if (m_overlay)
+      m_overlay->write(picture, frame.stamp_ns);
+    if (m_saliency && report.saliency)
+      m_saliency->write(drawSaliency(frame.image, m_summary.camera, overlay.foreground, overlay.text), frame.stamp_ns);
+  });
   return picture;
+}
+
+/// A video that cannot be written, on a full disk for example, costs nothing else.
+template <typename Action> void TrackOutput::film(const Action &action)
+{
+  try {
+    action();
+  }
+  catch (const vpException &error) {
+    loseVideos(error.what());
+  }
+}
+
+void TrackOutput::loseVideos(const std::string &why)
+{
+  if (m_overlay || m_saliency)
+    fmt::print(stderr, "bole: {}; the run goes on without videos\n", why);
+  m_overlay.reset(); // their unfinished files go, which may make room for the rest
+  m_saliency.reset();
 }
 
 void TrackOutput::addSilence(std::size_t frames)
@@ -128,39 +162,66 @@ void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
   m_summary.trunks = m_picture.trunks;
   m_summary.reference = pipeline.reference();
   m_picture.caption = describe(m_summary.reference);
+  m_picture.has_ranges = m_summary.reference.has_ranges;
   m_summary.is_complete = is_complete;
-  m_confirmed =
-      static_cast<int>(std::count_if(m_picture.trunks.begin(), m_picture.trunks.end(),
-                                     [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
+  m_summary.duration_s = 1e-9 * static_cast<double>(m_last_ns - m_first_ns);
+  measureMotion(m_picture.smoothed, m_summary);
+  if (!m_picture.smoothed.empty())
+    m_camera_place = (m_picture.smoothed.front().wMb * m_bMc).t.head<2>();
+  m_picture.camera = m_camera_place;
+}
+
+void TrackOutput::waitForKeeping()
+{
+  if (!m_keeping.valid())
+    return;
+  const std::string error = m_keeping.get();
+  if (!error.empty())
+    loseVideos(error); // the disk may be full of them
 }
 
 void TrackOutput::keep(const Pipeline &pipeline)
 {
-  if (m_keeping.valid()) {
-    if (m_keeping.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-      return;
-    m_keeping.get(); // throws what went wrong
-  }
+  if (m_keeping.valid() && m_keeping.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  waitForKeeping();
   take(pipeline, false);
-  m_keeping = std::async(std::launch::async, [run = m_run, picture = m_picture, summary = m_summary] {
-    writeFiles(run, picture, summary);
-  });
+  m_keeping = std::async(std::launch::async,
+                         [this, picture = m_picture, summary = m_summary, camera = m_camera_place]() -> std::string {
+                           try {
+                             m_folder.write(picture, summary, camera);
+                           }
+                           catch (const std::exception &error) {
+                             return error.what();
+                           }
+                           return {};
+                         });
 }
 
 void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
 {
-  if (m_keeping.valid())
-    m_keeping.get();
+  waitForKeeping();
+  m_is_cancelled = !is_complete;
+  if (m_digest.valid())
+    m_summary.digest = m_digest.get();
   take(pipeline, is_complete);
-  writeFiles(m_run, m_picture, m_summary);
-  writeG2o(m_run + "/graph.g2o", pipeline.graph());
+  try {
+    m_folder.write(m_picture, m_summary, m_camera_place);
+  }
+  catch (const vpException &error) {
+    loseVideos(error.what());
+    m_folder.write(m_picture, m_summary, m_camera_place);
+  }
+  writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
 }
 
 void TrackOutput::finish()
 {
-  if (m_overlay)
-    m_overlay->finish();
-  if (m_saliency)
-    m_saliency->finish();
+  film([this] {
+    if (m_overlay)
+      m_overlay->finish();
+    if (m_saliency)
+      m_saliency->finish();
+  });
 }
 } // namespace bole::apps

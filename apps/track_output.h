@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// The folder that `bole track` writes, every file atomically.
+/// What `bole track` gathers while it runs and writes into the folder of the run.
 
 #include "ardrone/drone_link.h"
-#include "output/map_svg.h"
-#include "output/summary_json.h"
+#include "output/run_folder.h"
+#include "output/verdict.h"
 #include "output/video_writer.h"
 #include <bole/pipeline.h>
 
+#include <atomic>
 #include <future>
 #include <memory>
 #include <string>
@@ -18,12 +19,13 @@ namespace bole::apps
 class TrackOutput
 {
 public:
-  /// Makes the folder. \throw vpException when that cannot be done.
-  TrackOutput(const std::string &run, const std::string &input, const std::string &preset, const FrameSource &source,
-              const std::string &note, bool has_video);
+  /// Makes the folder. \p made: how the run is made, as far as that is known before it begins. \p has_pictures: whether
+  /// somebody looks at what add() returns. \throw vpException when the folder cannot be made.
+  TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video, bool has_pictures);
+  ~TrackOutput();
 
-  /// Takes in a frame and returns its overlay (empty for a frame without an image). \p age_ms: of a live frame when
-  /// \p result was there.
+  /// Takes in a frame and returns its overlay: empty for a frame without an image, and where nobody looks at it.
+  /// \p age_ms: of a live frame when \p report was there.
   vpImage<vpRGBa> add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms = {});
   /// Counts \p frames missing ones at the end of the flight, of which nothing is known.
   void addSilence(std::size_t frames);
@@ -34,23 +36,33 @@ public:
   void keep(const Pipeline &pipeline);
   /// Writes all but the videos.
   void write(const Pipeline &pipeline, bool is_complete);
-  /// Ends the videos.
+  /// Ends the videos. A video that cannot be written is lost with a warning, and nothing else is.
   void finish();
 
   std::size_t trunksInView() const { return m_in_view; }
-  int confirmed() const { return m_confirmed; }
+  bool hasVideo() const { return m_overlay != nullptr; }
+  Verdict verdict() const { return judge(m_summary); }
   const TimingTable &timing() const { return m_summary.timing; }
 
 private:
+  vpImage<vpRGBa> draw(const Frame &frame, const FrameReport &report);
+  template <typename Action> void film(const Action &action);
+  void loseVideos(const std::string &why);
   void take(const Pipeline &pipeline, bool is_complete);
+  void waitForKeeping();
 
-  std::string m_run;
+  RunFolder m_folder;
   RunSummary m_summary;
-  PinholeCamera m_camera;
   MapPicture m_picture;
+  Eigen::Vector2d m_camera_place = Eigen::Vector2d::Zero(); ///< of the first frame [m]
+  Pose m_bMc;
+  bool m_has_pictures;
   std::unique_ptr<VideoWriter> m_overlay, m_saliency;
   std::size_t m_in_view = 0;
-  int m_confirmed = 0;
-  std::future<void> m_keeping; ///< last: it ends before the rest goes
+  std::int64_t m_first_ns = 0, m_last_ns = 0;
+  bool m_is_begun = false;
+  std::atomic<bool> m_is_cancelled{false};
+  std::future<std::optional<InputDigest>> m_digest;
+  std::future<std::string> m_keeping; ///< what went wrong; last: it ends before the rest goes
 };
 } // namespace bole::apps

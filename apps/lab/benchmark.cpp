@@ -2,10 +2,12 @@
 // bole benchmark: simulate, track and evaluate over many forests; medians with intervals.
 #include "commands.h"
 #include "interrupt.h"
+#include "data_files.h"
 
 #include "lab/trials/accuracy_trial.h"
 #include "lab/trials/median_interval.h"
 #include "output/atomic_file.h"
+#include "output/figure.h"
 #include "output/progress.h"
 #include <bole/config.h>
 
@@ -14,7 +16,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -41,13 +42,12 @@ struct Flight
   AccuracyTrialResult result;
 };
 
+/// A figure of a flight; NaN where there was nothing to measure.
 struct Measure
 {
-  const char *name;
+  const char *name, *unit; ///< "%": a share of 0 to 1
   std::function<double(const AccuracyTrialResult &)> of;
 };
-
-double orNone(double value, bool is_known) { return is_known ? value : std::numeric_limits<double>::quiet_NaN(); }
 
 const std::vector<Measure> &measures()
 {
@@ -55,25 +55,28 @@ const std::vector<Measure> &measures()
   constexpr auto kScaled = static_cast<std::size_t>(Alignment::xy_yaw_scale);
   using Result = AccuracyTrialResult;
   static const std::vector<Measure> list = {
-      {"recall", [](const Result &r) { return orNone(r.trunks.recall, r.trunks.all.expected > 0); }},
-      {"precision", [](const Result &r) { return orNone(r.trunks.precision, r.trunks.confirmed > 0); }},
-      {"duplicates", [](const Result &r) { return orNone(r.trunks.duplicates, r.trunks.confirmed > 0); }},
-      {"position median [m]",
-       [=](const Result &r) { return orNone(r.trunks.all.median[kAligned], r.trunks.all.matches > 0); }},
-      {"position RMSE [m]",
-       [=](const Result &r) { return orNone(r.trunks.all.rmse[kAligned], r.trunks.all.matches > 0); }},
-      {"... aligned in scale [m]",
-       [=](const Result &r) { return orNone(r.trunks.all.rmse[kScaled], r.trunks.all.matches > 0); }},
-      {"radius RMSE [m]", [](const Result &r) { return orNone(r.trunks.all.radius_rmse, r.trunks.all.matches > 0); }},
-      {"radius bias [m]", [](const Result &r) { return orNone(r.trunks.all.radius_bias, r.trunks.all.matches > 0); }},
-      {"NEES/2", [](const Result &r) { return r.nees_half; }},
-      {"ATE [m]", [](const Result &r) { return r.trajectory.ate; }},
-      {"ATE, pose filter [m]", [](const Result &r) { return r.odometry.ate; }},
-      {"ATE, scale [m]", [](const Result &r) { return r.trajectory_scaled.ate; }},
-      {"ATE, scale, filter [m]", [](const Result &r) { return r.odometry_scaled.ate; }},
-      {"median frame [ms]", [](const Result &r) { return r.median_ms; }}};
+      {"recall", "%", [](const Result &r) { return r.trunks.recall; }},
+      {"precision", "%", [](const Result &r) { return r.trunks.precision; }},
+      {"duplicates", "%", [](const Result &r) { return r.trunks.duplicates; }},
+      {"position median", "m", [=](const Result &r) { return r.trunks.all.median[kAligned]; }},
+      {"position RMSE", "m", [=](const Result &r) { return r.trunks.all.rmse[kAligned]; }},
+      {"... aligned in scale", "m", [=](const Result &r) { return r.trunks.all.rmse[kScaled]; }},
+      {"radius RMSE", "m", [](const Result &r) { return r.trunks.all.radius_rmse; }},
+      {"radius bias", "m", [](const Result &r) { return r.trunks.all.radius_bias; }},
+      {"NEES/2", "", [](const Result &r) { return r.trunks.all.nees_half; }},
+      {"ATE", "m", [](const Result &r) { return r.trajectory.ate; }},
+      {"ATE, pose filter", "m", [](const Result &r) { return r.odometry.ate; }},
+      {"ATE, scale", "m", [](const Result &r) { return r.trajectory_scaled.ate; }},
+      {"ATE, scale, filter", "m", [](const Result &r) { return r.odometry_scaled.ate; }},
+      {"median frame", "ms", [](const Result &r) { return r.median_ms; }}};
   return list;
 }
+
+std::string titleOf(const Measure &measure)
+{
+  return *measure.unit == '\0' ? measure.name : fmt::format("{} [{}]", measure.name, measure.unit);
+}
+double factorOf(const Measure &measure) { return *measure.unit == '%' ? 100 : 1; }
 
 SceneOptions sceneOf(const Arguments &arguments, std::uint64_t seed, double density, const std::string &light)
 {
@@ -93,13 +96,13 @@ std::string csvOf(const std::vector<Flight> &flights)
 {
   std::string text = "seed,density,light,expected,found,confirmed,matched";
   for (const Measure &measure : measures())
-    text += fmt::format(",{}", measure.name);
+    text += fmt::format(",{}", titleOf(measure));
   for (const Flight &flight : flights) {
     const TrunkMetrics &trunks = flight.result.trunks;
     text += fmt::format("\n{},{},{},{},{},{},{}", flight.seed, flight.density, flight.light, trunks.all.expected,
                         trunks.all.found, trunks.confirmed, trunks.matches.size());
     for (const Measure &measure : measures()) {
-      const double value = measure.of(flight.result);
+      const double value = factorOf(measure) * measure.of(flight.result);
       text += std::isnan(value) ? "," : fmt::format(",{:.5g}", value);
     }
   }
@@ -119,10 +122,12 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
   }
   const ShareInterval recall = wilson(static_cast<int>(found), static_cast<int>(expected));
   const ShareInterval precision = wilson(static_cast<int>(matched), static_cast<int>(confirmed));
-  fmt::print("\n{}: {} flights; of all trunks recall {:.2f} [{:.2f}, {:.2f}] ({} of {}), precision {:.2f} [{:.2f}, "
-             "{:.2f}] ({} of {})\n",
-             name, flights.size(), recall.share, recall.low, recall.high, found, expected, precision.share,
-             precision.low, precision.high, matched, confirmed);
+  const auto told = [](const ShareInterval &interval, std::size_t part, std::size_t whole) {
+    return fmt::format("{} [{}, {}] ({} of {})", percent(interval.share), percent(interval.low), percent(interval.high),
+                       part, whole);
+  };
+  fmt::print("\n{}: {} flight{}; of all trunks recall {}, precision {}\n", name, flights.size(),
+             flights.size() == 1 ? "" : "s", told(recall, found, expected), told(precision, matched, confirmed));
   json["recall"] = {
       {"share", recall.share}, {"low", recall.low}, {"high", recall.high}, {"found", found}, {"expected", expected}};
   json["precision"] = {{"share", precision.share},
@@ -133,13 +138,11 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
   for (const Measure &measure : measures()) {
     std::vector<double> values;
     for (const Flight *flight : flights)
-      values.push_back(measure.of(flight->result));
+      values.push_back(factorOf(measure) * measure.of(flight->result));
     const MedianInterval median = bootstrapMedian(values);
-    if (median.count == 0)
-      continue;
-    fmt::print("  {:26} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", measure.name, median.median, median.low,
-               median.high, median.count);
-    json["medians"][measure.name] = {
+    fmt::print("  {:26} median {}   [{}, {}]   of {}\n", titleOf(measure), figure(median.median, 8, 3),
+               figure(median.low, 0, 3), figure(median.high, 0, 3), median.count);
+    json["medians"][titleOf(measure)] = {
         {"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
   }
   return json;
@@ -174,7 +177,7 @@ void run(const Arguments &arguments)
 {
   Options options;
   if (!arguments.config.empty())
-    readConfig(arguments.config, options);
+    readConfig(findPreset(arguments.config), options);
   setOptions(arguments.settings, options);
   for (const double density : arguments.densities) // before any work
     sceneOf(arguments, arguments.first_seed, density, "sun");
@@ -187,8 +190,9 @@ void run(const Arguments &arguments)
   }
   endAtInterrupt();
   std::vector<Flight> flights;
-  Progress progress(static_cast<std::size_t>(arguments.seeds) * arguments.densities.size() * arguments.lights.size(),
-                    stderr);
+  const std::size_t total =
+      static_cast<std::size_t>(arguments.seeds) * arguments.densities.size() * arguments.lights.size();
+  Progress progress(total, stderr, "flight");
   std::size_t confirmed = 0;
   for (int k = 0; k < arguments.seeds; ++k)
     for (const double density : arguments.densities)
@@ -197,11 +201,16 @@ void run(const Arguments &arguments)
         Flight flight{seed, density, light, {}};
         flight.result =
             runAccuracyTrial(sceneOf(arguments, seed, density, light), arguments.frames, options, interrupted);
-        if (interrupted())
-          return flights.empty() ? void() : report(arguments, flights); // the flights that were finished
+        if (interrupted()) { // the flights that were finished count
+          progress.finish();
+          fmt::print(stderr, "bole: interrupted after {} of {} flights\n", flights.size(), total);
+          if (!flights.empty())
+            report(arguments, flights);
+          endWith(ExitCode::interrupted);
+        }
         confirmed += flight.result.trunks.confirmed;
         flights.push_back(std::move(flight));
-        progress.update(flights.size(), confirmed);
+        progress.update(flights.size(), fmt::format("{} trunks", confirmed));
       }
   progress.finish();
   report(arguments, flights);
@@ -234,11 +243,12 @@ void addBenchmark(CLI::App &app)
   command->add_option("--h264", arguments->h264_kbps, "Pass the pictures through H.264 at this bit rate [kbit/s]");
   command->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   command->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
-  command->footer(
-      "Intervals of medians by bootstrap over the flights, of shares by Wilson. Ctrl-C reports the flights finished.\n"
-      "Examples:\n"
-      "  bole benchmark --seeds 10 -o run/benchmark\n"
-      "  bole benchmark --seeds 5 --density .12 --light sun --path slalom --set flow.use_saliency=false");
+  command->footer("95 % intervals: of medians by bootstrap over the flights, of shares by Wilson; none of one flight. "
+                  "\"-\" and null:\n"
+                  "there was nothing to measure. Ctrl-C reports the flights finished; the exit status is then 130.\n"
+                  "Examples:\n"
+                  "  bole benchmark --seeds 10 -o run/benchmark\n"
+                  "  bole benchmark --seeds 5 --density .12 --light sun --path slalom --set flow.use_saliency=false");
   command->callback([arguments] { run(*arguments); });
 }
 } // namespace bole::apps

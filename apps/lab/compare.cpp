@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
 #include "commands.h"
+#include "interrupt.h"
 
 #include "lab/baseline/comparison_report.h"
 #include "mbt/cao_reader.h"
@@ -57,6 +58,8 @@ void compareAll(const Arguments &arguments, const TestFlight &flight, const std:
   std::vector<Contender> contenders;
   for (const TrackerKind kind : kVisp)
     for (const Help help : {Help::alone, Help::prior, Help::reinitialised}) {
+      if (interrupted())
+        return;
       if (!arguments.is_quick) {
         say(fmt::format("settings of {}, {}", toString(kind), toString(help)));
         report.sweeps.push_back(sweep(flight, cao, kind, help, report.limits));
@@ -84,6 +87,8 @@ void measureBasin(const Arguments &arguments, const TestFlight &flight, const st
   options.range_m = arguments.far_m;
   for (const bool has_clutter : {true, false}) {
     for (const TrackerKind kind : kVisp) {
+      if (interrupted())
+        return;
       say(fmt::format("basin of {}{}", toString(kind), has_clutter ? "" : ", without clutter"));
       BasinRow best;
       double best_sum = -1;
@@ -139,15 +144,20 @@ void run(const Arguments &arguments)
   report.frames = int(flight.frames.size());
   report.trunks = int(model.size());
   report.limits = flight.limits;
+  endAtInterrupt();
   compareAll(arguments, flight, cao, report);
-  if (arguments.has_basin)
+  if (arguments.has_basin && !interrupted())
     measureBasin(arguments, flight, cao, report);
-  if (arguments.has_faults)
+  if (arguments.has_faults && !interrupted())
     measureFaults(arguments, flight, cao, report);
   std::fputs(toTable(report).c_str(), stdout);
   writeAtomically((fs::path(arguments.out) / "compare.json").string(), toJson(report));
   writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
   writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
+  if (interrupted()) {
+    say("interrupted: what was compared until then is in " + arguments.out);
+    endWith(ExitCode::interrupted);
+  }
 }
 } // namespace
 

@@ -3,11 +3,13 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "overlay_window.h"
+#include "data_files.h"
 
 #include "lab/trials/error_curves.h"
 #include "lab/trials/median_interval.h"
 #include "lab/trials/servo_trial.h"
 #include "output/atomic_file.h"
+#include "output/figure.h"
 #include "output/video_writer.h"
 #include <bole/config.h>
 #include <bole/overlay.h>
@@ -43,9 +45,9 @@ struct Column
 const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::servoing_from_s},
                                       {"duration [s]", &ServoTrialResult::duration_s},
                                       {"bearing rms [deg]", &ServoTrialResult::bearing_rms_deg},
-                                      {"distance rms", &ServoTrialResult::distance_rms},
-                                      {"distance mean", &ServoTrialResult::distance_mean},
-                                      {"r/d rms", &ServoTrialResult::ratio_rms},
+                                      {"distance rms [-]", &ServoTrialResult::distance_rms},
+                                      {"distance mean [-]", &ServoTrialResult::distance_mean},
+                                      {"r/d rms [-]", &ServoTrialResult::ratio_rms},
                                       {"turned [deg]", &ServoTrialResult::turned_deg},
                                       {"least clearance [m]", &ServoTrialResult::least_clearance},
                                       {"gap [m]", &ServoTrialResult::gap_width},
@@ -161,8 +163,10 @@ void print(const Arguments &arguments, const std::vector<ServoTrialResult> &resu
 {
   const int runs = static_cast<int>(results.size()), good = successes(results);
   const ShareInterval share = wilson(good, runs);
-  fmt::print("{}: {} of {} runs succeeded (95 % interval {:.2f} to {:.2f}), {} touched a trunk\n",
-             toString(arguments.trial.scenario.kind), good, runs, share.low, share.high, contacts(results));
+  const std::string interval =
+      runs < 2 ? "" : fmt::format(" (95 % interval {} to {})", percent(share.low, 0), percent(share.high, 0));
+  fmt::print("{}: {} of {} run{} succeeded{}, {} touched a trunk\n", toString(arguments.trial.scenario.kind), good,
+             runs, runs == 1 ? "" : "s", interval, contacts(results));
   if (otherGaps(results) > 0)
     fmt::print("  {:3} of them through another gap than the one set up\n", otherGaps(results));
   for (const auto &[reason, number] : failures(results))
@@ -170,8 +174,8 @@ void print(const Arguments &arguments, const std::vector<ServoTrialResult> &resu
   for (const Column &column : kColumns) {
     const MedianInterval median = medianOf(column, results);
     if (median.count > 0)
-      fmt::print("  {:22} median {:8.3f}   [{:.3f}, {:.3f}]   of {}\n", column.name, median.median, median.low,
-                 median.high, median.count);
+      fmt::print("  {:22} median {}   [{}, {}]   of {}\n", column.name, figure(median.median, 8, 3),
+                 figure(median.low, 0, 3), figure(median.high, 0, 3), median.count);
   }
   if (!arguments.folder.empty())
     fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
@@ -221,7 +225,7 @@ ServoTrialResult fly(const Arguments &arguments, ServoTrialOptions trial, std::u
 void run(Arguments &arguments)
 {
   if (!arguments.config.empty())
-    readConfig(arguments.config, arguments.trial.pipeline);
+    readConfig(findPreset(arguments.config), arguments.trial.pipeline);
   setOptions(arguments.settings, arguments.trial.pipeline);
   if (arguments.is_ungated)
     arguments.trial.pipeline.stages.saliency = false;
@@ -233,8 +237,8 @@ void run(Arguments &arguments)
   const std::uint64_t first = arguments.trial.scenario.seed;
   for (int k = 0; k < arguments.runs && !interrupted(); ++k) {
     ServoTrialResult result = fly(arguments, arguments.trial, first + static_cast<std::uint64_t>(k), window);
-    if (interrupted() && k > 0)
-      break; // half a run says nothing
+    if (interrupted())
+      break; // half a run is neither a success nor a failure
     std::fprintf(stderr, "run %d of %d, seed %llu: %s\n", k + 1, arguments.runs,
                  static_cast<unsigned long long>(result.seed),
                  result.is_success ? "succeeded" : result.outcome.c_str());
@@ -242,7 +246,12 @@ void run(Arguments &arguments)
     results.push_back(std::move(result));
     writeTables(arguments, results);
   }
-  print(arguments, results);
+  if (!results.empty())
+    print(arguments, results);
+  if (interrupted()) {
+    std::fprintf(stderr, "bole: interrupted after %zu of %d runs\n", results.size(), arguments.runs);
+    endWith(ExitCode::interrupted);
+  }
 }
 
 void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *example)

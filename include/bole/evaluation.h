@@ -2,27 +2,130 @@
 #pragma once
 /// \file
 /// A finished run against the ground truth of its sequence: what `bole evaluate` prints.
+///
+/// Law (a test): a figure for which there was nothing to measure is NaN. It is printed as "-" and is null in JSON, so
+/// that a failure never looks like an error of zero.
 
-#include "evaluation/trajectory_metrics.h"
-#include "evaluation/trunk_metrics.h"
+#include <bole/pose.h>
+#include <bole/trunk_record.h>
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace bole
 {
+/// The figure of what could not be measured.
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+
+/// What is taken from the estimate before it is compared with the truth.
+enum class Alignment
+{
+  none,        ///< both are taken in the world as they stand
+  first_pose,  ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
+  xy_yaw,      ///< least squares over the trajectory in x, y and yaw; z stays
+  xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
+};
+const char *toString(Alignment alignment);
+inline std::size_t indexOf(Alignment alignment) { return static_cast<std::size_t>(alignment); }
+
+/// One figure for each Alignment.
+using ByAlignment = std::array<double, 4>;
+constexpr ByAlignment kNoneMeasured = {kNotMeasured, kNotMeasured, kNotMeasured, kNotMeasured};
+
+struct TrajectoryErrors
+{
+  std::size_t poses = 0;
+  double ate = kNotMeasured;          ///< absolute trajectory error: RMSE of the position in 3-D [m]
+  double ate_xy = kNotMeasured;       ///< its horizontal part [m]
+  double rotation_deg = kNotMeasured; ///< RMSE of the angle [degrees]
+};
+
+struct RelativeErrors
+{
+  std::size_t intervals = 0;
+  double translation = kNotMeasured;  ///< RMSE over the interval [m]
+  double rotation_deg = kNotMeasured; ///< [degrees]
+};
+
 struct TrajectoryReport
 {
   std::array<TrajectoryErrors, 4> absolute; ///< by Alignment
-  PlanarTransform scaled;                   ///< the transform of Alignment::xy_yaw_scale
-  RelativeErrors over_frame,
-      over_second; ///< relative errors between consecutive frames and over 1 s
+  double scale = kNotMeasured;              ///< by which Alignment::xy_yaw_scale multiplies the estimate
+  RelativeErrors over_frame, over_second;   ///< between consecutive frames, and over 1 s
+};
+
+/// What a flight saw of a trunk of the truth.
+struct TrunkVisibility
+{
+  std::size_t frames = 0;    ///< within range, inside the image, not hidden
+  double bearing_change = 0; ///< largest difference of its bearings over those frames [degrees]
+  double min_range = 0;      ///< of those frames [m]
+  bool is_expected = false;  ///< counts for recall
+};
+
+/// A trunk of the map and the one of the truth it was matched with.
+struct TrunkMatch
+{
+  TrunkRecord estimate;
+  int truth_id = 0;
+  double truth_radius = kNotMeasured; ///< [m]
+  TrunkVisibility visibility;
+  ByAlignment error = kNoneMeasured;  ///< distance under each Alignment [m]
+  double nees_half = kNotMeasured;    ///< e^T P^-1 e / 2, with the first pose as gauge
+  double predicted_sigma = 0;         ///< sqrt(trace P) [m], to be compared with the RMSE of the distance
+  double radius_error = kNotMeasured; ///< estimate - truth [m]
+};
+
+/// A trunk of the map without partner, or one of the truth that was expected and not found.
+struct Unmatched
+{
+  int id = 0;
+  int nearest_id = -1;                    ///< in the other set (for a miss: any status), -1 where that is empty
+  double nearest_distance = kNotMeasured; ///< [m], after TrunkMetrics::matching
+  bool is_duplicate = false;              ///< within the gate of a trunk of the truth that has a better partner
+  TrunkRecord estimate;                   ///< false positive: the trunk; miss: the nearest of the map
+  TrunkVisibility visibility;             ///< of the missed trunk
+};
+
+/// Figures of a set of matches.
+struct TrunkErrors
+{
+  std::size_t expected = 0, found = 0; ///< trunks of the truth that count for recall
+  std::size_t matches = 0;
+  ByAlignment median = kNoneMeasured, rmse = kNoneMeasured;      ///< of the distance under each Alignment [m]
+  double nees_half = kNotMeasured;                               ///< mean; near 1 when covariances are honest
+  double predicted_sigma = kNotMeasured;                         ///< root mean square [m]
+  double radius_rmse = kNotMeasured, radius_bias = kNotMeasured; ///< [m]
+  double recall() const;                                         ///< found / expected
+};
+
+struct TrunkBin
+{
+  std::string name;
+  TrunkErrors errors;
+};
+
+/// How good a map of trunks is. Shares are 0 .. 1.
+struct TrunkMetrics
+{
+  Alignment matching = Alignment::xy_yaw; ///< after which the trunks were matched
+  std::size_t confirmed = 0;
+  double precision = kNotMeasured; ///< matched / confirmed, against all trunks of the truth, near and far
+  double recall = kNotMeasured;    ///< expected and matched / expected (TrunkVisibility::is_expected)
+  double f1 = kNotMeasured;
+  double duplicates = kNotMeasured; ///< share of the confirmed trunks
+  TrunkErrors all;
+  std::vector<TrunkBin> by_range, by_parallax;
+  std::vector<TrunkMatch> matches;
+  std::vector<Unmatched> false_positives, misses;
 };
 
 struct EvaluationOptions
 {
-  /// For live flights, whose stamps are the drone's: shift the run's stamps by motionShift().
+  /// For live flights, whose stamps are the drone's: shifts the run's stamps so that its motion is that of the truth.
   bool align_time = false;
 };
 
@@ -36,19 +139,18 @@ struct Evaluation
   std::optional<TrajectoryReport> online;   ///< trajectory_online.tum
   std::optional<TrajectoryReport> odometry; ///< the pose filter at the frames of trajectory.tum
   std::optional<TrunkMetrics> trunks;       ///< where the sequence has trees.csv
-  std::string reference; ///< describe() of the run's metre and up, from its summary.json; empty without one
+  std::string reference; ///< describe() of the run's scale and gravity, from its summary.json; empty without one
 };
 
-/// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with
-/// another run: then its smoothed trajectory and its confirmed trunks stand for the truth, all of
-/// them expected, and what is measured is how alike two runs are. Errors: vpException naming the
-/// file that is missing or faulty, or that has no common stamps with the truth. Where the summary of
-/// the run says that its metre is not odometry's, trunks are matched after alignment in scale too;
-/// where its world stands at the height of the first camera, the mean height is aligned.
+/// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with another run: then
+/// its smoothed trajectory and its trunks stand for the truth, all of them expected, and what is measured is how alike
+/// two runs are. Where the summary of the run says that its scale is not odometry's, trunks are matched after alignment
+/// in scale too; where its world stands at the height of the first camera, the mean height is aligned.
+/// \throw vpException naming the file that is missing or faulty, or that has no common stamps with the truth.
 Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options = {});
 
-/// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match
-/// or its nearest neighbour, and every false positive and duplicate.
+/// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match or its nearest
+/// neighbour, and every false positive and duplicate.
 std::string toTable(const Evaluation &evaluation, bool verbose);
 
 /// Everything, as JSON.

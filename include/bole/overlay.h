@@ -36,14 +36,15 @@ struct Overlay
 };
 
 /// Draws \p overlay on \p image, enlarged by a whole number to about 640 columns or more, with a line of text below.
-/// Borders have a colour for each id (candidates are thin), labels say "id  r/d  distance", the saliency is an inset
-/// in the upper right corner. The size depends on that of the camera's image alone; an empty image is drawn grey.
+/// Borders have a colour for each id (candidates are thin), labels say id and distance and do not cover one another,
+/// the saliency is an inset in the upper right corner, a legend stands in the bar of text. The size depends on that of
+/// the camera's image alone; an empty image is drawn grey.
 vpImage<vpRGBa> drawOverlay(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Overlay &overlay);
 
 /// The image and, beside it, the field \p foreground (0 .. 1, any size) in colours (the paper's Fig. 8).
 vpImage<vpRGBa> drawSaliency(const vpImage<unsigned char> &image, const PinholeCamera &camera,
                              const vpImage<float> &foreground, const std::string &text);
 
-/// A colour that stays with an id: neighbours in number are far apart in hue.
+/// A colour that stays with an id: one of the palette of Okabe and Ito, those that stand out on a wood made brighter.
 vpRGBa colourOf(int id);
 } // namespace bole

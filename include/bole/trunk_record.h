@@ -5,6 +5,9 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cmath>
+
 namespace bole
 {
 /// [m] above the ground.
@@ -70,22 +73,30 @@ inline const char *toString(TrunkFate fate)
   return "unknown";
 }
 
-/// A trunk in the world frame. Position and radius are those at breast height, where forest
-/// inventories measure (and the ground truth of the rendered flights is given): the axis at
-/// kBreastHeight above the ground. For an upright trunk the height does not matter; one that leans
-/// by 3 degrees is 7 cm off at its foot. Without a known ground (no odometry) the height of the
-/// first camera stands in.
+/// A trunk in the world frame. Position and radius are those at breast height, where forest inventories measure (and
+/// the ground truth of the rendered flights is given): the axis at kBreastHeight above the ground. For an upright trunk
+/// the height does not matter; one that leans by 3 degrees is 7 cm off at its foot. Without a known ground (no
+/// odometry) the height of the first camera stands in.
+///
+/// A trunk that was confirmed and went out of sight stays confirmed.
 struct TrunkRecord
 {
+  using Covariance = Eigen::Matrix<double, 5, 5>;
+
   int id = 0;
-  Eigen::Vector2d xy = Eigen::Vector2d::Zero();                ///< [m]
-  double radius = 0;                                           ///< [m]
-  Eigen::Vector2d lean = Eigen::Vector2d::Zero();              ///< tan of the lean towards x and y
-  Eigen::Matrix2d covariance_xy = Eigen::Matrix2d::Identity(); ///< [m^2]
-  double variance_radius = 0;                                  ///< [m^2]
-  int observations = 0;                                        ///< frames with a summary factor
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();   ///< [m]
+  double radius = 0;                              ///< [m]
+  Eigen::Vector2d lean = Eigen::Vector2d::Zero(); ///< tan of the lean towards x and y
+  double ground_z = 0;                            ///< height of the ground in the world [m]
+  double probability = 0;                         ///< that it is a trunk and not a chance pair of lines, 0 to 1
+  Covariance covariance = Covariance::Identity(); ///< of x, y, radius, lean x, lean y
+  int observations = 0;                           ///< views: frames with a summary factor
   double first_seen_s = 0, last_seen_s = 0;
   TrunkStatus status = TrunkStatus::candidate;
   TrunkFate fate = TrunkFate::none; ///< of what is not confirmed
+
+  Eigen::Matrix2d covarianceXy() const { return covariance.topLeftCorner<2, 2>(); }         ///< [m^2]
+  double positionSigma() const { return std::sqrt(std::max(0.0, covarianceXy().trace())); } ///< [m]
+  double radiusSigma() const { return std::sqrt(std::max(0.0, covariance(2, 2))); }         ///< [m]
 };
 } // namespace bole

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "evaluation/trajectory_metrics.h"
+#include "evaluation/trunk_metrics.h"
+#include "evaluation/visibility.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
 #include "output/summary_json.h"
@@ -14,13 +17,24 @@ namespace bole
 {
 namespace
 {
+/// Length of the horizontal path of the estimates [m].
+double pathLength(const std::vector<PosePair> &pairs)
+{
+  double length = 0;
+  for (std::size_t i = 1; i < pairs.size(); ++i)
+    length += (pairs[i].estimate.t - pairs[i - 1].estimate.t).head<2>().norm();
+  return length;
+}
+
 TrajectoryReport report(const std::vector<PosePair> &pairs)
 {
   TrajectoryReport result;
   const Alignments alignments = alignAll(pairs);
   for (std::size_t a = 0; a < alignments.size(); ++a)
     result.absolute[a] = absoluteErrors(pairs, alignments[a]);
-  result.scaled = at(alignments, Alignment::xy_yaw_scale);
+  constexpr double kRest = 1e-3; // a path shorter than this has no scale [m]
+  if (pathLength(pairs) > kRest)
+    result.scale = at(alignments, Alignment::xy_yaw_scale).scale;
   if (pairs.size() > 1)
     result.over_frame = relativeErrors(pairs, (pairs[1].stamp_ns - pairs[0].stamp_ns) * 1e-9);
   result.over_second = relativeErrors(pairs, 1);
@@ -88,12 +102,21 @@ Reference readRun(const std::string &run)
   reference.frames = reference.trajectory.size();
   reference.first_stamp_ns = reference.trajectory.front().stamp_ns;
   for (const TrunkRecord &trunk : readTrunks(run + "/trunks.csv"))
-    if (trunk.status == TrunkStatus::confirmed)
-      reference.trunks.push_back({trunk.id, trunk.xy, trunk.radius, 0});
+    reference.trunks.push_back({trunk.id, trunk.xy, trunk.radius, 0});
   TrunkVisibility expected;
   expected.is_expected = true;
   reference.visibility.assign(reference.trunks.size(), expected);
   return reference;
+}
+
+/// The trunks of the map, and the hypotheses that are none: what stood nearest to a missed trunk.
+std::vector<TrunkRecord> readMap(const std::string &run)
+{
+  std::vector<TrunkRecord> map = readTrunks(run + "/trunks.csv");
+  if (std::filesystem::exists(run + "/hypotheses.csv"))
+    for (const TrunkRecord &hypothesis : readTrunks(run + "/hypotheses.csv"))
+      map.push_back(hypothesis);
+  return map;
 }
 
 bool isRun(const std::string &folder)
@@ -164,7 +187,7 @@ Evaluation evaluate(const std::string &run, const std::string &sequence, const E
   }
   if (!reference.trunks.empty() || evaluation.is_against_run)
     evaluation.trunks =
-        trunkMetrics(readTrunks(in_run("trunks.csv")), reference.trunks, reference.visibility, alignAll(pairs),
+        trunkMetrics(readMap(run), reference.trunks, reference.visibility, alignAll(pairs),
                      world.scale == ScaleSource::odometry ? Alignment::xy_yaw : Alignment::xy_yaw_scale);
   return evaluation;
 }

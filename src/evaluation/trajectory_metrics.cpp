@@ -14,7 +14,7 @@ namespace
 
 double rms(double sum_of_squares, std::size_t count)
 {
-  return count == 0 ? 0 : std::sqrt(sum_of_squares / static_cast<double>(count));
+  return count == 0 ? kNotMeasured : std::sqrt(sum_of_squares / static_cast<double>(count));
 }
 
 constexpr double kDegree = M_PI / 180;

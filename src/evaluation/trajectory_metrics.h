@@ -4,22 +4,12 @@
 /// How far a trajectory is from the truth.
 
 #include "input/trajectory.h"
+#include <bole/evaluation.h>
 
-#include <string>
 #include <vector>
 
 namespace bole
 {
-/// What is taken from the estimate before it is compared with the truth.
-enum class Alignment
-{
-  none,        ///< both are taken in the world as they stand
-  first_pose,  ///< x, y, z and yaw of the first common pose: the gauge of the estimate's covariances
-  xy_yaw,      ///< least squares over the trajectory in x, y and yaw; z stays
-  xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
-};
-const char *toString(Alignment alignment);
-
 /// p of the estimate becomes (scale * Rz(yaw) * p.xy + t, p.z + dz).
 struct PlanarTransform
 {
@@ -47,7 +37,7 @@ std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &tr
 /// What must be added to the stamps of \p estimate [ns] for its motion to be that of \p truth: of
 /// the shifts within \p range_s of \p start_ns, the one with the least relative error (translation
 /// in m plus rotation in rad, over 0.3 s), to a millisecond. Where the two lie in the world does not
-/// matter; a flight that changes neither speed nor attitude says nothing of its time.
+/// matter. A flight that changes neither speed nor attitude does not tell its time.
 std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth, std::int64_t start_ns,
                          double range_s = 2);
 
@@ -56,23 +46,8 @@ std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth, st
 /// that does not move keeps scale 1.
 PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
 
-struct TrajectoryErrors
-{
-  std::size_t poses = 0;
-  double ate = 0;          ///< absolute trajectory error: RMSE of the position in 3-D [m]
-  double ate_xy = 0;       ///< its horizontal part [m]
-  double rotation_deg = 0; ///< RMSE of the angle [degrees]
-};
-
 /// Errors after \p transform.
 TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform);
-
-struct RelativeErrors
-{
-  std::size_t intervals = 0;
-  double translation = 0;  ///< RMSE over \p delta_s [m]
-  double rotation_deg = 0; ///< [degrees]
-};
 
 /// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the
 /// first pose at least \p delta_s (less half a millisecond) after i and no later than twice that.

@@ -16,23 +16,47 @@ namespace bole
 {
 namespace
 {
+/// Sums over what was measured.
+struct Sum
+{
+  double sum = 0, squares = 0;
+  std::size_t count = 0;
+
+  void add(double value)
+  {
+    if (std::isnan(value))
+      return;
+    sum += value;
+    squares += value * value;
+    ++count;
+  }
+  double mean() const { return count == 0 ? kNotMeasured : sum / static_cast<double>(count); }
+  double rms() const { return count == 0 ? kNotMeasured : std::sqrt(squares / static_cast<double>(count)); }
+};
+
 double halfNees(const TrunkRecord &estimate, const TruthTrunk &truth, const PlanarTransform &gauge)
 {
   const Eigen::Matrix2d L = gauge.linear();
-  const Eigen::Matrix2d P = L * estimate.covariance_xy * L.transpose();
+  const Eigen::Matrix2d P = L * estimate.covarianceXy() * L.transpose();
   const Eigen::Vector2d error = gauge * estimate.xy - truth.xy;
-  return P.determinant() > 0 ? 0.5 * error.dot(P.inverse() * error) : 0;
+  return P.determinant() > 0 ? 0.5 * error.dot(P.inverse() * error) : kNotMeasured;
 }
 
 TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth, const TrunkVisibility &visibility,
                    const Alignments &alignments)
 {
-  TrunkMatch match{estimate, truth, visibility};
+  TrunkMatch match;
+  match.estimate = estimate;
+  match.truth_id = truth.id;
+  match.visibility = visibility;
   for (std::size_t a = 0; a < alignments.size(); ++a)
     match.error[a] = (alignments[a] * estimate.xy - truth.xy).norm();
   match.nees_half = halfNees(estimate, truth, at(alignments, Alignment::first_pose));
-  match.predicted_sigma = std::sqrt(std::max(0.0, estimate.covariance_xy.trace()));
-  match.radius_error = truth.radius > 0 ? estimate.radius - truth.radius : 0;
+  match.predicted_sigma = estimate.positionSigma();
+  if (truth.radius > 0) {
+    match.truth_radius = truth.radius;
+    match.radius_error = estimate.radius - truth.radius;
+  }
   return match;
 }
 
@@ -41,8 +65,7 @@ TrunkErrors summarize(const TrunkMetrics &metrics, const std::function<bool(cons
 {
   TrunkErrors errors;
   std::array<std::vector<double>, 4> distances;
-  double sigma2 = 0, radius = 0, radius2 = 0;
-  std::size_t with_radius = 0;
+  Sum nees, sigma, radius;
   for (const TrunkMatch &match : metrics.matches) {
     if (!counts(match.visibility))
       continue;
@@ -50,33 +73,24 @@ TrunkErrors summarize(const TrunkMetrics &metrics, const std::function<bool(cons
     errors.found += match.visibility.is_expected ? 1 : 0;
     for (std::size_t a = 0; a < distances.size(); ++a)
       distances[a].push_back(match.error[a]);
-    errors.nees_half += match.nees_half;
-    sigma2 += match.predicted_sigma * match.predicted_sigma;
-    if (match.truth.radius > 0) {
-      ++with_radius;
-      radius += match.radius_error;
-      radius2 += match.radius_error * match.radius_error;
-    }
+    nees.add(match.nees_half);
+    sigma.add(match.predicted_sigma);
+    radius.add(match.radius_error);
   }
   errors.expected = errors.found + static_cast<std::size_t>(
                                        std::count_if(metrics.misses.begin(), metrics.misses.end(),
                                                      [&](const Unmatched &miss) { return counts(miss.visibility); }));
-  if (errors.matches == 0)
-    return errors;
-  const auto count = static_cast<double>(errors.matches);
   for (std::size_t a = 0; a < distances.size(); ++a) {
-    double sum = 0;
-    for (const double distance : distances[a])
-      sum += distance * distance;
-    errors.rmse[a] = std::sqrt(sum / count);
+    Sum distance;
+    for (const double value : distances[a])
+      distance.add(value);
+    errors.rmse[a] = distance.rms();
     errors.median[a] = centreOf(distances[a]);
   }
-  errors.nees_half /= count;
-  errors.predicted_sigma = std::sqrt(sigma2 / count);
-  if (with_radius > 0) {
-    errors.radius_bias = radius / static_cast<double>(with_radius);
-    errors.radius_rmse = std::sqrt(radius2 / static_cast<double>(with_radius));
-  }
+  errors.nees_half = nees.mean();
+  errors.predicted_sigma = sigma.rms();
+  errors.radius_bias = radius.mean();
+  errors.radius_rmse = radius.rms();
   return errors;
 }
 
@@ -102,7 +116,7 @@ template <typename Position>
 void findNearest(Unmatched &entry, const Eigen::Vector2d &point, std::size_t count, const Position &position,
                  std::size_t &index)
 {
-  entry.nearest_distance = count == 0 ? 0 : std::numeric_limits<double>::infinity();
+  entry.nearest_distance = count == 0 ? kNotMeasured : std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count; ++i) {
     const double distance = (position(i) - point).norm();
     if (distance < entry.nearest_distance) {
@@ -112,6 +126,11 @@ void findNearest(Unmatched &entry, const Eigen::Vector2d &point, std::size_t cou
   }
 }
 } // namespace
+
+double TrunkErrors::recall() const
+{
+  return expected == 0 ? kNotMeasured : static_cast<double>(found) / static_cast<double>(expected);
+}
 
 Alignments alignAll(const std::vector<PosePair> &pairs)
 {
@@ -181,7 +200,9 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
     metrics.precision = static_cast<double>(metrics.matches.size()) / static_cast<double>(metrics.confirmed);
     metrics.duplicates = static_cast<double>(duplicates) / static_cast<double>(metrics.confirmed);
   }
-  if (metrics.precision + metrics.recall > 0)
+  if (metrics.precision + metrics.recall == 0)
+    metrics.f1 = 0;
+  else // NaN where one of them is
     metrics.f1 = 2 * metrics.precision * metrics.recall / (metrics.precision + metrics.recall);
   metrics.by_range = binned(metrics, {0, 2, 4, 6, 8.001}, "m", &TrunkVisibility::min_range);
   metrics.by_parallax = binned(metrics, {0, 3, 10, 30, 60, 1e9}, "degrees", &TrunkVisibility::bearing_change);

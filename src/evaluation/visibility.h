@@ -6,6 +6,7 @@
 #include "input/trajectory.h"
 #include "input/truth.h"
 #include <bole/camera.h>
+#include <bole/evaluation.h>
 
 #include <vector>
 
@@ -18,15 +19,6 @@ struct VisibilityOptions
   double max_hidden = 0.5;       ///< share of the trunk's width that nearer trunks may hide
   std::size_t min_frames = 8;    ///< frames in which all of this holds
   double min_bearing_change = 3; ///< [degrees], over those frames, in the world
-};
-
-/// What a flight saw of a trunk.
-struct TrunkVisibility
-{
-  std::size_t frames = 0;    ///< within range, inside the image, not hidden
-  double bearing_change = 0; ///< largest difference of its bearings over those frames [degrees]
-  double min_range = 0;      ///< of those frames [m]
-  bool is_expected = false;  ///< counts for recall
 };
 
 /// Sees every trunk of \p trunks from the true poses \p wMb of the frames.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -18,7 +19,7 @@ double medianOf(std::vector<double> values)
 double centreOf(std::vector<double> values)
 {
   if (values.empty())
-    return 0;
+    return std::numeric_limits<double>::quiet_NaN();
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return values.size() % 2 == 1 ? *middle : 0.5 * (*middle + *std::max_element(values.begin(), middle));
@@ -27,7 +28,7 @@ double centreOf(std::vector<double> values)
 double quantileOf(std::vector<double> values, double share)
 {
   if (values.empty())
-    return 0;
+    return std::numeric_limits<double>::quiet_NaN();
   const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;

@@ -9,8 +9,8 @@ namespace bole
 {
 /// The upper one of the two in the middle where the count is even; 0 of none.
 double medianOf(std::vector<double> values);
-/// The mean of the two in the middle where the count is even; 0 of none.
+/// The mean of the two in the middle where the count is even; NaN of none.
 double centreOf(std::vector<double> values);
-/// The one of \p values below which the part \p share of them stays, 0 to 1: the nearest rank; 0 of none.
+/// The one of \p values below which the part \p share of them stays, 0 to 1: the nearest rank; NaN of none.
 double quantileOf(std::vector<double> values, double share);
 } // namespace bole

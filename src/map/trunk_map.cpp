@@ -139,11 +139,11 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
     record.xy = trunk.trunk.axisAt(breast_z).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
-    Eigen::Matrix<double, 2, 5> J = Eigen::Matrix<double, 2, 5>::Zero(); // of the place at breast height
-    J.leftCols<2>().setIdentity();
-    J.rightCols<2>() = breast_z * Eigen::Matrix2d::Identity();
-    record.covariance_xy = J * trunk.covariance * J.transpose();
-    record.variance_radius = trunk.covariance(2, 2) * record.radius * record.radius;
+    record.probability = 1 / (1 + std::exp(-evidence(trunk)));
+    Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
+    J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
+    J(2, 2) = record.radius;
+    record.covariance = J * trunk.covariance * J.transpose();
     record.observations = trunk.observations;
     record.first_seen_s = trunk.first_seen_s;
     record.last_seen_s = trunk.last_seen_s;

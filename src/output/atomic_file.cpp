@@ -50,6 +50,11 @@ AtomicFile::AtomicFile(std::string path) : m_path(std::move(path))
   ::close(descriptor);
 }
 
+bool AtomicFile::isTemporary(const std::string &name)
+{
+  return !name.empty() && name.front() == '.' && fs::path(name).stem().extension() == ".partial";
+}
+
 AtomicFile::~AtomicFile()
 {
   if (!m_is_committed)

@@ -30,6 +30,9 @@ public:
   /// Puts the file in its place. Throws vpException naming it when the disk says no.
   void commit();
 
+  /// Whether \p name is that of a temporary file: of one that is being written, or was by a process that was killed.
+  static bool isTemporary(const std::string &name);
+
 private:
   std::string m_path;
   std::string m_temporary;

@@ -2,6 +2,8 @@
 #include "output/map_svg.h"
 
 #include "output/atomic_file.h"
+#include "output/palette.h"
+#include "output/svg.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -41,119 +43,126 @@ Sheet sheetFor(const MapPicture &picture)
   return sheet;
 }
 
-std::string path(const Sheet &sheet, const Trajectory &trajectory, const char *style)
+SvgPoints path(const Sheet &sheet, const Trajectory &trajectory)
 {
-  if (trajectory.empty())
-    return {};
-  std::string points;
+  SvgPoints points;
   for (const auto &stamped : trajectory)
-    points += fmt::format("{:.1f},{:.1f} ", sheet.x(stamped.wMb.t.x()), sheet.y(stamped.wMb.t.y()));
-  return fmt::format("<polyline points=\"{}\" fill=\"none\" {}/>\n", points, style);
+    points.emplace_back(sheet.x(stamped.wMb.t.x()), sheet.y(stamped.wMb.t.y()));
+  return points;
 }
 
-std::string grid(const Sheet &sheet)
+void drawGrid(SvgDrawing &drawing, const Sheet &sheet)
 {
-  std::string lines;
-  const auto label = [](double x, double y, double metres) {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#999\">{:g} m</text>\n", x, y, metres);
-  };
+  constexpr const char *kLine = "#e4e4e4", *kLabel = "style=\"fill:#999\"";
   for (double m = std::ceil(sheet.box.min().x()); m <= sheet.box.max().x(); ++m) {
-    lines += fmt::format("<path d=\"M{0:.1f} 0V{1:.1f}\"/>\n", sheet.x(m), sheet.height());
+    drawing.line(sheet.x(m), 0, sheet.x(m), sheet.height(), kLine);
     if (std::fmod(m, 2) == 0)
-      lines += label(sheet.x(m) + 2, sheet.height() - 4, m);
+      drawing.text(sheet.x(m) + 2, sheet.height() - 4, fmt::format("{:g} m", m), kLabel);
   }
   for (double m = std::ceil(sheet.box.min().y()); m <= sheet.box.max().y(); ++m) {
-    lines += fmt::format("<path d=\"M0 {0:.1f}H{1:.1f}\"/>\n", sheet.y(m), sheet.width());
+    drawing.line(0, sheet.y(m), sheet.width(), sheet.y(m), kLine);
     if (std::fmod(m, 2) == 0)
-      lines += label(3, sheet.y(m) - 3, m);
+      drawing.text(3, sheet.y(m) - 3, fmt::format("{:g} m", m), kLabel);
   }
-  return "<g stroke=\"#e4e4e4\" stroke-width=\"1\">" + lines + "</g>\n";
 }
 
 std::string ellipse(const Sheet &sheet, const TrunkRecord &trunk)
 {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(trunk.covariance_xy);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(trunk.covarianceXy());
   const Eigen::Vector2d axes = 2 * eigen.eigenvalues().cwiseMax(0).cwiseSqrt() * kPixelsPerMetre;
   const Eigen::Vector2d major = eigen.eigenvectors().col(1);
-  return fmt::format(
-      "<ellipse cx=\"0\" cy=\"0\" rx=\"{:.1f}\" ry=\"{:.1f}\" transform=\"translate({:.1f} {:.1f}) "
-      "rotate({:.1f})\" fill=\"#c0392b\" fill-opacity=\".15\" stroke=\"#c0392b\" stroke-opacity=\".6\"/>\n",
-      axes(1), axes(0), sheet.x(trunk.xy.x()), sheet.y(trunk.xy.y()), -std::atan2(major.y(), major.x()) * 180 / M_PI);
+  return fmt::format("<ellipse cx=\"0\" cy=\"0\" rx=\"{0:.1f}\" ry=\"{1:.1f}\" transform=\"translate({2:.1f} {3:.1f}) "
+                     "rotate({4:.1f})\" fill=\"{5}\" fill-opacity=\".15\" stroke=\"{5}\" stroke-opacity=\".6\"/>\n",
+                     axes(1), axes(0), sheet.x(trunk.xy.x()), sheet.y(trunk.xy.y()),
+                     -std::atan2(major.y(), major.x()) * 180 / M_PI, palette::kVermilion);
 }
 
-std::string trunk(const Sheet &sheet, const TrunkRecord &record)
+void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &record)
 {
   const double x = sheet.x(record.xy.x()), y = sheet.y(record.xy.y()), r = record.radius * kPixelsPerMetre;
   if (record.status == TrunkStatus::candidate)
-    return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#e0a800\"/>\n", x, y,
-                       r);
+    drawing.circle(x, y, r, "none", fmt::format("stroke=\"{}\"", palette::kOrange));
   if (record.status != TrunkStatus::confirmed)
-    return {};
-  return ellipse(sheet, record) +
-         fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#c0392b\" fill-opacity=\".75\"/>\n"
-                     "<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#7b241c\">{}</text>\n",
-                     x, y, r, x + r + 3, y - r - 1, record.id);
+    return;
+  drawing.add(ellipse(sheet, record));
+  drawing.circle(x, y, r, palette::kVermilion, "fill-opacity=\".75\"");
+  drawing.text(x + r + 3, y - r - 1, fmt::format("{}", record.id));
 }
 
-std::string escaped(const std::string &text)
+void drawLegend(SvgDrawing &drawing, const MapPicture &picture)
 {
-  std::string xml;
-  for (const char c : text)
-    xml += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return xml;
-}
-
-std::string legend(const MapPicture &picture)
-{
-  std::string text =
-      fmt::format("<text x=\"10\" y=\"20\" font-size=\"15\" fill=\"#222\">{}</text>\n", escaped(picture.title));
+  drawing.text(10, 20, picture.title, "font-size=\"15\"");
   double y = 40;
   if (!picture.caption.empty()) {
-    text += fmt::format("<text x=\"10\" y=\"{:.0f}\" fill=\"#222\">{}</text>\n", y, picture.caption);
+    drawing.text(10, y, picture.caption);
     y += 18;
   }
-  const auto entry = [&](bool shown, const char *colour, const char *name) {
-    if (!shown)
+  const auto entry = [&](bool is_shown, const char *colour, const char *name) {
+    if (!is_shown)
       return;
-    text += fmt::format("<rect x=\"10\" y=\"{0:.0f}\" width=\"18\" height=\"4\" fill=\"{1}\"/>"
-                        "<text x=\"34\" y=\"{2:.0f}\" fill=\"#222\">{3}</text>\n",
-                        y - 6, colour, y, name);
+    drawing.box(10, y - 6, 18, 4, colour);
+    drawing.text(34, y, name);
     y += 16;
   };
-  entry(true, "#c0392b", "trunks, two sigma");
   const bool has_candidates = std::any_of(picture.trunks.begin(), picture.trunks.end(), [](const TrunkRecord &record) {
     return record.status == TrunkStatus::candidate;
   });
-  entry(has_candidates, "#e0a800", "candidates, not confirmed");
-  entry(!picture.truth_trunks.empty(), "#27ae60", "trunks, truth");
-  entry(!picture.smoothed.empty(), "#1f4e9e", "trajectory, smoothed");
-  entry(!picture.online.empty(), "#7fa8e0", "trajectory, online");
-  entry(!picture.odometry.empty(), "#aaaaaa", "pose filter");
-  entry(!picture.truth.empty(), "#27ae60", "trajectory, truth");
-  return text;
+  if (!picture.has_ranges) {
+    entry(true, palette::kVermilion, "trunks: bearing and width, at no known distance");
+    return;
+  }
+  entry(true, palette::kVermilion, "trunks, two sigma");
+  entry(has_candidates, palette::kOrange, "candidates, not confirmed");
+  entry(!picture.truth_trunks.empty(), palette::kGreen, "trunks, truth");
+  entry(!picture.smoothed.empty(), palette::kBlue, "trajectory, smoothed");
+  entry(!picture.online.empty(), palette::kSkyBlue, "trajectory, online");
+  entry(!picture.odometry.empty(), palette::kGrey, "pose filter");
+  entry(!picture.truth.empty(), palette::kGreen, "trajectory, truth");
+}
+
+/// What a camera that only rotated knows: a wedge for each trunk, from bearing to bearing of its borders.
+std::string bearingsSvg(const MapPicture &picture)
+{
+  constexpr double kSide = 520, kRadius = 200, kX = kSide / 2, kY = kX + 40;
+  SvgDrawing drawing(kSide, kSide + 40);
+  drawing.circle(kX, kY, kRadius, "none", "stroke=\"#e4e4e4\"");
+  for (const TrunkRecord &record : picture.trunks) {
+    const Eigen::Vector2d to = record.xy - picture.camera;
+    if (record.status != TrunkStatus::confirmed || !(to.norm() > 0))
+      continue;
+    const double bearing = std::atan2(to.y(), to.x()), half = std::asin(std::min(0.99, record.radius / to.norm()));
+    const auto at = [](double angle, double r) {
+      return std::pair(kX + r * std::cos(angle), kY - r * std::sin(angle));
+    };
+    drawing.polygon({{kX, kY}, at(bearing - half, kRadius), at(bearing + half, kRadius)}, palette::kVermilion,
+                    "fill-opacity=\".6\"");
+    const auto [x, y] = at(bearing, kRadius + 14);
+    drawing.text(x, y, fmt::format("{}", record.id), "text-anchor=\"middle\"");
+  }
+  drawLegend(drawing, picture);
+  return drawing.finish();
 }
 } // namespace
 
 std::string toSvg(const MapPicture &picture)
 {
+  if (!picture.has_ranges)
+    return bearingsSvg(picture);
   const Sheet sheet = sheetFor(picture);
-  std::string svg = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-                                "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"sans-serif\" font-size=\"11\">\n"
-                                "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-                                sheet.width(), sheet.height());
-  svg += grid(sheet);
+  SvgDrawing drawing(sheet.width(), sheet.height());
+  drawGrid(drawing, sheet);
   for (const TruthTrunk &truth : picture.truth_trunks)
     if (sheet.box.contains(truth.xy))
-      svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#27ae60\" fill-opacity=\".35\" "
-                         "stroke=\"#27ae60\"/>\n",
-                         sheet.x(truth.xy.x()), sheet.y(truth.xy.y()), std::max(truth.radius, 0.05) * kPixelsPerMetre);
-  svg += path(sheet, picture.truth, "stroke=\"#27ae60\" stroke-width=\"2\"");
-  svg += path(sheet, picture.odometry, "stroke=\"#aaa\" stroke-dasharray=\"2 3\"");
-  svg += path(sheet, picture.online, "stroke=\"#7fa8e0\"");
-  svg += path(sheet, picture.smoothed, "stroke=\"#1f4e9e\" stroke-width=\"2\"");
+      drawing.circle(sheet.x(truth.xy.x()), sheet.y(truth.xy.y()), std::max(truth.radius, 0.05) * kPixelsPerMetre,
+                     palette::kGreen, fmt::format("fill-opacity=\".35\" stroke=\"{}\"", palette::kGreen));
+  drawing.polyline(path(sheet, picture.truth), palette::kGreen, "stroke-width=\"2\"");
+  drawing.polyline(path(sheet, picture.odometry), palette::kGrey, "stroke-dasharray=\"2 3\"");
+  drawing.polyline(path(sheet, picture.online), palette::kSkyBlue);
+  drawing.polyline(path(sheet, picture.smoothed), palette::kBlue, "stroke-width=\"2\"");
   for (const TrunkRecord &record : picture.trunks)
-    svg += trunk(sheet, record);
-  return svg + legend(picture) + "</svg>\n";
+    drawTrunk(drawing, sheet, record);
+  drawLegend(drawing, picture);
+  return drawing.finish();
 }
 
 void writeMap(const std::string &path, const MapPicture &picture) { writeAtomically(path, toSvg(picture)); }

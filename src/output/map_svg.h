@@ -16,10 +16,12 @@ namespace bole
 struct MapPicture
 {
   std::string title;
-  std::string caption;             ///< under the title: where the metre and up come from
+  std::string caption;             ///< under the title: where scale and gravity come from
   std::vector<TrunkRecord> trunks; ///< confirmed: filled circle to scale with its 2-sigma ellipse; candidates: outline
   Trajectory smoothed, online, odometry, truth;
-  std::vector<TruthTrunk> truth_trunks; ///< within the frame of the picture
+  std::vector<TruthTrunk> truth_trunks;             ///< within the frame of the picture
+  bool has_ranges = true;                           ///< false: only bearings and widths are known
+  Eigen::Vector2d camera = Eigen::Vector2d::Zero(); ///< from which these are seen
 };
 
 /// One metre is 40 px; the picture holds the trajectories and the confirmed trunks.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/overlay.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -10,6 +12,7 @@ namespace bole
 namespace
 {
 constexpr int kTextBar = 30; ///< rows of the line of text [px]
+constexpr int kLegend = 270; ///< columns that the legend takes there [px]
 const cv::Scalar kBarColour(32, 28, 24, 255), kTextColour(230, 230, 230, 255), kWarningColour(255, 170, 60, 255);
 
 int enlargement(const PinholeCamera &camera) { return std::max(1, (640 + camera.width - 1) / camera.width); }
@@ -34,6 +37,17 @@ void drawText(cv::Mat &canvas, const std::string &text, cv::Point at, double siz
 {
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar(0, 0, 0, 255), 3, cv::LINE_AA);
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, colour, 1, cv::LINE_AA);
+}
+
+/// Where the saliency is shown; empty where there is none or no room for it.
+cv::Rect insetBox(const cv::Mat &canvas, const vpImage<float> &foreground)
+{
+  if (foreground.getSize() == 0)
+    return {};
+  const int width = canvas.cols * 27 / 100;
+  const int height = static_cast<int>(static_cast<double>(width) * foreground.getHeight() / foreground.getWidth());
+  const cv::Rect box(canvas.cols - width - 8, 8, width, height);
+  return height <= 0 || box.br().y > canvas.rows ? cv::Rect() : box;
 }
 
 /// A border as points on the canvas, from low to high; empty where it is behind the camera.
@@ -96,45 +110,49 @@ void drawTrunk(cv::Mat &canvas, const OverlayTrunk &trunk, const PinholeCamera &
   drawLine(canvas, right, colour, is_confirmed ? 2 : 1, !trunk.is_observed);
 }
 
-cv::Rect labelBox(const std::string &text, double size, cv::Point at)
+std::string labelOf(const OverlayTrunk &trunk)
 {
-  const cv::Size extent = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, nullptr);
-  return {at.x, at.y - extent.height - 3, extent.width, extent.height + 6};
+  if (trunk.status != TrunkStatus::confirmed)
+    return fmt::format("{}", trunk.id);
+  return trunk.distance > 0 ? fmt::format("{}  {:.1f} m", trunk.id, trunk.distance) : fmt::format("{}", trunk.id);
 }
 
-/// Labels stand at their trunks, in the first row in which they cover no other label.
+/// The box of \p text with its lower left corner near \p at, moved until it lies within \p canvas.
+cv::Rect labelBox(const std::string &text, double size, cv::Point at, const cv::Rect &canvas)
+{
+  const cv::Size extent = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, nullptr) + cv::Size(6, 8);
+  const int x = std::clamp(at.x, canvas.x, std::max(canvas.x, canvas.br().x - extent.width));
+  const int y = std::clamp(at.y - extent.height, canvas.y, std::max(canvas.y, canvas.br().y - extent.height));
+  return {{x, y}, extent};
+}
+
+/// Labels stand at the feet of their trunks, or above one another where they would cover others; one that finds no free
+/// row is left out. Confirmed trunks come first.
 void drawLabels(cv::Mat &canvas, const Overlay &overlay, const PinholeCamera &camera, int factor)
 {
   std::vector<cv::Rect> taken;
-  const int bottom = camera.height * factor;
-  for (const OverlayTrunk &trunk : overlay.trunks) {
-    if (!trunk.relative.isFinite())
-      continue;
-    const auto points = borderPoints(trunk, Border::right, camera, factor);
-    if (points.empty())
-      continue;
-    const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
-    std::string text = fmt::format("{}", trunk.id);
-    if (is_confirmed) {
-      text += fmt::format("  {:.3f}", trunk.relative.ratio());
-      if (trunk.distance > 0)
-        text += fmt::format("  {:.1f} m", trunk.distance);
+  if (overlay.foreground.getSize() > 0)
+    taken.push_back(insetBox(canvas, overlay.foreground));
+  const auto isFree = [&taken](const cv::Rect &box) {
+    return std::none_of(taken.begin(), taken.end(), [&](const cv::Rect &other) { return (other & box).area() > 0; });
+  };
+  for (const bool is_confirmed : {true, false})
+    for (const OverlayTrunk &trunk : overlay.trunks) {
+      if (!trunk.relative.isFinite() || (trunk.status == TrunkStatus::confirmed) != is_confirmed)
+        continue;
+      const auto points = borderPoints(trunk, Border::right, camera, factor);
+      if (points.empty() || points.front().x < 0 || points.front().x > static_cast<float>(canvas.cols))
+        continue;
+      const std::string text = labelOf(trunk);
+      const double size = is_confirmed ? 0.45 : 0.36;
+      cv::Rect box = labelBox(text, size, cv::Point(points.front()) + cv::Point(2, 0), {{0, 0}, canvas.size()});
+      for (int row = 0; row < 12 && !isFree(box); ++row)
+        box.y -= box.height;
+      if (!isFree(box) || box.y < 0)
+        continue;
+      taken.push_back(box);
+      drawText(canvas, text, {box.x + 3, box.br().y - 4}, size, scalarOf(colourOf(trunk.id)));
     }
-    const double size = is_confirmed ? 0.45 : 0.36;
-    cv::Point at(cvRound(points.front().x) + 4, std::min(bottom - 10, cvRound(points.front().y)));
-    cv::Rect box = labelBox(text, size, at);
-    const auto collides = [&] {
-      return std::any_of(taken.begin(), taken.end(), [&](const cv::Rect &other) { return (other & box).area() > 0; });
-    };
-    for (int row = 0; row < 12 && collides(); ++row) {
-      at.y -= box.height;
-      box = labelBox(text, size, at);
-    }
-    if (at.x < 0 || at.x > canvas.cols - 10 || at.y < box.height)
-      continue;
-    taken.push_back(box);
-    drawText(canvas, text, at, size, scalarOf(colourOf(trunk.id)));
-  }
 }
 
 /// 0 dark blue, 0.5 grey, 1 orange; where the field is not a number, black.
@@ -160,19 +178,37 @@ cv::Mat coloured(const vpImage<float> &field, const cv::Size &size)
 
 void drawInset(cv::Mat &canvas, const vpImage<float> &foreground)
 {
-  if (foreground.getSize() == 0)
-    return;
-  const int width = canvas.cols * 27 / 100;
-  const int height = static_cast<int>(static_cast<double>(width) * foreground.getHeight() / foreground.getWidth());
-  const cv::Rect box(canvas.cols - width - 8, 8, width, height);
-  if (height <= 0 || box.y + box.height > canvas.rows)
+  const cv::Rect box = insetBox(canvas, foreground);
+  if (box.empty())
     return;
   coloured(foreground, box.size()).copyTo(canvas(box));
   cv::rectangle(canvas, box, kTextColour, 1);
   drawText(canvas, "near", {box.x + 5, box.y + 15}, 0.4, kTextColour);
 }
 
-vpImage<vpRGBa> withTextBar(const cv::Mat &canvas, const std::string &text, bool is_warning)
+/// What the lines mean, at the right end of the bar.
+void drawLegend(cv::Mat &bar)
+{
+  struct Entry
+  {
+    const char *name;
+    int width;
+    bool is_dashed;
+  };
+  constexpr int kLine = 22, kGap = 12;
+  constexpr double kSize = 0.36;
+  int x = bar.cols - 4, y = bar.rows / 2;
+  for (const Entry &entry : {Entry{"predicted", 2, true}, Entry{"candidate", 1, false}, Entry{"trunk", 2, false}}) {
+    const int width = cv::getTextSize(entry.name, cv::FONT_HERSHEY_SIMPLEX, kSize, 1, nullptr).width;
+    x -= width + kGap;
+    cv::putText(bar, entry.name, {x, y + 4}, cv::FONT_HERSHEY_SIMPLEX, kSize, kTextColour, 1, cv::LINE_AA);
+    x -= kLine + 4;
+    for (int part = 0; part < kLine; part += 6)
+      cv::line(bar, {x + part, y}, {x + part + (entry.is_dashed ? 3 : 6), y}, kTextColour, entry.width, cv::LINE_AA);
+  }
+}
+
+vpImage<vpRGBa> withTextBar(const cv::Mat &canvas, const std::string &text, bool is_warning, bool has_legend)
 {
   vpImage<vpRGBa> picture(static_cast<unsigned>(canvas.rows + kTextBar), static_cast<unsigned>(canvas.cols));
   cv::Mat whole(canvas.rows + kTextBar, canvas.cols, CV_8UC4, picture.bitmap);
@@ -180,19 +216,21 @@ vpImage<vpRGBa> withTextBar(const cv::Mat &canvas, const std::string &text, bool
   canvas.copyTo(whole.rowRange(0, canvas.rows));
   cv::putText(whole, text, {8, canvas.rows + 20}, cv::FONT_HERSHEY_SIMPLEX, 0.45,
               is_warning ? kWarningColour : kTextColour, 1, cv::LINE_AA);
+  cv::Mat bar = whole.rowRange(canvas.rows, whole.rows);
+  const int used = 8 + cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, 0.45, 1, nullptr).width;
+  if (has_legend && used + kLegend < bar.cols)
+    drawLegend(bar);
   return picture;
 }
 } // namespace
 
 vpRGBa colourOf(int id)
 {
-  const double hue = 360 * std::fmod(0.618033988749895 * (id + 1), 1.0);
-  const auto channel = [&](double offset) {
-    const double k = std::fmod(offset + hue / 60, 6.0);
-    const double value = 1 - 0.75 * std::max(0.0, std::min({k, 4 - k, 1.0}));
-    return static_cast<unsigned char>(std::lround(255 * value));
-  };
-  return vpRGBa(channel(5), channel(3), channel(1), 255);
+  constexpr std::size_t kBright = 6; // black and the darkest do not stand out on a wood
+  constexpr std::array<std::array<unsigned char, 3>, kBright> kColours = {
+      {{86, 180, 233}, {230, 159, 0}, {0, 200, 146}, {240, 228, 66}, {255, 120, 30}, {224, 140, 188}}};
+  const auto &c = kColours[static_cast<std::size_t>(id < 0 ? -id : id) % kBright];
+  return vpRGBa(c[0], c[1], c[2], 255);
 }
 
 vpImage<vpRGBa> drawOverlay(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Overlay &overlay)
@@ -203,7 +241,7 @@ vpImage<vpRGBa> drawOverlay(const vpImage<unsigned char> &image, const PinholeCa
     drawTrunk(canvas, trunk, camera, factor);
   drawLabels(canvas, overlay, camera, factor);
   drawInset(canvas, overlay.foreground);
-  return withTextBar(canvas, overlay.text, overlay.is_warning);
+  return withTextBar(canvas, overlay.text, overlay.is_warning, true);
 }
 
 vpImage<vpRGBa> drawSaliency(const vpImage<unsigned char> &image, const PinholeCamera &camera,
@@ -215,6 +253,6 @@ vpImage<vpRGBa> drawSaliency(const vpImage<unsigned char> &image, const PinholeC
     right = coloured(foreground, left.size());
   cv::Mat both;
   cv::hconcat(left, right, both);
-  return withTextBar(both, text, false);
+  return withTextBar(both, text, false, false);
 }
 } // namespace bole

@@ -2,61 +2,76 @@
 #include "output/progress.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <unistd.h>
 
 namespace bole
 {
-Progress::Progress(std::size_t frames, std::FILE *stream, double seconds_between_lines)
-    : m_frames(frames),
+namespace
+{
+/// "1:05" of 65 s.
+std::string clockText(double seconds)
+{
+  const auto whole = static_cast<long>(std::lround(seconds));
+  return whole < 3600 ? fmt::format("{}:{:02}", whole / 60, whole % 60)
+                      : fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+} // namespace
+
+Progress::Progress(std::size_t total, std::FILE *stream, std::string noun)
+    : m_total(total),
       m_stream(stream),
-      m_is_terminal(isatty(fileno(stream)) == 1),
+      m_noun(std::move(noun)),
+      m_is_shown(isatty(fileno(stream)) == 1),
       m_start(Clock::now()),
       m_last_print(m_start)
 {
-  m_interval_s = m_is_terminal ? 0.1 : seconds_between_lines;
 }
 
 Progress::~Progress() { finish(); }
 
-std::string Progress::text(std::size_t frame, std::size_t frames, double frames_per_second, std::size_t trunks,
-                           const std::string &remark, bool is_terminal)
+std::string Progress::text(std::size_t done, std::size_t total, double seconds, const std::string &noun,
+                           const std::string &remark)
 {
   std::string text;
-  if (frames > 0 && is_terminal) {
+  if (total > 0) {
     constexpr std::size_t kWidth = 28;
-    const std::size_t done = std::min(kWidth, kWidth * frame / frames);
-    text = "[" + std::string(done, '#') + std::string(kWidth - done, '.') + "] ";
+    const std::size_t filled = std::min(kWidth, kWidth * done / total);
+    text = "[" + std::string(filled, '#') + std::string(kWidth - filled, '.') + "] ";
   }
-  text += frames > 0 ? fmt::format("frame {} of {}", frame, frames) : fmt::format("frame {}", frame);
-  text += fmt::format("  {:.1f} frames/s  {} trunk{}", frames_per_second, trunks, trunks == 1 ? "" : "s");
+  text += total > 0 ? fmt::format("{} {} of {}", noun, done, total) : fmt::format("{} {}", noun, done);
+  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0;
+  if (rate > 0)
+    text += fmt::format("  {:.1f} {}s/s", rate, noun);
+  if (rate > 0 && done < total)
+    text += fmt::format("  {} left", clockText(static_cast<double>(total - done) / rate));
   return remark.empty() ? text : text + "  " + remark;
 }
 
-void Progress::print(std::size_t frame, std::size_t trunks, const std::string &remark)
+void Progress::print()
 {
   const double seconds = std::chrono::duration<double>(Clock::now() - m_start).count();
-  const double rate = seconds > 0 ? static_cast<double>(frame) / seconds : 0;
-  const std::string line = text(frame, m_frames, rate, trunks, remark, m_is_terminal);
-  std::fprintf(m_stream, m_is_terminal ? "\r\033[K%s" : "%s\n", line.c_str());
+  std::fprintf(m_stream, "\r\033[K%s", text(m_done, m_total, seconds, m_noun, m_remark).c_str());
   std::fflush(m_stream);
-  m_is_open = m_is_terminal;
-  m_printed_frame = frame;
+  m_is_open = true;
+  m_printed = m_done;
   m_last_print = Clock::now();
 }
 
-void Progress::update(std::size_t frame, std::size_t trunks, const std::string &remark)
+void Progress::update(std::size_t done, const std::string &remark)
 {
-  m_last_frame = frame;
-  m_last_trunks = trunks;
-  if (std::chrono::duration<double>(Clock::now() - m_last_print).count() >= m_interval_s)
-    print(frame, trunks, remark);
+  constexpr double kInterval_s = 0.1;
+  m_done = done;
+  m_remark = remark;
+  if (m_is_shown && std::chrono::duration<double>(Clock::now() - m_last_print).count() >= kInterval_s)
+    print();
 }
 
 void Progress::finish()
 {
-  if (m_last_frame > m_printed_frame)
-    print(m_last_frame, m_last_trunks, {});
+  if (m_is_shown && m_done > m_printed)
+    print();
   if (m_is_open)
     std::fputc('\n', m_stream);
   m_is_open = false;

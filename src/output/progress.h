@@ -9,32 +9,31 @@
 
 namespace bole
 {
-/// A bar that is redrawn in place on a terminal, a line every few seconds elsewhere.
+/// A bar that is redrawn in place on a terminal; nothing elsewhere, where it would only fill a log.
 class Progress
 {
 public:
-  /// \param frames of the whole run, 0 when not known; \p stream is stderr in programs.
-  Progress(std::size_t frames, std::FILE *stream, double seconds_between_lines = 5);
+  /// \param total steps of the whole run, 0 when not known; \p noun names a step; \p stream is stderr in programs.
+  Progress(std::size_t total, std::FILE *stream, std::string noun = "frame");
   ~Progress(); ///< ends the line of the bar
 
-  /// \p frame frames are done, \p trunks are confirmed; \p remark may be empty.
-  void update(std::size_t frame, std::size_t trunks, const std::string &remark = {});
+  /// \p done steps are done; \p remark may be empty.
+  void update(std::size_t done, const std::string &remark = {});
   void finish();
 
-  /// The text of the bar or line.
-  static std::string text(std::size_t frame, std::size_t frames, double frames_per_second, std::size_t trunks,
-                          const std::string &remark, bool is_terminal);
+  /// The text of the bar after \p seconds.
+  static std::string text(std::size_t done, std::size_t total, double seconds, const std::string &noun,
+                          const std::string &remark);
 
 private:
   using Clock = std::chrono::steady_clock;
-  void print(std::size_t frame, std::size_t trunks, const std::string &remark);
+  void print();
 
-  std::size_t m_frames;
+  std::size_t m_total, m_done = 0, m_printed = 0;
   std::FILE *m_stream;
-  double m_interval_s;
-  bool m_is_terminal;
+  std::string m_noun, m_remark;
+  bool m_is_shown;        ///< on a terminal
   bool m_is_open = false; ///< a bar stands on the current line
-  std::size_t m_last_frame = 0, m_last_trunks = 0, m_printed_frame = 0;
   Clock::time_point m_start, m_last_print;
 };
 } // namespace bole

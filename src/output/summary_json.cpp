@@ -2,19 +2,14 @@
 #include "output/summary_json.h"
 #include "geometry/median.h"
 #include "output/atomic_file.h"
+#include "output/verdict.h"
+#include "output/versions.h"
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/core/version.hpp>
-#include <visp3/core/vpConfig.h>
 #include <visp3/core/vpException.h>
-
-extern "C" {
-#include <libavutil/avutil.h>
-}
 
 namespace bole
 {
@@ -24,19 +19,22 @@ using Json = nlohmann::ordered_json;
 
 Json median(std::vector<double> values) { return values.empty() ? Json() : Json(medianOf(std::move(values))); }
 
-Json trunksJson(const std::vector<TrunkRecord> &trunks)
+/// \p has_ranges: false leaves out all lengths.
+Json trunksJson(const std::vector<TrunkRecord> &trunks, bool has_ranges)
 {
   Json json;
   for (const auto status : {TrunkStatus::confirmed, TrunkStatus::candidate, TrunkStatus::lost, TrunkStatus::merged})
     json[toString(status)] =
         std::count_if(trunks.begin(), trunks.end(), [&](const TrunkRecord &trunk) { return trunk.status == status; });
+  if (!has_ranges)
+    return json;
   std::vector<double> radius, sigma, sigma_radius, observations;
   for (const TrunkRecord &trunk : trunks) {
     if (trunk.status != TrunkStatus::confirmed)
       continue;
     radius.push_back(trunk.radius);
-    sigma.push_back(std::sqrt(std::max(0.0, trunk.covariance_xy.trace())));
-    sigma_radius.push_back(std::sqrt(std::max(0.0, trunk.variance_radius)));
+    sigma.push_back(trunk.positionSigma());
+    sigma_radius.push_back(trunk.radiusSigma());
     observations.push_back(trunk.observations);
   }
   json["median_of_confirmed"] = {{"radius_m", median(radius)},
@@ -74,34 +72,63 @@ Json positiveOrNull(double value) { return value > 0 ? Json(value) : Json(); }
 Json textOrNull(const std::string &text) { return text.empty() ? Json() : Json(text); }
 } // namespace
 
+namespace
+{
+Json inputJson(const RunSummary &summary)
+{
+  return {{"source", summary.input},
+          {"bytes", summary.digest ? Json(summary.digest->bytes) : Json()},
+          {"sha256", summary.digest ? Json(summary.digest->sha256) : Json()},
+          {"camera_file", textOrNull(summary.camera_file)},
+          {"odometry_file", textOrNull(summary.odometry_file)},
+          {"odometry", summary.has_odometry},
+          {"gyro", summary.has_gyro},
+          {"note", textOrNull(summary.note)}};
+}
+
+Json motionJson(const RunSummary &summary)
+{
+  const bool has_ranges = summary.reference.has_ranges;
+  return {{"duration_s", summary.duration_s},
+          {"path_m", has_ranges ? Json(summary.path_m) : Json()},
+          {"extent_m", has_ranges ? Json(summary.extent_m) : Json()},
+          {"rotated_deg", summary.rotated_deg}};
+}
+} // namespace
+
 std::string toJson(const RunSummary &summary)
 {
   const PinholeCamera &camera = summary.camera;
+  const Verdict verdict = judge(summary);
   Json json;
   json["complete"] = summary.is_complete;
-  json["input"] = {{"source", summary.input},
-                   {"camera_file", textOrNull(summary.camera_file)},
-                   {"odometry_file", textOrNull(summary.odometry_file)},
-                   {"odometry", summary.has_odometry},
-                   {"gyro", summary.has_gyro},
-                   {"note", textOrNull(summary.note)}};
-  json["camera"] = {{"width_px", camera.width}, {"height_px", camera.height}, {"fx_px", camera.fx},
-                    {"fy_px", camera.fy},       {"cx_px", camera.cx},         {"cy_px", camera.cy}};
+  json["trusted"] = verdict.is_trusted;
+  json["facts"] = verdict.facts;
+  json["doubts"] = verdict.doubts;
+  json["command"] = summary.command;
+  json["working_folder"] = textOrNull(summary.working_folder);
+  json["versions"] = versions();
+  json["input"] = inputJson(summary);
+  json["camera"] = {{"width_px", camera.width},
+                    {"height_px", camera.height},
+                    {"fx_px", camera.fx},
+                    {"fy_px", camera.fy},
+                    {"cx_px", camera.cx},
+                    {"cy_px", camera.cy},
+                    {"known", summary.is_camera_known}};
   json["preset"] = textOrNull(summary.preset);
+  json["options"] = textOrNull(summary.options);
   json["scale"] = toString(summary.reference.scale);
   json["scale_sigma"] = positiveOrNull(summary.reference.scale_sigma);
   json["gravity"] = toString(summary.reference.gravity);
   json["gravity_sigma_rad"] = positiveOrNull(summary.reference.gravity_sigma);
   json["ranges"] = summary.reference.has_ranges;
+  json["motion"] = motionJson(summary);
   json["frames"] = framesJson(summary.frames);
-  json["trunks"] = trunksJson(summary.trunks);
+  json["trunks"] = trunksJson(summary.trunks, summary.reference.has_ranges);
   json["timing"] = timingJson(summary.timing);
   for (const auto &[name, value] : summary.figures)
     json["figures"][name] = value;
-  json["versions"] = {{"bole", summary.version},
-                      {"visp", fmt::format("{}.{}.{}", VISP_VERSION_MAJOR, VISP_VERSION_MINOR, VISP_VERSION_PATCH)},
-                      {"opencv", CV_VERSION},
-                      {"libav", av_version_info()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

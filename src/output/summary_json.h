@@ -3,12 +3,14 @@
 /// \file
 /// What a run was made of and what came out, for people and scripts.
 
+#include "output/digest.h"
 #include "output/timing_csv.h"
 #include <bole/frame.h>
 #include <bole/trunk_record.h>
 #include <bole/world_reference.h>
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,21 +18,34 @@ namespace bole
 {
 struct RunSummary
 {
-  std::string version; ///< of bole
+  // how the run was made
+  std::vector<std::string> command; ///< program and arguments
+  std::string working_folder;       ///< in which they count
   std::string input, preset, camera_file, odometry_file;
+  std::string options; ///< all that were in effect, as YAML
+  std::optional<InputDigest> digest;
   std::string note; ///< FrameSource::note()
   PinholeCamera camera;
+  bool is_camera_known = true; ///< false: the field of view is a guess
   bool has_odometry = false, has_gyro = false;
+
+  // what came of it
   bool is_complete = true;  ///< false: the run was stopped, this is what was known by then
-  WorldReference reference; ///< where the metre and up come from
+  WorldReference reference; ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
-  std::vector<TrunkRecord> trunks;
+  std::map<FrameStatus, std::string> reasons; ///< the first message of each status
+  double duration_s = 0;                      ///< from the first frame to the last
+  double path_m = 0;                          ///< length of the smoothed trajectory
+  double extent_m = 0;                        ///< farthest that the camera was from its first place
+  double rotated_deg = 0;                     ///< most that it was rotated from its first attitude
+  std::vector<TrunkRecord> trunks;            ///< and hypotheses
   TimingTable timing;
   std::map<std::string, double> figures; ///< anything else a stage counts, by name
 };
 
-/// Inputs, preset, camera, frames by status, trunks by status with the medians of their radius, standard deviation and
-/// observations, sources of scale and gravity, median cost by stage, versions of the libraries.
+/// Command, options, input with its hash, versions; camera, frames by status, trunks by status with the medians of
+/// their radius, standard deviation and observations, sources of scale and gravity, what is doubtful (judge()), median
+/// cost by stage. null: there was nothing to measure.
 std::string toJson(const RunSummary &summary);
 /// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
 WorldReference readReference(const std::string &path);

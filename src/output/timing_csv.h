@@ -25,7 +25,7 @@ struct TimingTable
   std::vector<std::string> stages;
   std::vector<FrameTiming> frames;
 
-  /// Median over the frames; 0 without frames.
+  /// Median over the frames; NaN without frames.
   double medianTotal_ms() const;
   double medianStage_ms(std::size_t stage) const;
   /// The cost that 95 % of the frames stay below.

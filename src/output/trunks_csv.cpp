@@ -3,16 +3,55 @@
 #include "input/csv_reader.h"
 #include "output/atomic_file.h"
 
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <fmt/format.h>
+#include <fstream>
 #include <iterator>
 
 namespace bole
 {
-const char *const kTrunksCsvHeader = "id,x [m],y [m],radius [m],var_xx [m^2],var_xy [m^2],var_yy [m^2],"
-                                     "var_radius [m^2],observations,first_seen [s],last_seen [s],status";
+const char *const kTrunksCsvHeader =
+    "id,status,x,y,radius,lean_x,lean_y,ground_z,probability,first_seen,last_seen,views,var_xx,var_xy,var_yy,"
+    "var_radius,var_lean_xx,var_lean_xy,var_lean_yy,cov_x_radius,cov_y_radius,cov_x_lean_x,cov_x_lean_y,cov_y_lean_x,"
+    "cov_y_lean_y,cov_radius_lean_x,cov_radius_lean_y";
 
 namespace
 {
+const char *const kUnits = "# units,,m,m,m,1,1,m,1,s,s,1,m^2,m^2,m^2,m^2,1,1,1,m^2,m^2,m,m,m,m,m,m";
+const char *const kFateColumn = ",fate";
+
+/// Rows and columns of TrunkRecord::covariance in the order of the header, from column 12.
+constexpr std::size_t kFirstCovariance = 12, kColumns = 27;
+constexpr std::array<std::pair<int, int>, 15> kCovariance = {{{0, 0},
+                                                              {0, 1},
+                                                              {1, 1},
+                                                              {2, 2},
+                                                              {3, 3},
+                                                              {3, 4},
+                                                              {4, 4},
+                                                              {0, 2},
+                                                              {1, 2},
+                                                              {0, 3},
+                                                              {0, 4},
+                                                              {1, 3},
+                                                              {1, 4},
+                                                              {2, 3},
+                                                              {2, 4}}};
+
+void addRow(std::string &text, const TrunkRecord &trunk)
+{
+  fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{:.6g},{:.6f},{:.6f},{:.4f},{:.6f},{:.9f},{:.9f},{}",
+                 trunk.id, toString(trunk.status), trunk.xy.x(), trunk.xy.y(), trunk.radius, trunk.lean.x(),
+                 trunk.lean.y(), trunk.ground_z, trunk.probability, trunk.first_seen_s, trunk.last_seen_s,
+                 trunk.observations);
+  for (const auto &[row, column] : kCovariance)
+    fmt::format_to(std::back_inserter(text), ",{:.6e}", trunk.covariance(row, column));
+}
+
 TrunkStatus readStatus(const CsvReader &csv, std::size_t column)
 {
   for (const auto status : {TrunkStatus::candidate, TrunkStatus::confirmed, TrunkStatus::lost, TrunkStatus::merged})
@@ -20,43 +59,101 @@ TrunkStatus readStatus(const CsvReader &csv, std::size_t column)
       return status;
   csv.fail(fmt::format("status = \"{}\", must be candidate, confirmed, lost or merged", csv.text(column)));
 }
+
+TrunkFate readFate(const CsvReader &csv, std::size_t column)
+{
+  for (int i = 0; i <= static_cast<int>(TrunkFate::unranged); ++i)
+    if (csv.text(column) == toString(static_cast<TrunkFate>(i)))
+      return static_cast<TrunkFate>(i);
+  csv.fail(fmt::format("fate = \"{}\", is not known", csv.text(column)));
+}
+
+TrunkRecord readRow(const CsvReader &csv)
+{
+  TrunkRecord trunk;
+  trunk.id = static_cast<int>(csv.integer(0, "id"));
+  trunk.status = readStatus(csv, 1);
+  trunk.xy = {csv.number(2, "x"), csv.number(3, "y")};
+  trunk.radius = csv.number(4, "radius");
+  if (!(trunk.radius > 0))
+    csv.fail(fmt::format("radius = {}, must be above 0 m", trunk.radius));
+  trunk.lean = {csv.number(5, "lean_x"), csv.number(6, "lean_y")};
+  trunk.ground_z = csv.number(7, "ground_z");
+  trunk.probability = csv.number(8, "probability");
+  trunk.first_seen_s = csv.number(9, "first_seen");
+  trunk.last_seen_s = csv.number(10, "last_seen");
+  trunk.observations = static_cast<int>(csv.integer(11, "views"));
+  for (std::size_t i = 0; i < kCovariance.size(); ++i) {
+    const auto [row, column] = kCovariance[i];
+    trunk.covariance(row, column) = trunk.covariance(column, row) = csv.number(kFirstCovariance + i, "covariance");
+  }
+  const Eigen::Matrix2d P = trunk.covarianceXy();
+  if (P(0, 0) < 0 || P(1, 1) < 0 || P.determinant() < -1e-5 * (P(0, 0) * P(1, 1)))
+    csv.fail("var_xx, var_xy, var_yy must be a covariance");
+  return trunk;
+}
 } // namespace
 
-void writeTrunks(const std::string &path, const std::vector<TrunkRecord> &trunks)
+void writeTrunks(const std::string &path, const std::vector<TrunkRecord> &map)
 {
-  std::string text = fmt::format("{}\n", kTrunksCsvHeader);
-  for (const TrunkRecord &trunk : trunks) {
-    const Eigen::Matrix2d &P = trunk.covariance_xy;
-    fmt::format_to(std::back_inserter(text),
-                   "{},{:.6f},{:.6f},{:.6g},{:.6e},{:.6e},{:.6e},{:.6e},{},{:.9f},{:.9f},{}\n", trunk.id, trunk.xy.x(),
-                   trunk.xy.y(), trunk.radius, P(0, 0), P(0, 1), P(1, 1), trunk.variance_radius, trunk.observations,
-                   trunk.first_seen_s, trunk.last_seen_s, toString(trunk.status));
+  std::string text = fmt::format("{}\n{}\n", kTrunksCsvHeader, kUnits);
+  for (const TrunkRecord &trunk : map) {
+    if (trunk.status != TrunkStatus::confirmed)
+      continue;
+    addRow(text, trunk);
+    text += '\n';
+  }
+  writeAtomically(path, text);
+}
+
+void writeHypotheses(const std::string &path, const std::vector<TrunkRecord> &map)
+{
+  std::string text = fmt::format("{}{}\n{},\n", kTrunksCsvHeader, kFateColumn, kUnits);
+  for (const TrunkRecord &trunk : map) {
+    if (trunk.status == TrunkStatus::confirmed)
+      continue;
+    addRow(text, trunk);
+    fmt::format_to(std::back_inserter(text), ",{}\n", toString(trunk.fate));
   }
   writeAtomically(path, text);
 }
 
 std::vector<TrunkRecord> readTrunks(const std::string &path)
 {
+  std::ifstream file(path);
+  std::string header;
+  std::getline(file, header);
+  const bool has_fate = header == std::string(kTrunksCsvHeader) + kFateColumn;
+  CsvReader csv(path, {kColumns + (has_fate ? 1 : 0), ',', has_fate ? header : kTrunksCsvHeader});
   std::vector<TrunkRecord> trunks;
-  CsvReader csv(path, {12, ',', kTrunksCsvHeader});
   while (csv.next()) {
-    TrunkRecord trunk;
-    trunk.id = static_cast<int>(csv.integer(0, "id"));
-    trunk.xy = {csv.number(1, "x"), csv.number(2, "y")};
-    trunk.radius = csv.number(3, "radius");
-    if (!(trunk.radius > 0))
-      csv.fail(fmt::format("radius = {}, must be above 0 m", trunk.radius));
-    const double xx = csv.number(4, "var_xx"), xy = csv.number(5, "var_xy"), yy = csv.number(6, "var_yy");
-    if (xx < 0 || yy < 0 || xx * yy - xy * xy < -1e-5 * (xx * yy))
-      csv.fail("var_xx, var_xy, var_yy must be a covariance");
-    trunk.covariance_xy << xx, xy, xy, yy;
-    trunk.variance_radius = csv.number(7, "var_radius");
-    trunk.observations = static_cast<int>(csv.integer(8, "observations"));
-    trunk.first_seen_s = csv.number(9, "first_seen");
-    trunk.last_seen_s = csv.number(10, "last_seen");
-    trunk.status = readStatus(csv, 11);
-    trunks.push_back(trunk);
+    trunks.push_back(readRow(csv));
+    if (has_fate)
+      trunks.back().fate = readFate(csv, kColumns);
   }
   return trunks;
+}
+
+void writeBearings(const std::string &path, const std::vector<TrunkRecord> &map, const Eigen::Vector2d &from)
+{
+  constexpr double kDegrees = 180 / M_PI;
+  std::string text =
+      "id,status,bearing,width,sigma_bearing,sigma_width,views\n# units,,degrees,degrees,degrees,degrees,1\n";
+  for (const TrunkRecord &trunk : map) {
+    const Eigen::Vector2d to = trunk.xy - from;
+    const double range = to.norm(), ratio = std::min(0.99, trunk.radius / range);
+    if (trunk.status != TrunkStatus::confirmed || !(range > 0))
+      continue;
+    const Eigen::Vector2d across = Eigen::Vector2d(-to.y(), to.x()) / range, along = to / range;
+    const double across_sigma = std::sqrt(std::max(0.0, across.dot(trunk.covarianceXy() * across)));
+    // the ratio r/d is known far better than r and d, whose errors go together
+    Eigen::Vector3d J(-along.x() * ratio / range, -along.y() * ratio / range, 1 / range);
+    const double ratio_variance = J.dot(trunk.covariance.topLeftCorner<3, 3>() * J);
+    fmt::format_to(std::back_inserter(text), "{},{},{:.4f},{:.4f},{:.4f},{:.4f},{}\n", trunk.id, toString(trunk.status),
+                   std::atan2(to.y(), to.x()) * kDegrees, 2 * std::asin(ratio) * kDegrees,
+                   across_sigma / range * kDegrees,
+                   2 * std::sqrt(std::max(0.0, ratio_variance) / (1 - ratio * ratio)) * kDegrees, trunk.observations);
+  }
+  writeAtomically(path, text);
 }
 } // namespace bole

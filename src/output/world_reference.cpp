@@ -47,7 +47,7 @@ std::string describe(const WorldReference &reference)
     scale += fmt::format(" (+- {:.0f} %)", 100 * reference.scale_sigma);
   if (reference.gravity_sigma > 0)
     up += fmt::format(" (+- {:.1f} degrees)", reference.gravity_sigma * 180 / M_PI);
-  return fmt::format("scale: {}; up: {}{}", scale, up,
-                     reference.has_ranges ? "" : "; the camera only turned: bearings, no ranges");
+  return fmt::format("scale: {}; gravity: {}{}", scale, up,
+                     reference.has_ranges ? "" : "; the camera only rotated: bearings, no ranges");
 }
 } // namespace bole

@@ -46,11 +46,13 @@ std::vector<TrunkRecord> Engine::map() const
     return records;
   const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>() * m_metres;
   const double sigma = m_motion->hasRanges() ? estimateScale(true).sigma : 0;
-  for (const TrunkRecord &in_units : m_map.records(m_motion->groundZ().value_or(0) + kBreastHeight / m_metres)) {
+  const double ground_z = m_motion->groundZ().value_or(0);
+  for (const TrunkRecord &in_units : m_map.records(ground_z + kBreastHeight / m_metres)) {
     TrunkRecord record = inMetres(in_units, m_metres);
-    const Eigen::Vector2d by_log_scale = record.xy - origin;
-    record.covariance_xy += sigma * sigma * by_log_scale * by_log_scale.transpose();
-    record.variance_radius += sigma * sigma * record.radius * record.radius;
+    record.ground_z = ground_z * m_metres;
+    Vector5d by_log_scale;
+    by_log_scale << record.xy - origin, record.radius, 0, 0;
+    record.covariance += sigma * sigma * by_log_scale * by_log_scale.transpose();
     records.push_back(record);
   }
   return records;

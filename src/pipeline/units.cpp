@@ -58,8 +58,8 @@ TrunkRecord inMetres(TrunkRecord record, double metres)
 {
   record.xy *= metres;
   record.radius *= metres;
-  record.covariance_xy *= metres * metres;
-  record.variance_radius *= metres * metres;
+  record.covariance.topRows<3>() *= metres;
+  record.covariance.leftCols<3>() *= metres;
   return record;
 }
 

@@ -99,12 +99,16 @@ public:
     m_expected += static_cast<double>(trunks.all.expected);
     const double confirmed = static_cast<double>(trunks.confirmed);
     m_confirmed += confirmed;
-    m_true += trunks.precision * confirmed;
-    m_duplicates += trunks.duplicates * confirmed;
+    m_true += static_cast<double>(trunks.matches.size());
+    if (confirmed > 0)
+      m_duplicates += trunks.duplicates * confirmed;
     const double matches = static_cast<double>(trunks.all.matches);
     m_matches += matches;
-    m_squares += matches * trunks.all.rmse[kAligned] * trunks.all.rmse[kAligned];
-    m_radius_squares += matches * trunks.all.radius_rmse * trunks.all.radius_rmse;
+    if (matches > 0)
+      m_squares += matches * trunks.all.rmse[kAligned] * trunks.all.rmse[kAligned];
+    for (const TrunkMatch &match : trunks.matches)
+      if (!std::isnan(match.radius_error))
+        m_radius_squares += match.radius_error * match.radius_error;
     for (const TrunkMatch &match : trunks.matches)
       m_errors.push_back(match.error[kAligned]);
     if (matches > 0)

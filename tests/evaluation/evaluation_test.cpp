@@ -10,7 +10,8 @@
 #include <bole/evaluation.h>
 
 #include <Eigen/LU>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <filesystem>
@@ -55,7 +56,7 @@ TrunkRecord confirmed(int id, double x, double y, double radius = 0.2, double va
   trunk.id = id;
   trunk.xy = {x, y};
   trunk.radius = radius;
-  trunk.covariance_xy = variance * Eigen::Matrix2d::Identity();
+  trunk.covariance = variance * TrunkRecord::Covariance::Identity();
   trunk.status = TrunkStatus::confirmed;
   return trunk;
 }
@@ -251,7 +252,7 @@ TEST(TrunkMetrics, MeasuresPositionRadiusAndHonesty)
 TEST(TrunkMetrics, TurnsTheCovarianceWithTheGauge)
 {
   TrunkRecord trunk = confirmed(0, 0, 0);
-  trunk.covariance_xy = Eigen::Vector2d(0.04, 0.0001).asDiagonal();
+  trunk.covariance.topLeftCorner<2, 2>() = Eigen::Vector2d(0.04, 0.0001).asDiagonal();
   Alignments alignments{};
   alignments[static_cast<std::size_t>(Alignment::first_pose)] = {1, M_PI / 2, {5, 0.2}, 0};
   alignments[static_cast<std::size_t>(Alignment::xy_yaw)] = {1, M_PI / 2, {5, 0.2}, 0};
@@ -283,6 +284,34 @@ TEST(TrunkMetrics, BinsAddUpToTheWhole)
     EXPECT_EQ(expected_sum, 12u);
     EXPECT_EQ(found, 8u);
   }
+}
+
+TEST(TrunkMetrics, WhatCouldNotBeMeasuredIsNoNumber)
+{
+  const TrunkMetrics nothing_matched = trunkMetrics({confirmed(0, 9, 9)}, {tree(0, 1, 1)}, {expected()}, kIdentity);
+  EXPECT_EQ(nothing_matched.recall, 0);
+  EXPECT_EQ(nothing_matched.precision, 0);
+  EXPECT_EQ(nothing_matched.f1, 0);
+  const TrunkErrors &all = nothing_matched.all;
+  for (const double figure :
+       {all.median[0], all.rmse[2], all.nees_half, all.predicted_sigma, all.radius_rmse, all.radius_bias})
+    EXPECT_TRUE(std::isnan(figure));
+
+  const TrunkMetrics empty_map = trunkMetrics({}, {tree(0, 1, 1)}, {expected()}, kIdentity);
+  EXPECT_EQ(empty_map.recall, 0);
+  EXPECT_TRUE(std::isnan(empty_map.precision) && std::isnan(empty_map.f1) && std::isnan(empty_map.duplicates));
+  EXPECT_TRUE(std::isnan(trunkMetrics({confirmed(0, 1, 1)}, {}, {}, kIdentity).recall));
+  EXPECT_TRUE(std::isnan(empty_map.misses.at(0).nearest_distance));
+
+  const TrunkMetrics far = trunkMetrics({confirmed(0, 5, 0)}, {{10000, {5, 0}, 0, 0}}, {{}}, kIdentity);
+  EXPECT_TRUE(std::isnan(far.all.radius_bias)); // the truth has no radius
+  EXPECT_EQ(far.precision, 1);
+}
+
+TEST(TrajectoryMetrics, WhatCouldNotBeMeasuredIsNoNumber)
+{
+  EXPECT_TRUE(std::isnan(absoluteErrors({}, {}).ate));
+  EXPECT_TRUE(std::isnan(relativeErrors({PosePair()}, 1).translation));
 }
 
 TEST(TrunkMetrics, SurvivesAnEmptyMapAndAnEmptyTruth)
@@ -383,6 +412,29 @@ TEST_F(RunAgainst, TheClockOfALiveRunIsFoundByItsMotionWhenAsked)
   EXPECT_NEAR(*evaluation.time_shift_s, -100.037, 0.0011);
   EXPECT_EQ(evaluation.smoothed.absolute[0].poses, late.size());
   EXPECT_LT(evaluation.smoothed.absolute[2].ate, 3e-3);
+}
+
+TEST_F(RunAgainst, ARunInWhichNothingMatchedShowsNoErrorOfZero)
+{
+  const Evaluation evaluation = evaluate(writeRun("nothing", 0, 0, {confirmed(1, 500, 500)}), kFlight);
+  const std::string table = toTable(evaluation, true);
+  EXPECT_THAT(table, testing::HasSubstr("recall 0.0 % (0 of 10)   precision 0.0 % (0 of 1)"));
+  EXPECT_THAT(table, testing::ContainsRegex("aligned x, y, yaw +- +-\n"));
+  const auto json = nlohmann::json::parse(toJson(evaluation));
+  EXPECT_TRUE(json.at("trunks").at("all").at("position_m").at("xy_yaw").at("rmse").is_null());
+  EXPECT_TRUE(json.at("trunks").at("all").at("nees_half").is_null());
+  EXPECT_TRUE(json.at("trunks").at("by_range").at("0 to 2 m").at("radius_m").at("bias").is_null());
+  EXPECT_EQ(json.at("trunks").at("recall"), 0);
+}
+
+TEST_F(RunAgainst, ARunThatStoodStillHasNoScale)
+{
+  const std::string run = writeRun("still", 0, 0, {});
+  Trajectory still = readTumTrajectory(run + "/trajectory.tum");
+  for (StampedPose &pose : still)
+    pose.wMb.t.setZero();
+  writeTrajectory(run + "/trajectory.tum", still);
+  EXPECT_TRUE(std::isnan(evaluate(run, kFlight).smoothed.scale));
 }
 
 TEST_F(RunAgainst, AnotherRunStandsForTheTruth)

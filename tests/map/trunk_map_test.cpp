@@ -506,9 +506,9 @@ TEST_F(Life, RecordsTellThePlaceAtBreastHeight)
   see(trunk, 4);
   const TrunkRecord record = m_map.records().at(0);
   EXPECT_LT((record.xy - Eigen::Vector2d(3 + 0.13, 1 - 0.065)).norm(), 1e-12);
-  EXPECT_NEAR(record.covariance_xy(0, 0), 0.01 + 1.3 * 1.3 * 1e-3, 1e-12);
-  EXPECT_NEAR(record.covariance_xy(1, 1), 0.02 + 1.3 * 1.3 * 2e-3, 1e-12);
-  EXPECT_NEAR(record.variance_radius, 0.04 * 0.15 * 0.15, 1e-12);
+  EXPECT_NEAR(record.covarianceXy()(0, 0), 0.01 + 1.3 * 1.3 * 1e-3, 1e-12);
+  EXPECT_NEAR(record.covarianceXy()(1, 1), 0.02 + 1.3 * 1.3 * 2e-3, 1e-12);
+  EXPECT_NEAR(record.covariance(2, 2), 0.04 * 0.15 * 0.15, 1e-12);
   EXPECT_EQ(record.observations, 4);
   EXPECT_NEAR(record.last_seen_s - record.first_seen_s, 0.3, 1e-12);
 }

@@ -6,10 +6,12 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <visp3/core/vpException.h>
 
 using namespace bole;
@@ -102,48 +104,114 @@ TEST_F(RunFiles, StampsBeforeZeroComeBackToo)
   EXPECT_EQ(read[1].stamp_ns, -500000000);
 }
 
-TEST_F(RunFiles, TrunksComeBack)
+namespace
+{
+TrunkRecord confirmedTrunk()
 {
   TrunkRecord trunk;
   trunk.id = 3;
+  trunk.status = TrunkStatus::confirmed;
   trunk.xy = {1.5, -2.25};
   trunk.radius = 0.125;
-  trunk.covariance_xy << 0.04, -0.01, -0.01, 0.02;
-  trunk.variance_radius = 1e-4;
+  trunk.lean = {0.01, -0.02};
+  trunk.ground_z = -0.25;
+  trunk.probability = 0.875;
+  Eigen::Matrix<double, 5, 5> root;
+  for (int i = 0; i < 25; ++i)
+    root(i / 5, i % 5) = 0.01 * ((7 * i) % 11 - 5);
+  trunk.covariance = root * root.transpose();
   trunk.observations = 17;
   trunk.first_seen_s = 0.4;
   trunk.last_seen_s = 3.1;
-  trunk.status = TrunkStatus::merged;
-  writeTrunks(path("trunks.csv"), {trunk, trunk});
+  return trunk;
+}
+} // namespace
 
-  EXPECT_THAT(content("trunks.csv"),
-              testing::StartsWith("id,x [m],y [m],radius [m],var_xx [m^2],var_xy [m^2],var_yy [m^2],var_radius "
-                                  "[m^2],observations,first_seen [s],last_seen [s],status\n3,1.500000,-2.250000,"));
+TEST_F(RunFiles, TrunksComeBackWithTheirWholeCovariance)
+{
+  const TrunkRecord trunk = confirmedTrunk();
+  writeTrunks(path("trunks.csv"), {trunk, trunk});
   const auto read = readTrunks(path("trunks.csv"));
   ASSERT_EQ(read.size(), 2u);
   EXPECT_EQ(read[0].id, 3);
-  EXPECT_LT((read[0].covariance_xy - trunk.covariance_xy).norm(), 1e-9);
-  EXPECT_EQ(read[0].status, TrunkStatus::merged);
+  EXPECT_LT((read[0].covariance - trunk.covariance).norm(), 1e-6 * trunk.covariance.norm());
+  EXPECT_LT((read[0].lean - trunk.lean).norm(), 1e-9);
+  EXPECT_EQ(read[0].status, TrunkStatus::confirmed);
+  EXPECT_DOUBLE_EQ(read[0].ground_z, -0.25);
+  EXPECT_DOUBLE_EQ(read[0].probability, 0.875);
+  EXPECT_EQ(read[0].observations, 17);
   EXPECT_DOUBLE_EQ(read[0].last_seen_s, 3.1);
 }
 
-TEST_F(RunFiles, TheThinnestTrunkStillComesBack)
+TEST_F(RunFiles, TrunksCsvHoldsTrunksAndHypothesesCsvTheRestWithTheReason)
 {
-  TrunkRecord thread; // a candidate may shrink to anything before it is given up
+  TrunkRecord outdone = confirmedTrunk();
+  outdone.id = 8;
+  outdone.status = TrunkStatus::lost;
+  outdone.fate = TrunkFate::outdone;
+  const std::vector<TrunkRecord> map = {confirmedTrunk(), outdone};
+  writeTrunks(path("trunks.csv"), map);
+  writeHypotheses(path("hypotheses.csv"), map);
+  const auto trunks = readTrunks(path("trunks.csv")), rest = readTrunks(path("hypotheses.csv"));
+  ASSERT_EQ(trunks.size(), 1u);
+  EXPECT_EQ(trunks[0].id, 3);
+  ASSERT_EQ(rest.size(), 1u);
+  EXPECT_EQ(rest[0].id, 8);
+  EXPECT_EQ(rest[0].fate, TrunkFate::outdone);
+}
+
+TEST_F(RunFiles, EveryColumnHasAUnitInALineThatBeginsAsAComment)
+{
+  writeTrunks(path("trunks.csv"), {confirmedTrunk()});
+  writeHypotheses(path("hypotheses.csv"), {TrunkRecord()});
+  for (const char *name : {"trunks.csv", "hypotheses.csv"}) {
+    std::istringstream lines(content(name));
+    std::vector<std::ptrdiff_t> commas;
+    std::string line;
+    for (int i = 0; std::getline(lines, line); ++i) {
+      EXPECT_EQ(line[0] == '#', i == 1) << line;
+      commas.push_back(std::count(line.begin(), line.end(), ','));
+    }
+    EXPECT_THAT(commas, testing::AllOf(testing::SizeIs(3), testing::Each(commas.at(0)))) << name;
+    EXPECT_THAT(content(name).substr(0, content(name).find('\n')), testing::Not(testing::HasSubstr("["))) << name;
+  }
+}
+
+TEST_F(RunFiles, ARotatedCamerasTrunksHaveABearingAndAWidth)
+{
+  TrunkRecord trunk = confirmedTrunk();
+  trunk.xy = {1, 3};
+  trunk.radius = 0.2;
+  trunk.covariance.setZero();
+  trunk.covariance(0, 0) = 0.09; // across the line of sight, 2 m away
+  writeBearings(path("bearings.csv"), {trunk, TrunkRecord()}, {1, 1});
+  EXPECT_THAT(content("bearings.csv"), testing::HasSubstr("\n3,confirmed,90.0000,11.4783,8.5944,0.0000,17\n"));
+  EXPECT_THAT(content("bearings.csv"), testing::Not(testing::HasSubstr("candidate")));
+}
+
+TEST_F(RunFiles, TheThinnestHypothesisStillComesBack)
+{
+  TrunkRecord thread; // a candidate may shrink to anything before it is rejected
   thread.radius = 3e-8;
-  writeTrunks(path("thin.csv"), {thread});
+  writeHypotheses(path("thin.csv"), {thread});
   EXPECT_DOUBLE_EQ(readTrunks(path("thin.csv")).at(0).radius, 3e-8);
 }
 
 TEST_F(RunFiles, RefusesTrunksThatAreNone)
 {
-  const std::string header = std::string(kTrunksCsvHeader) + "\n";
+  writeTrunks(path("trunks.csv"), {confirmedTrunk()});
+  const std::string good = content("trunks.csv");
+  const auto with = [&good](const std::string &old, const std::string &text) {
+    std::string changed = good;
+    changed.replace(changed.find(old), old.size(), text);
+    return changed;
+  };
   for (const auto &[text, message] : std::vector<std::pair<std::string, std::string>>{
            {"id,x\n", "trunks.csv:1: the header"},
-           {header + "0,1,2,-0.1,1,0,1,1,5,0,1,confirmed\n", "trunks.csv:2: radius"},
-           {header + "0,1,2,0.1,1,2,1,1,5,0,1,confirmed\n", "trunks.csv:2: var_xx"},
-           {header + "0,1,2,0.1,1,0,1,1,5,0,1,found\n", "trunks.csv:2: status = \"found\""},
-           {header + "0,nan,2,0.1,1,0,1,1,5,0,1,confirmed\n", "trunks.csv:2: x = \"nan\""}}) {
+           {with(",0.125,", ",-0.1,"), "trunks.csv:3: radius"},
+           {with("\n3,confirmed", "\n3,found"), "trunks.csv:3: status = \"found\""},
+           {with(",1.500000,", ",nan,"), "trunks.csv:3: x = \"nan\""},
+           {with(fmt::format(",{:.6e},", confirmedTrunk().covariance(0, 0)), ",-1,"), "trunks.csv:3: var_xx"}}) {
     writeAtomically(path("trunks.csv"), text);
     try {
       readTrunks(path("trunks.csv"));

@@ -82,7 +82,7 @@ TEST(PlainVideo, ACameraThatOnlyTurnsHasNoRangesAndSaysSo)
   EXPECT_NE(describe(pipeline.reference()).find("no ranges"), std::string::npos);
   for (const TrunkRecord &trunk : pipeline.map()) { // what stands upright is held by its bearing: its range is a guess
     const Eigen::Vector2d along = trunk.xy.normalized();
-    EXPECT_GT(std::sqrt(along.dot(trunk.covariance_xy * along)), 0.25 * trunk.xy.norm()) << trunk.id;
+    EXPECT_GT(std::sqrt(along.dot(trunk.covarianceXy() * along)), 0.25 * trunk.xy.norm()) << trunk.id;
   }
 }
 

@@ -6,12 +6,13 @@
 #include <array>
 #include <cstdio>
 #include <string>
+#include <sys/wait.h>
 
 namespace bole::test
 {
 struct Outcome
 {
-  int status = 0;   ///< of the shell, as pclose() tells it: 0 where all went well
+  int status = 0;   ///< exit status; 128 and more: ended by a signal
   std::string text; ///< standard output and error together
 };
 
@@ -22,7 +23,8 @@ inline Outcome runShell(const std::string &command)
   std::array<char, 4096> buffer;
   while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
     outcome.text.append(buffer.data(), n);
-  outcome.status = pclose(pipe);
+  const int status = pclose(pipe);
+  outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return outcome;
 }
 } // namespace bole::test

@@ -97,8 +97,12 @@ TEST(Kill, LeavesOldOrCompleteFiles)
     for (const std::string &line : lines)
       EXPECT_EQ(fieldsIn(line, ' '), 8u) << name << ": " << line;
   }
-  for (const std::string &line : linesOf(run + "/trunks.csv"))
-    EXPECT_EQ(fieldsIn(line, ','), 12u) << line;
+  for (const char *name : {"/trunks.csv", "/hypotheses.csv"}) {
+    const auto lines = linesOf(run + name);
+    ASSERT_FALSE(lines.empty()) << name;
+    for (const std::string &line : lines)
+      EXPECT_EQ(fieldsIn(line, ','), fieldsIn(lines[0], ',')) << line;
+  }
   const auto timing = linesOf(run + "/timing.csv");
   ASSERT_GE(timing.size(), 11u);
   for (const std::string &line : timing)

@@ -6,18 +6,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace bole
 {
 namespace
 {
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 double rootMeanSquare(const std::vector<FrameError> &errors, std::size_t n, double FrameError::*member)
 {
   double sum = 0;
   for (std::size_t k = 0; k < n; ++k)
     sum += errors[k].*member * errors[k].*member;
-  return n > 0 ? std::sqrt(sum / double(n)) : 0;
+  return n > 0 ? std::sqrt(sum / double(n)) : kNaN;
 }
 
 void summarise(Score &score)

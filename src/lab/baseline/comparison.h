@@ -33,7 +33,7 @@ struct Score
   int tracked = 0;         ///< without complaint and right
   int silent_failures = 0; ///< wrong without complaint
   int reinitialisations = 0;
-  double position_rmse_m = 0; ///< while tracked: until the first loss
+  double position_rmse_m = 0; ///< while tracked: until the first loss; NaN where it was lost at once
   double rotation_rmse_deg = 0;
   double all_position_rmse_m = 0; ///< over all frames, whatever it said
   double all_rotation_rmse_deg = 0;

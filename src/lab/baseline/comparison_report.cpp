@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/comparison_report.h"
+#include "output/figure.h"
 
 #include <fmt/format.h>
 #include <iterator>
@@ -16,6 +17,9 @@ template <typename... Arguments> void add(std::string &text, const char *format,
   fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
 }
 
+/// Frames until it was right again, of the slowest; NaN where it never was.
+double slowestOf(const FaultRow &row) { return row.recovered > 0 ? row.slowest : NAN; }
+
 void addScores(std::string &text, const std::vector<Score> &scores)
 {
   add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "", "until", "", "RMSE", "", "RMSE",
@@ -23,16 +27,17 @@ void addScores(std::string &text, const std::vector<Score> &scores)
   add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "tracker, help", "loss", "right",
       "held [m]", "[deg]", "all [m]", "[deg]", "silent", "started", "median", "p95");
   for (const Score &s : scores)
-    add(text, "{:<42} {:>6} {:>6} {:>8.3f} {:>7.2f} {:>8.3f} {:>7.2f} {:>6} {:>7} {:>6.2f} {:>6.2f}\n", s.name,
-        s.until_loss, s.tracked, s.position_rmse_m, s.rotation_rmse_deg, s.all_position_rmse_m, s.all_rotation_rmse_deg,
-        s.silent_failures, s.reinitialisations, s.median_ms, s.p95_ms);
+    add(text, "{:<42} {:>6} {:>6} {} {} {} {} {:>6} {:>7} {} {}\n", s.name, s.until_loss, s.tracked,
+        figure(s.position_rmse_m, 8, 3), figure(s.rotation_rmse_deg, 7, 2), figure(s.all_position_rmse_m, 8, 3),
+        figure(s.all_rotation_rmse_deg, 7, 2), s.silent_failures, s.reinitialisations, figure(s.median_ms, 6, 2),
+        figure(s.p95_ms, 6, 2));
 }
 
 void addBasin(std::string &text, const std::vector<BasinRow> &rows)
 {
   if (rows.empty())
     return;
-  add(text, "\nBasin: share of right answers one frame after a yaw step [px]; silent failures at the widest\n{:<42}",
+  add(text, "\nBasin: right answers [%] one frame after a yaw step [px]; silent failures [%] at the widest\n{:<42}",
       "");
   for (const double step : rows[0].steps_px)
     add(text, " {:>5g}", step);
@@ -40,8 +45,8 @@ void addBasin(std::string &text, const std::vector<BasinRow> &rows)
   for (const BasinRow &row : rows) {
     add(text, "{:<42}", row.name + (row.has_clutter ? ", forest" : ", plain"));
     for (const double share : row.success)
-      add(text, " {:>5.2f}", share);
-    add(text, " {:>6.2f} {:>6}\n", row.silent.back(), row.pairs);
+      add(text, " {}", figure(row.pairs > 0 ? 100 * share : NAN, 5, 0));
+    add(text, " {} {:>6}\n", figure(row.pairs > 0 ? 100 * row.silent.back() : NAN, 6, 0), row.pairs);
   }
 }
 
@@ -53,7 +58,7 @@ void addFaults(std::string &text, const std::vector<FaultRow> &rows)
       "slowest");
   for (const FaultRow &row : rows)
     add(text, "{:<42} {:<14} {:>4} of {:<3} {:>5} {:>6} of {:<3} {:>7}\n", row.name, row.fault.text(), row.noticed,
-        row.fault_frames, row.silent_failures, row.recovered, row.runs, row.slowest);
+        row.fault_frames, row.silent_failures, row.recovered, row.runs, figure(slowestOf(row), 7, 0));
 }
 
 Json scoreJson(const Score &s, bool has_errors)
@@ -94,7 +99,7 @@ std::string toTable(const ComparisonReport &report)
   if (!report.timing.empty()) {
     add(text, "\nCost on the same trunks, at the true pose [ms a frame]\n");
     for (const Score &s : report.timing)
-      add(text, "{:<42} median {:.2f}, p95 {:.2f}\n", toString(s.kind), s.median_ms, s.p95_ms);
+      add(text, "{:<42} median {}, p95 {}\n", toString(s.kind), figure(s.median_ms, 0, 2), figure(s.p95_ms, 0, 2));
   }
   addBasin(text, report.basin);
   addFaults(text, report.faults);
@@ -145,7 +150,7 @@ std::string toJson(const ComparisonReport &report)
                       {"noticed", row.noticed},
                       {"silent_failures", row.silent_failures},
                       {"recovered", row.recovered},
-                      {"slowest_recovery_frames", row.slowest}});
+                      {"slowest_recovery_frames", slowestOf(row)}});
   return json.dump(1) + "\n";
 }
 } // namespace bole

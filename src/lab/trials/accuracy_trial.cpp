@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/accuracy_trial.h"
+#include "evaluation/visibility.h"
 #include "geometry/median.h"
 #include "lab/simulation/h264_link.h"
 
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <visp3/core/vpException.h>
@@ -88,7 +88,6 @@ void compare(AccuracyTrialResult &result, const Pipeline &pipeline, const Record
     poses.push_back(pose.wMb);
   result.trunks = trunkMetrics(pipeline.map(), truth, trunkVisibility(truth, poses, forwardCamera(), camera),
                                alignAll(pairPoses(smoothed, recorded.truth)));
-  result.nees_half = result.trunks.all.matches ? result.trunks.all.nees_half : std::numeric_limits<double>::quiet_NaN();
   result.median_ms = medianOf(recorded.frame_ms);
 }
 } // namespace

@@ -18,8 +18,7 @@ struct AccuracyTrialResult
   TrunkMetrics trunks;
   TrajectoryErrors trajectory, odometry;               ///< after Alignment::xy_yaw: smoothed, and the pose filter's
   TrajectoryErrors trajectory_scaled, odometry_scaled; ///< after Alignment::xy_yaw_scale
-  double median_ms = 0;                                ///< of a frame in the pipeline
-  double nees_half = 0;                                ///< mean over the matched trunks; NaN without any
+  double median_ms = kNotMeasured;                     ///< of a frame in the pipeline
 };
 
 /// Renders \p frames of \p scene, tracks them with \p options and compares map and trajectory with the truth.

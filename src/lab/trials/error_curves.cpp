@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/error_curves.h"
+#include "output/palette.h"
+#include "output/svg.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +12,9 @@ namespace bole
 {
 namespace
 {
-constexpr double kLeft = 62, kWidth = 560, kHeight = 130, kGap = 34, kTop = 40;
+constexpr double kLeft = 62, kWidth = 560, kHeight = 130, kGap = 36, kTop = 42;
 
-using Points = std::vector<std::pair<double, double>>;
+using Points = SvgPoints;
 
 std::vector<std::string> namesIn(const LoopRecord &record)
 {
@@ -39,22 +41,8 @@ Points pointsOf(const LoopRecord &record, const std::string &name, ServoTask::Va
   return points;
 }
 
-/// 1, 2 or 5 times a power of ten, about a fifth of \p span.
-double tickStep(double span)
-{
-  const double raw = std::max(span, 1e-9) / 5, base = std::pow(10, std::floor(std::log10(raw)));
-  return base * (raw / base < 1.5 ? 1 : raw / base < 3.5 ? 2 : raw / base < 7.5 ? 5 : 10);
-}
-
-struct Panel
-{
-  double t_max, low, high, y0;
-  double x(double t) const { return kLeft + kWidth * t / t_max; }
-  double y(double v) const { return y0 + kHeight * (1 - (std::clamp(v, low, high) - low) / (high - low)); }
-};
-
 /// Range that holds all but the wildest of the values.
-void fit(Panel &panel, const Points &one, const Points &other)
+void fit(SvgAxes &axes, const Points &one, const Points &other)
 {
   std::vector<double> values{0};
   for (const Points *points : {&one, &other})
@@ -62,74 +50,47 @@ void fit(Panel &panel, const Points &one, const Points &other)
       values.push_back(v);
   std::sort(values.begin(), values.end());
   const std::size_t skip = values.size() / 100;
-  panel.low = values[skip];
-  panel.high = values[values.size() - 1 - skip];
-  const double pad = 0.08 * std::max(panel.high - panel.low, 1e-3);
-  panel.low -= pad;
-  panel.high += pad;
-}
-
-std::string line(const Panel &panel, const Points &points, const char *style)
-{
-  std::string text = fmt::format("<polyline fill=\"none\" {} points=\"", style);
-  for (const auto &[t, v] : points)
-    text += fmt::format("{:.1f},{:.1f} ", panel.x(t), panel.y(v));
-  return text + "\"/>\n";
+  const double low = values[skip], high = values[values.size() - 1 - skip];
+  const double pad = 0.08 * std::max(high - low, 1e-3);
+  axes.y_low = low - pad;
+  axes.y_high = high + pad;
 }
 
 /// Bands behind the curves: searching, hovering in doubt.
-std::string bands(const Panel &panel, const LoopRecord &record)
+void drawBands(SvgDrawing &drawing, const SvgAxes &axes, const LoopRecord &record)
 {
-  std::string text;
+  constexpr const char *kSearching = "#ececec", *kLost = "#f6cfae";
   const auto &samples = record.samples;
-  for (std::size_t k = 0; k + 1 < samples.size(); ++k) {
-    const bool is_search = samples[k].phase == TaskPhase::searching;
-    if (!is_search && !samples[k].is_lost)
-      continue;
-    text += fmt::format("<rect x=\"{:.1f}\" y=\"{:.0f}\" width=\"{:.2f}\" height=\"{:.0f}\" fill=\"{}\"/>\n",
-                        panel.x(samples[k].time_s), panel.y0,
-                        kWidth * (samples[k + 1].time_s - samples[k].time_s) / panel.t_max + 0.3, kHeight,
-                        samples[k].is_lost ? "#f3b6b0" : "#ececec");
-  }
-  return text;
-}
-
-std::string axes(const Panel &panel, const std::string &name)
-{
-  std::string text;
-  const double step = tickStep(panel.high - panel.low);
-  for (double v = std::ceil(panel.low / step) * step; v <= panel.high; v += step)
-    text += fmt::format("<line x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" stroke=\"{3}\"/>"
-                        "<text x=\"{4}\" y=\"{5:.1f}\" text-anchor=\"end\">{6:g}</text>\n",
-                        kLeft, kLeft + kWidth, panel.y(v), std::abs(v) < 1e-9 ? "#888" : "#ddd", kLeft - 6,
-                        panel.y(v) + 4, std::abs(v) < 1e-9 ? 0 : v);
-  const double step_s = tickStep(panel.t_max);
-  for (double t = 0; t <= panel.t_max; t += step_s)
-    text += fmt::format("<text x=\"{:.1f}\" y=\"{:.0f}\" text-anchor=\"middle\" fill=\"#555\">{:g} s</text>\n",
-                        panel.x(t), panel.y0 + kHeight + 15, t);
-  return text + fmt::format("<text x=\"{}\" y=\"{:.0f}\" font-weight=\"bold\">{}</text>\n", kLeft, panel.y0 - 5, name);
+  for (std::size_t k = 0; k + 1 < samples.size(); ++k)
+    if (samples[k].is_lost || samples[k].phase == TaskPhase::searching)
+      drawing.box(axes.x(samples[k].time_s), axes.top, axes.x(samples[k + 1].time_s) - axes.x(samples[k].time_s) + 0.3,
+                  axes.height, samples[k].is_lost ? kLost : kSearching);
 }
 } // namespace
 
 std::string errorCurves(const LoopRecord &record, const std::string &title)
 {
   const std::vector<std::string> names = namesIn(record);
-  const double height = kTop + static_cast<double>(names.size()) * (kHeight + kGap) + 10;
-  std::string svg = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"650\" height=\"{:.0f}\" "
-                                "font-family=\"sans-serif\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" "
-                                "fill=\"white\"/>\n<text x=\"{}\" y=\"18\" font-size=\"14\">{}</text>\n",
-                                height, kLeft, title);
-  Panel panel{record.samples.empty() ? 1 : std::max(1.0, record.samples.back().time_s), 0, 1, kTop};
+  SvgDrawing drawing(650, kTop + static_cast<double>(names.size()) * (kHeight + kGap) + 10);
+  drawing.text(kLeft, 18, title, "font-size=\"14\"");
+  drawing.text(kLeft + kWidth, 18, "thick: true, thin: believed", "text-anchor=\"end\"");
+  SvgAxes axes;
+  axes.left = kLeft;
+  axes.top = kTop;
+  axes.width = kWidth;
+  axes.height = kHeight;
+  axes.x_high = record.samples.empty() ? 1 : std::max(1.0, record.samples.back().time_s);
   for (const std::string &name : names) {
     const Points believed = pointsOf(record, name, &LoopSample::believed),
                  real = pointsOf(record, name, &LoopSample::real);
-    fit(panel, believed, real);
-    svg += bands(panel, record) + axes(panel, name);
-    svg += line(panel, believed, "stroke=\"#4a7ab5\" stroke-width=\"0.8\"");
-    svg += line(panel, real, "stroke=\"#b5462a\" stroke-width=\"1.8\"");
-    panel.y0 += kHeight + kGap;
+    fit(axes, believed, real);
+    drawBands(drawing, axes, record);
+    axes.draw(drawing, "", name, " s");
+    drawing.polyline(axes(believed), palette::kBlue, "stroke-width=\"0.8\"");
+    drawing.polyline(axes(real), palette::kVermilion, "stroke-width=\"1.8\"");
+    axes.top += kHeight + kGap;
   }
-  return svg + "</svg>\n";
+  return drawing.finish();
 }
 
 std::string samplesCsv(const LoopRecord &record)

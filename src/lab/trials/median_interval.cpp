@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace bole
 {
@@ -15,8 +14,8 @@ MedianInterval bootstrapMedian(std::vector<double> values, int resamples, std::u
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return std::isnan(v); }), values.end());
   MedianInterval interval;
   interval.count = values.size();
-  if (values.empty()) {
-    interval.median = interval.low = interval.high = std::numeric_limits<double>::quiet_NaN();
+  if (values.size() < 2) { // one run says nothing of the others
+    interval.median = values.empty() ? interval.median : values.front();
     return interval;
   }
   std::sort(values.begin(), values.end()); // the order of the runs must not matter

@@ -4,13 +4,15 @@
 /// How far a median over a few runs can be trusted.
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace bole
 {
 struct MedianInterval
 {
-  double median = 0, low = 0, high = 0; ///< 95 % interval; NaN without values
+  double median = std::numeric_limits<double>::quiet_NaN(); ///< NaN without values
+  double low = median, high = median;                       ///< 95 % interval; NaN with fewer than two values
   std::size_t count = 0;
 };
 
@@ -21,10 +23,10 @@ struct MedianInterval
 /// interval holds the true median in about 95 of 100; the same seed, the same interval.
 MedianInterval bootstrapMedian(std::vector<double> values, int resamples = 2000, std::uint64_t seed = 1);
 
-/// 95 % interval of a share of successes (Wilson).
+/// 95 % interval of a share of successes (Wilson); NaN without runs.
 struct ShareInterval
 {
-  double share = 0, low = 0, high = 1;
+  double share = std::numeric_limits<double>::quiet_NaN(), low = share, high = share;
 };
 ShareInterval wilson(int successes, int runs);
 } // namespace bole

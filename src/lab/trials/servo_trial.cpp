@@ -287,14 +287,18 @@ void judgeFault(ServoTrialResult &result)
 } // namespace
 
 ServoTrialResult::ServoTrialResult()
-    : bearing_rms_deg(kNaN),
+    : servoing_from_s(kNaN),
+      bearing_rms_deg(kNaN),
       distance_rms(kNaN),
       distance_mean(kNaN),
       ratio_rms(kNaN),
       turned_deg(kNaN),
+      least_clearance(kNaN),
       gap_width(kNaN),
       progress(kNaN),
       mean_speed(kNaN),
+      median_loop_ms(kNaN),
+      p95_loop_ms(kNaN),
       hover_after_s(kNaN),
       drift(kNaN)
 {
@@ -353,7 +357,8 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   if (result.record.is_contact)
     result.outcome = "touched a trunk";
   result.is_success = result.outcome.empty();
-  result.servoing_from_s = result.record.servoing_from_s;
+  if (result.record.servoing_from_s >= 0)
+    result.servoing_from_s = result.record.servoing_from_s;
   result.least_clearance = robot.leastClearance();
   result.median_loop_ms = result.record.medianLoop_ms();
   result.p95_loop_ms = result.record.percentile95Loop_ms();

@@ -31,17 +31,18 @@ struct ServoTrialResult
 {
   std::uint64_t seed = 0;
   bool is_success = false;
-  std::string outcome; ///< one line: why not, where it failed
-  double servoing_from_s = -1, duration_s = 0;
+  std::string outcome;    ///< one line: why not, where it failed
+  double servoing_from_s; ///< NaN where the task never found what it flies by
+  double duration_s = 0;
   double bearing_rms_deg, distance_rms; ///< hold, circle: true errors over the last 5 s; distance relative
   double distance_mean;                 ///< of the same: what does not average out
   double ratio_rms;                     ///< of r/d against the one asked for: the image's share of distance_rms
   double turned_deg;                    ///< circle: how far round
-  double least_clearance = 0;           ///< body's origin to bark [m]
+  double least_clearance;               ///< body's origin to bark [m]
   double gap_width;                     ///< gap: true free width of the one passed [m]
   bool is_other_gap = false;            ///< gap: not the one that the scenario has set up
   double progress, mean_speed;          ///< slalom [m], [m/s]
-  double median_loop_ms = 0, p95_loop_ms = 0;
+  double median_loop_ms, p95_loop_ms;
   double hover_after_s, drift; ///< fault: until it hovered [s]; how far it moved while it lasted [m]
   LoopRecord record;
 

@@ -31,6 +31,14 @@ TEST(BootstrapMedian, HoldsTheMedianAndHasNoWidthWhereAllAreEqual)
   EXPECT_EQ(bootstrapMedian({1, std::nan(""), 3}).count, 2u);
 }
 
+TEST(BootstrapMedian, OneRunHasNoInterval)
+{
+  const MedianInterval one = bootstrapMedian({3});
+  EXPECT_EQ(one.median, 3);
+  EXPECT_TRUE(std::isnan(one.low));
+  EXPECT_TRUE(std::isnan(one.high));
+}
+
 TEST(BootstrapMedian, TheOrderOfTheRunsDoesNotMatter)
 {
   const MedianInterval a = bootstrapMedian({5, 1, 4, 2, 3, 9}), b = bootstrapMedian({9, 3, 2, 4, 1, 5});
@@ -51,6 +59,13 @@ TEST(BootstrapMedian, HoldsTheTrueMedianInAbout95Of100Samples)
   }
   EXPECT_GT(holds, 400 * 0.91);
   EXPECT_LT(holds, 400 * 0.99);
+}
+
+TEST(Wilson, NothingIsKnownWithoutRuns) { EXPECT_TRUE(std::isnan(wilson(0, 0).share)); }
+
+TEST(ServoTrialResult, WhatWasNeverFoundWasFoundAtNoTime)
+{
+  EXPECT_TRUE(std::isnan(ServoTrialResult().servoing_from_s));
 }
 
 TEST(Wilson, AgreesWithThePublishedExample)

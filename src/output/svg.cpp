@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "output/svg.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace bole
+{
+namespace
+{
+constexpr const char *kGrid = "#dddddd";
+
+std::string pointsText(const SvgPoints &points)
+{
+  std::string text;
+  for (const auto &[x, y] : points)
+    text += fmt::format("{:.1f},{:.1f} ", x, y);
+  return text;
+}
+} // namespace
+
+std::string escaped(const std::string &text)
+{
+  std::string xml;
+  for (const char c : text)
+    xml += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return xml;
+}
+
+SvgDrawing::SvgDrawing(double width, double height)
+    : m_text(fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
+                         "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"sans-serif\" font-size=\"11\">\n"
+                         "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+                         width, height))
+{
+}
+
+void SvgDrawing::line(double x0, double y0, double x1, double y1, const char *colour, const std::string &style)
+{
+  m_text += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" {}/>\n", x0, y0,
+                        x1, y1, colour, style);
+}
+
+void SvgDrawing::polyline(const SvgPoints &points, const char *colour, const std::string &style)
+{
+  if (!points.empty())
+    m_text +=
+        fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" {}/>\n", pointsText(points), colour, style);
+}
+
+void SvgDrawing::polygon(const SvgPoints &points, const char *colour, const std::string &style)
+{
+  m_text += fmt::format("<polygon points=\"{}\" fill=\"{}\" {}/>\n", pointsText(points), colour, style);
+}
+
+void SvgDrawing::circle(double x, double y, double radius, const char *fill, const std::string &style)
+{
+  m_text +=
+      fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" {}/>\n", x, y, radius, fill, style);
+}
+
+void SvgDrawing::box(double x, double y, double width, double height, const char *fill)
+{
+  m_text += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.1f}\" fill=\"{}\"/>\n", x, y,
+                        width, height, fill);
+}
+
+void SvgDrawing::text(double x, double y, const std::string &text, const std::string &style)
+{
+  m_text += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#222\" {}>{}</text>\n", x, y, style, escaped(text));
+}
+
+double SvgAxes::x(double value) const { return left + width * (value - x_low) / (x_high - x_low); }
+
+double SvgAxes::y(double value) const
+{
+  const double v = std::clamp(value, y_low, y_high);
+  const double part = is_log ? std::log(v / y_low) / std::log(y_high / y_low) : (v - y_low) / (y_high - y_low);
+  return top + height * (1 - part);
+}
+
+SvgPoints SvgAxes::operator()(const SvgPoints &values) const
+{
+  SvgPoints points;
+  for (const auto &[u, v] : values)
+    points.emplace_back(x(u), y(v));
+  return points;
+}
+
+std::vector<double> ticksBetween(double low, double high)
+{
+  const double raw = std::max(high - low, 1e-9) / 5, base = std::pow(10, std::floor(std::log10(raw)));
+  const double step = base * (raw / base < 1.5 ? 1 : raw / base < 3.5 ? 2 : raw / base < 7.5 ? 5 : 10);
+  std::vector<double> ticks;
+  for (double v = std::ceil(low / step) * step; v <= high + 1e-9 * step; v += step)
+    ticks.push_back(std::abs(v) < 1e-9 * step ? 0 : v);
+  return ticks;
+}
+
+void SvgAxes::draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,
+                   const std::string &x_unit) const
+{
+  for (const double v : ticksBetween(x_low, x_high)) {
+    drawing.line(x(v), top, x(v), top + height, kGrid);
+    drawing.text(x(v), top + height + 15, fmt::format("{:.6g}{}", v, x_unit), "text-anchor=\"middle\"");
+  }
+  std::vector<double> ticks = ticksBetween(y_low, y_high);
+  if (is_log) {
+    ticks.clear();
+    for (double decade = std::pow(10, std::floor(std::log10(y_low))); decade <= y_high; decade *= 10)
+      for (const double part : {1.0, 3.0})
+        if (decade * part >= y_low && decade * part <= y_high * 1.000001)
+          ticks.push_back(decade * part);
+  }
+  for (const double v : ticks) {
+    drawing.line(left, y(v), left + width, y(v), v == 0 ? "#888888" : kGrid);
+    drawing.text(left - 6, y(v) + 4, fmt::format("{:.6g}", v), "text-anchor=\"end\"");
+  }
+  drawing.text(left, top - 6, y_name, "font-weight=\"bold\"");
+  if (!x_name.empty())
+    drawing.text(left + width / 2, top + height + 32, x_name, "text-anchor=\"middle\"");
+}
+} // namespace bole

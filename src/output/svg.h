@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Drawings and charts as SVG text: the one hand that all plots are drawn by.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace bole
+{
+using SvgPoints = std::vector<std::pair<double, double>>;
+
+/// \p text as it may stand in XML and HTML.
+std::string escaped(const std::string &text);
+
+/// Shapes on a white sheet. Coordinates [px], y down.
+class SvgDrawing
+{
+public:
+  SvgDrawing(double width, double height);
+
+  /// \p style: further attributes, such as `fill-opacity=".5"`.
+  void line(double x0, double y0, double x1, double y1, const char *colour, const std::string &style = {});
+  void polyline(const SvgPoints &points, const char *colour, const std::string &style = {});
+  void polygon(const SvgPoints &points, const char *colour, const std::string &style = {});
+  void circle(double x, double y, double radius, const char *fill, const std::string &style = {});
+  void box(double x, double y, double width, double height, const char *fill);
+  void text(double x, double y, const std::string &text, const std::string &style = {});
+  void add(const std::string &element) { m_text += element; }
+  std::string finish() const { return m_text + "</svg>\n"; }
+
+private:
+  std::string m_text;
+};
+
+/// The axes of a chart on a drawing: ticks at 1, 2 or 5 times a power of ten.
+struct SvgAxes
+{
+  double left = 60, top = 30, width = 600, height = 290; ///< of the field inside the axes [px]
+  double x_low = 0, x_high = 1, y_low = 0, y_high = 1;   ///< values
+  bool is_log = false;                                   ///< of y
+
+  double x(double value) const;
+  double y(double value) const; ///< values beyond the axes stand on them
+  SvgPoints operator()(const SvgPoints &values) const;
+  /// Grid, ticks, and the names of the axes; \p x_unit stands behind each number.
+  void draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,
+            const std::string &x_unit = {}) const;
+};
+
+/// Values of ticks between \p low and \p high, about five.
+std::vector<double> ticksBetween(double low, double high);
+} // namespace bole

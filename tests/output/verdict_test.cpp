@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What a run says of itself.
+#include "output/verdict.h"
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+
+using namespace bole;
+using testing::HasSubstr;
+
+namespace
+{
+RunSummary goodRun()
+{
+  RunSummary summary;
+  summary.input = "flight";
+  summary.frames[FrameStatus::ok] = 100;
+  summary.duration_s = 10;
+  summary.path_m = 8;
+  summary.extent_m = 7;
+  TrunkRecord trunk;
+  trunk.status = TrunkStatus::confirmed;
+  trunk.covariance.diagonal() << 0.0009, 0.0016, 0.0001, 1, 1;
+  summary.trunks = {trunk, TrunkRecord()};
+  return summary;
+}
+
+std::string textOf(const RunSummary &summary) { return toText(judge(summary)); }
+} // namespace
+
+TEST(Verdict, AGoodRunTellsItsFiguresAndDoubtsNothing)
+{
+  const Verdict verdict = judge(goodRun());
+  EXPECT_TRUE(verdict.is_trusted);
+  EXPECT_TRUE(verdict.doubts.empty());
+  EXPECT_THAT(toText(verdict), HasSubstr("path 8.00 m in 10.0 s; 100 frames, all ok"));
+  EXPECT_THAT(toText(verdict), HasSubstr("1 trunk, median sigma 0.050 m in place and 0.010 m in radius; 1 other"));
+}
+
+TEST(Verdict, TellsWhichFramesWereNotOkAndWhy)
+{
+  RunSummary summary = goodRun();
+  summary.frames[FrameStatus::corrupt] = 40;
+  summary.reasons[FrameStatus::corrupt] = "ends early";
+  EXPECT_THAT(textOf(summary), HasSubstr("100 of 140 frames ok, 40 corrupt (ends early)"));
+  EXPECT_THAT(textOf(summary), HasSubstr("Many frames could not be used"));
+  EXPECT_TRUE(judge(summary).is_trusted);
+}
+
+TEST(Verdict, NamesTheOptionThatWouldTellWhatIsGuessed)
+{
+  RunSummary summary = goodRun();
+  summary.reference.scale = ScaleSource::prior;
+  summary.reference.scale_sigma = 0.19;
+  summary.is_camera_known = false;
+  EXPECT_THAT(textOf(summary), HasSubstr("--camera-height"));
+  EXPECT_THAT(textOf(summary), HasSubstr("+- 19 %"));
+  EXPECT_THAT(textOf(summary), HasSubstr("--field-of-view"));
+}
+
+TEST(Verdict, ACameraThatOnlyRotatedIsNotTrustedAndHasNoLengths)
+{
+  RunSummary summary = goodRun();
+  summary.reference.has_ranges = false;
+  summary.rotated_deg = 40;
+  EXPECT_FALSE(judge(summary).is_trusted);
+  EXPECT_THAT(textOf(summary), testing::AllOf(HasSubstr("NOT TO BE TRUSTED"), HasSubstr("ONLY ROTATED, by 40 degrees"),
+                                              testing::Not(HasSubstr(" m in place"))));
+  const auto json = nlohmann::json::parse(toJson(summary));
+  EXPECT_EQ(json.at("trusted"), false);
+  EXPECT_TRUE(json.at("motion").at("path_m").is_null());
+  EXPECT_FALSE(json.at("trunks").contains("median_of_confirmed"));
+}
+
+TEST(Verdict, ACameraThatNeverMovedOrSawNothingIsNotTrusted)
+{
+  RunSummary still = goodRun();
+  still.extent_m = 0.02;
+  EXPECT_FALSE(judge(still).is_trusted);
+  EXPECT_THAT(textOf(still), HasSubstr("NEVER MOVED"));
+  RunSummary blind = goodRun();
+  blind.frames = {{FrameStatus::corrupt, 100}};
+  EXPECT_FALSE(judge(blind).is_trusted);
+  EXPECT_THAT(textOf(blind), HasSubstr("SAW NOTHING"));
+  RunSummary meadow = goodRun();
+  meadow.trunks.clear();
+  EXPECT_FALSE(judge(meadow).is_trusted);
+}
+
+TEST(Verdict, ARunThatFoundNothingHasNoMedianOfZero)
+{
+  RunSummary summary = goodRun();
+  summary.trunks = {TrunkRecord()};
+  EXPECT_THAT(textOf(summary), HasSubstr("0 trunks, median sigma - in place"));
+  EXPECT_THAT(textOf(summary), HasSubstr("No trunk was confirmed"));
+  const auto json = nlohmann::json::parse(toJson(summary));
+  EXPECT_TRUE(json.at("trunks").at("median_of_confirmed").at("radius_m").is_null());
+  EXPECT_TRUE(json.at("timing").at("median_frame_ms").is_null());
+}
+
+TEST(Summary, HoldsWhatTheRunCanBeRedoneWith)
+{
+  RunSummary summary = goodRun();
+  summary.command = {"bole", "track", "flight", "-o", "run"};
+  summary.options = "map:\n  lag: 0\n";
+  summary.digest = InputDigest{12, "abc"};
+  const auto json = nlohmann::json::parse(toJson(summary));
+  EXPECT_EQ(json.at("command").size(), 5u);
+  EXPECT_EQ(json.at("options"), summary.options);
+  EXPECT_EQ(json.at("input").at("bytes"), 12);
+  EXPECT_EQ(json.at("input").at("sha256"), "abc");
+  for (const char *part : {"bole", "commit", "visp", "opencv", "libav"})
+    EXPECT_FALSE(json.at("versions").at(part).get<std::string>().empty()) << part;
+}
+
+TEST(InputDigest, IsTheSha256OfAFile)
+{
+  const std::string path = testing::TempDir() + "bole_digest.txt";
+  std::ofstream(path) << "abc";
+  const auto digest = digestOf(path, std::atomic<bool>(false));
+  ASSERT_TRUE(digest);
+  EXPECT_EQ(digest->bytes, 3u);
+  EXPECT_EQ(digest->sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"); // FIPS 180-2, B.1
+}
+
+TEST(InputDigest, OfAFolderFollowsNamesAndContentAndThatOfNothingIsNone)
+{
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(testing::TempDir()) / "bole_digest";
+  fs::remove_all(folder);
+  fs::create_directories(folder / "sub");
+  std::ofstream(folder / "a") << "1";
+  std::ofstream(folder / "sub/b") << "23";
+  const std::atomic<bool> go(false), stop(true);
+  const auto first = digestOf(folder.string(), go);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->bytes, 3u);
+  EXPECT_EQ(digestOf(folder.string(), go)->sha256, first->sha256);
+  fs::rename(folder / "a", folder / "c");
+  EXPECT_NE(digestOf(folder.string(), go)->sha256, first->sha256);
+  EXPECT_EQ(digestOf((folder / "%05d.png").string(), go)->bytes, 1u + 2u);
+  EXPECT_FALSE(digestOf(folder.string(), stop));
+  EXPECT_FALSE(digestOf("ardrone://192.168.1.1", go));
+}

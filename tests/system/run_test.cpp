@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What is left of a run that does not go to its end, or is not worth much.
+#include "support/shell.h"
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+#include <visp3/io/vpImageIo.h>
+
+namespace
+{
+namespace fs = std::filesystem;
+using bole::test::Outcome;
+using testing::HasSubstr;
+const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
+
+Outcome run(const std::string &arguments, const std::string &before = "")
+{
+  return bole::test::runShell(before + BOLE_EXECUTABLE + " " + arguments);
+}
+
+std::string freshFolder(const std::string &name)
+{
+  const std::string folder = testing::TempDir() + "bole_run_" + name;
+  fs::remove_all(folder);
+  return folder;
+}
+
+nlohmann::json jsonOf(const std::string &path) { return nlohmann::json::parse(std::ifstream(path)); }
+
+std::string textOf(const std::string &path)
+{
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::size_t linesIn(const std::string &path)
+{
+  const std::string text = textOf(path);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+std::size_t hiddenFiles(const std::string &folder)
+{
+  std::size_t count = 0;
+  for (const auto &entry : fs::directory_iterator(folder))
+    count += entry.path().filename().string().front() == '.';
+  return count;
+}
+
+pid_t start(const std::string &folder)
+{
+  const pid_t child = fork();
+  if (child == 0) {
+    if (freopen("/dev/null", "w", stderr) && freopen("/dev/null", "w", stdout))
+      execl(BOLE_EXECUTABLE, "bole", "track", kFlight.c_str(), "-o", folder.c_str(), "--no-video", nullptr);
+    _exit(127);
+  }
+  return child;
+}
+
+class Interrupted : public testing::TestWithParam<int>
+{
+};
+
+TEST_P(Interrupted, KeepsWhatIsKnownAndReturns130)
+{
+  const std::string folder = freshFolder("signal" + std::to_string(GetParam()));
+  const pid_t child = start(folder);
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(300);
+  while (!fs::exists(folder + "/summary.json") && std::chrono::steady_clock::now() < give_up)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2)); // written first after 50 frames
+  kill(child, GetParam());
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  ASSERT_EQ(WEXITSTATUS(status), 130);
+  const auto summary = jsonOf(folder + "/summary.json");
+  EXPECT_EQ(summary.at("complete"), false);
+  EXPECT_THAT(summary.at("doubts").dump(), HasSubstr("interrupted"));
+  EXPECT_GE(linesIn(folder + "/trajectory.tum"), 50u);
+  EXPECT_TRUE(fs::exists(folder + "/trunks.csv"));
+  EXPECT_EQ(hiddenFiles(folder), 0u);
+}
+INSTANTIATE_TEST_SUITE_P(Signals, Interrupted, testing::Values(SIGINT, SIGTERM, SIGHUP, SIGPIPE));
+
+TEST(Run, AVideoThatCannotBeWrittenCostsNothingElse)
+{
+  const std::string folder = freshFolder("full");
+  // no file may grow beyond 256 kB (512 bytes a block): the video would, the rest does not
+  const Outcome outcome = run("track " + kFlight + " -o " + folder + " --frames 25", "ulimit -f 500; ");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("goes on without videos"));
+  EXPECT_FALSE(fs::exists(folder + "/overlay.mp4"));
+  EXPECT_EQ(linesIn(folder + "/trajectory.tum"), 26u);
+  EXPECT_EQ(jsonOf(folder + "/summary.json").at("complete"), true);
+  EXPECT_EQ(hiddenFiles(folder), 0u);
+}
+
+TEST(Run, ClearsWhatAKilledRunLeftHalfWritten)
+{
+  const std::string folder = freshFolder("partial");
+  fs::create_directories(folder);
+  std::ofstream(folder + "/.overlay.partial.mp4") << "half";
+  std::ofstream(folder + "/.hidden") << "somebody's";
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 5 --no-video").status, 0);
+  EXPECT_FALSE(fs::exists(folder + "/.overlay.partial.mp4"));
+  EXPECT_TRUE(fs::exists(folder + "/.hidden"));
+}
+
+TEST(Run, HoldsItsCommandItsOptionsAndItsInput)
+{
+  const std::string folder = freshFolder("redo");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 5 --no-video --quiet").text, "");
+  const auto summary = jsonOf(folder + "/summary.json");
+  EXPECT_EQ(summary.at("command").at(1), "track");
+  EXPECT_EQ(summary.at("input").at("sha256").get<std::string>().size(), 64u);
+  EXPECT_GT(summary.at("input").at("bytes"), 100000);
+  EXPECT_EQ(summary.at("options"), textOf(folder + "/options.yaml"));
+  EXPECT_THAT(textOf(folder + "/options.yaml"), HasSubstr("map:"));
+  // what the folder holds makes the same run again
+  const std::string again = freshFolder("again");
+  ASSERT_EQ(run("track " + kFlight + " -o " + again + " --frames 5 --no-video -q --config " + folder + "/options.yaml")
+                .status,
+            0);
+  EXPECT_EQ(textOf(again + "/trajectory.tum"), textOf(folder + "/trajectory.tum"));
+}
+
+TEST(Run, OfACameraThatNeverMovedSaysSoAndHasNoLengths)
+{
+  const std::string frames = freshFolder("still_frames"), folder = freshFolder("still");
+  fs::create_directories(frames);
+  vpImage<unsigned char> picture;
+  vpImageIo::read(picture, kFlight + "/mav0/cam0/data/0000000000000.png");
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 2);
+  for (int k = 0; k < 25; ++k) {
+    vpImage<unsigned char> noisy = picture;
+    for (unsigned int i = 0; i < noisy.getSize(); ++i)
+      noisy.bitmap[i] = static_cast<unsigned char>(std::clamp(noisy.bitmap[i] + noise(random), 0.0, 255.0));
+    vpImageIo::write(noisy, frames + "/" + std::to_string(1000 + k) + ".png");
+  }
+  const Outcome outcome = run("track " + frames + " -o " + folder + " --no-video");
+  EXPECT_EQ(outcome.status, 3) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("THE CAMERA NEVER MOVED"));
+  EXPECT_EQ(jsonOf(folder + "/summary.json").at("trusted"), false);
+  EXPECT_EQ(linesIn(folder + "/trunks.csv"), 2u); // names and units
+  EXPECT_TRUE(fs::exists(folder + "/bearings.csv"));
+}
+
+TEST(Run, IntoAFolderThatAnotherRunWritesToIsRefused)
+{
+  const std::string folder = freshFolder("twice");
+  const pid_t child = start(folder);
+  while (!fs::exists(folder + "/summary.json") && waitpid(child, nullptr, WNOHANG) == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  const Outcome second = run("track " + kFlight + " -o " + folder + " --frames 5 --no-video");
+  EXPECT_EQ(second.status, 1);
+  EXPECT_THAT(second.text, HasSubstr("another run writes into this folder"));
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+}
+
+TEST(Command, AloneListsTheCommands)
+{
+  const Outcome outcome = run("");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.text, testing::AllOf(HasSubstr("track"), HasSubstr("evaluate"), HasSubstr("Exit status")));
+}
+
+TEST(Command, SuggestsTheNearestOfWhatItDoesNotKnow)
+{
+  const Outcome command = run("trakc x -o y"), option = run("track x -o y --no-vidoe"),
+                preset = run("track x -o y --config papre");
+  EXPECT_EQ(command.status, 2);
+  EXPECT_THAT(command.text, HasSubstr("trakc: no such command, did you mean track?"));
+  EXPECT_EQ(option.status, 2);
+  EXPECT_THAT(option.text, HasSubstr("--no-vidoe: no such option, did you mean --no-video?"));
+  EXPECT_EQ(preset.status, 1);
+  EXPECT_THAT(preset.text, HasSubstr("did you mean paper?"));
+}
+
+TEST(Command, FindsItsPresetsFromAnyFolder)
+{
+  const std::string folder = freshFolder("preset");
+  const Outcome outcome =
+      run("track " + kFlight + " -o " + folder + " --frames 3 --no-video --config paper", "cd / && ");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_EQ(jsonOf(folder + "/summary.json").at("preset"), "paper");
+}
+} // namespace
