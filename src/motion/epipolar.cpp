@@ -67,7 +67,9 @@ double bulkSigma(std::vector<double> residuals)
   for (double &r : residuals) {
     r = std::abs(r);
   }
-  double sigma = 1.4826 * medianOf(residuals);
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  double sigma = 1.4826 * *middle;
   for (int round = 0; round < 3; ++round) {
     double sum = 0;
     int n = 0;
