@@ -83,8 +83,8 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
     m_picture.odometry.push_back({frame.stamp_ns, *frame.wMb_odometry});
   if (frame.wMb_truth)
     m_picture.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
-  m_in_view = static_cast<std::size_t>(
-      std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
+  m_in_view =
+      static_cast<std::size_t>(std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
         return trunk.is_tracked && trunk.status == TrunkStatus::confirmed;
       }));
   const bool has_image =

@@ -17,6 +17,11 @@ Cylinder operator*(const Pose &aMb, const Cylinder &b)
   return a;
 }
 
+Cylinder cylinderOf(const Trunk &trunk, double foot_z, double top_z, const std::string &name)
+{
+  return {trunk.axisAt(foot_z), trunk.axisAt(top_z), trunk.radius(), name};
+}
+
 RelativeTrunk relativeTrunk(const Cylinder &c)
 {
   const Vector3d axis = c.axis();

@@ -28,6 +28,10 @@ struct Cylinder
 /// The cylinder \p b, given in frame b, in frame a.
 Cylinder operator*(const Pose &aMb, const Cylinder &b);
 
+/// The part of the trunk \p trunk between the heights \p foot_z and \p top_z [m] of the world: one cylinder of a `.cao`
+/// model in the world frame.
+Cylinder cylinderOf(const Trunk &trunk, double foot_z, double top_z, const std::string &name = "");
+
 /// Relative trunk of the cylinder \p c given in the camera frame. Not isFinite() when the camera centre is
 /// inside the (endless) cylinder or on its axis.
 ///

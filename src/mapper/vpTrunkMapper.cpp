@@ -92,12 +92,12 @@ public:
   FrameStatus m_status = FrameStatus::missing;
   std::string m_message = "no image was tracked yet";
   Pose m_wMb;
-  std::vector<TrackedTrunk> m_trunks; ///< of the last frame
+  std::vector<TrunkInView> m_trunks; ///< of the last frame
 
 private:
   void start(const vpImage<unsigned char> &I);
   template <typename Pixel>
-  void displayBorder(const vpImage<Pixel> &I, const TrackedTrunk &trunk, Border border, const vpColor &color,
+  void displayBorder(const vpImage<Pixel> &I, const TrunkInView &trunk, Border border, const vpColor &color,
                      unsigned int thickness) const;
 };
 
@@ -127,21 +127,23 @@ void vpTrunkMapper::Impl::track(const vpImage<unsigned char> &I, double stamp_s,
   m_builder->build(std::llround(stamp_s * 1e9), std::move(file), frame);
   frame.wMb_odometry = wMb;
   frame.gyro = gyro;
-  m_status = frame.status;
   m_message = frame.message;
-  const FrameResult result = m_pipeline->process(frame);
-  m_wMb = result.wMb;
-  m_trunks = result.trunks;
+  const FrameReport report = m_pipeline->process(frame);
+  m_status = report.frame_status;
+  if (!report.reason.empty())
+    m_message = report.reason;
+  m_wMb = report.wMb;
+  m_trunks = report.trunks;
 }
 
 template <typename Pixel>
-void vpTrunkMapper::Impl::displayBorder(const vpImage<Pixel> &I, const TrackedTrunk &trunk, Border border,
+void vpTrunkMapper::Impl::displayBorder(const vpImage<Pixel> &I, const TrunkInView &trunk, Border border,
                                         const vpColor &color, unsigned int thickness) const
 {
   constexpr int kSteps = 12;
   std::optional<vpImagePoint> last;
   for (int k = 0; k <= kSteps; ++k) {
-    const double elevation = trunk.range.low + (trunk.range.high - trunk.range.low) * k / kSteps;
+    const double elevation = trunk.tan_low + (trunk.tan_high - trunk.tan_low) * k / kSteps;
     const Eigen::Vector3d ray = trunk.relative.borderDirection(border, elevation);
     std::optional<vpImagePoint> point;
     if (ray.z() > 0.05) {
@@ -159,15 +161,14 @@ void vpTrunkMapper::Impl::displayBorder(const vpImage<Pixel> &I, const TrackedTr
 template <typename Pixel>
 void vpTrunkMapper::Impl::display(const vpImage<Pixel> &I, const vpColor &color, unsigned int thickness) const
 {
-  for (const TrackedTrunk &trunk : m_trunks) {
-    if (trunk.status != TrackingStatus::tracked || trunk.map_status == TrunkStatus::merged ||
-        !trunk.relative.isFinite())
+  for (const TrunkInView &trunk : m_trunks) {
+    if (!trunk.is_tracked || !trunk.relative.isFinite())
       continue;
-    const bool is_confirmed = trunk.map_status == TrunkStatus::confirmed;
+    const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
     const vpColor &own = color == vpColor::none ? colorOf(trunk.id) : color;
     for (const Border border : {Border::left, Border::right})
       displayBorder(I, trunk, border, own, is_confirmed ? thickness : 1);
-    const Eigen::Vector3d ray = trunk.relative.borderDirection(Border::right, trunk.range.low);
+    const Eigen::Vector3d ray = trunk.relative.borderDirection(Border::right, trunk.tan_low);
     if (!is_confirmed || ray.z() < 0.05)
       continue;
     vpImagePoint at;

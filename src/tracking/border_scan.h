@@ -7,23 +7,14 @@
 /// mean gradient is scanned over the prediction's uncertainty and the pair of maxima (left, right) is chosen that
 /// best fits strength, prediction and the signed contrast that the border had in the frames before.
 
-#include "gradient/border_line.h"
-
-#include <optional>
-#include <vector>
+#include "tracking/border_profile.h"
 
 namespace bole
 {
-struct ScanPeak
-{
-  double offset_px = 0; ///< sideways from the predicted line, positive to the right, sub-pixel
-  double contrast = 0;  ///< signed mean gradient there [full scale/px]
-};
-
 /// Local maxima of abs(mean gradient) with the line moved by up to +-\p half_width_px, strongest first, at most
-/// \p most. Half a pixel apart, refined by a parabola.
-std::vector<ScanPeak> scanBorder(const vpImage<float> &g, const BorderLine &line, double half_width_px,
-                                 double contrast_min, std::size_t most = 6);
+/// \p most. The profile has a step of half a pixel, full scale a pixel; peaks are refined by a parabola.
+std::vector<BorderPeak> scanBorder(const vpImage<float> &g, const BorderLine &line, double half_width_px,
+                                   double contrast_min, std::size_t most = 6);
 
 struct PairPrior
 {
@@ -32,10 +23,10 @@ struct PairPrior
 };
 struct PeakPair
 {
-  ScanPeak left, right;
+  BorderPeak left, right;
   double cost = 0; ///< negative log-likelihood up to a constant
 };
 /// The best (left, right) pairs, lowest cost first, at most \p most. With an empty side the other stands alone.
-std::vector<PeakPair> pairPeaks(const std::vector<ScanPeak> &left, const std::vector<ScanPeak> &right,
+std::vector<PeakPair> pairPeaks(const std::vector<BorderPeak> &left, const std::vector<BorderPeak> &right,
                                 const PairPrior &prior, std::size_t most = 3);
 } // namespace bole

@@ -69,16 +69,16 @@ bool minimise(Problem &problem, double bound_px, Vector4d &xi)
   return (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && xi.allFinite() && std::isfinite(e);
 }
 
-struct VisibleBorder
+struct SeenBorder
 {
   BorderLine line;
   Eigen::Matrix<double, 1, 4> J_mid = Eigen::Matrix<double, 1, 4>::Zero(); ///< sideways move of its middle by theta^r
   bool visible = false;
 };
 
-VisibleBorder look(const PinholeCamera &camera, const TrackingPrediction &prediction, Border border, int rows_min)
+SeenBorder look(const PinholeCamera &camera, const TrackingPrediction &prediction, Border border, int rows_min)
 {
-  VisibleBorder seen;
+  SeenBorder seen;
   seen.line = borderLine(camera, prediction.relative, border, prediction.range);
   const bool hidden = border == Border::left ? prediction.left_hidden : prediction.right_hidden;
   seen.visible = !hidden && seen.line.rows() >= rows_min;
@@ -89,7 +89,7 @@ VisibleBorder look(const PinholeCamera &camera, const TrackingPrediction &predic
 
 /// The relative trunk whose borders lie where the pair was found: bearing and r/d from two borders, the bearing
 /// alone from one.
-RelativeTrunk startFrom(const PeakPair &pair, const VisibleBorder &left, const VisibleBorder &right,
+RelativeTrunk startFrom(const PeakPair &pair, const SeenBorder &left, const SeenBorder &right,
                         const RelativeTrunk &predicted)
 {
   Vector4d step = Vector4d::Zero();
@@ -104,7 +104,7 @@ RelativeTrunk startFrom(const PeakPair &pair, const VisibleBorder &left, const V
   return predicted.plus(step);
 }
 
-Eigen::Matrix2d offsetCovariance(const VisibleBorder &left, const VisibleBorder &right, const Matrix4d &covariance)
+Eigen::Matrix2d offsetCovariance(const SeenBorder &left, const SeenBorder &right, const Matrix4d &covariance)
 {
   Eigen::Matrix<double, 2, 4> J;
   J << left.J_mid, right.J_mid;
@@ -170,8 +170,8 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   };
   if (!prediction.relative.isFinite() || !prediction.covariance.allFinite())
     return finish(TrackingStatus::not_visible);
-  const VisibleBorder left = look(camera, prediction, Border::left, options.rows_min);
-  const VisibleBorder right = look(camera, prediction, Border::right, options.rows_min);
+  const SeenBorder left = look(camera, prediction, Border::left, options.rows_min);
+  const SeenBorder right = look(camera, prediction, Border::right, options.rows_min);
   if (!left.visible && !right.visible)
     return finish(prediction.left_hidden || prediction.right_hidden ? TrackingStatus::occluded
                                                                     : TrackingStatus::not_visible);
@@ -181,11 +181,11 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   PeakPair pair;
   if (options.scan) {
     const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance);
-    const auto scan = [&](const VisibleBorder &border, double variance) {
+    const auto scan = [&](const SeenBorder &border, double variance) {
       const double width =
           std::clamp(options.scan_sigmas * std::sqrt(variance), options.scan_min_px, options.scan_max_px);
       return border.visible ? scanBorder(gradient.signed_x, border.line, width, options.contrast_min)
-                            : std::vector<ScanPeak>();
+                            : std::vector<BorderPeak>();
     };
     const auto left_peaks = scan(left, S(0, 0)), right_peaks = scan(right, S(1, 1));
     if ((left.visible && left_peaks.empty()) || (right.visible && right_peaks.empty()))

@@ -4,12 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace
 {
@@ -43,6 +45,21 @@ constexpr const char *kProgram = "#include <bole/open_source.h>\n"
                                  "{\n"
                                  "  return count > 1 && bole::openSource(arguments[1])->camera().width > 0 ? 0 : 1;\n"
                                  "}\n";
+
+/// The images of the demonstration flight as flight0000.png and so on: ViSP's reader takes no names of 13 digits.
+void numberTheDemonstrationFlight(const fs::path &folder)
+{
+  fs::create_directories(folder);
+  std::vector<fs::path> images;
+  for (const auto &entry : fs::directory_iterator(BOLE_SOURCE_DIR "/data/park-forward/mav0/cam0/data"))
+    images.push_back(entry.path());
+  std::sort(images.begin(), images.end());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    std::string number = std::to_string(i);
+    number.insert(0, 4 - number.size(), '0');
+    fs::create_symlink(images[i], folder / ("flight" + number + ".png"));
+  }
+}
 
 /// This build, installed once for all tests.
 class Install : public testing::Test
@@ -93,11 +110,13 @@ TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
   const bool has_display = display != nullptr && *display != '\0';
   if (!has_display && bole::test::runShell("command -v xvfb-run").status != 0)
     GTEST_SKIP() << "neither a display nor xvfb-run: the program was built and not run";
-  const Outcome ran = bole::test::runShell("cd " + (s_prefix / "share/bole").string() + " && " +
-                                           (has_display ? "" : "xvfb-run -a ") + (build / "outside").string());
+  const fs::path flight = s_folder / "flight";
+  numberTheDemonstrationFlight(flight);
+  const Outcome ran = bole::test::runShell("cd " + flight.string() + " && " + (has_display ? "" : "xvfb-run -a ") +
+                                           (build / "outside").string());
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_THAT(ran.text, HasSubstr(" m, radius "));
-  EXPECT_TRUE(fs::exists(s_prefix / "share/bole/map.cao"));
+  EXPECT_TRUE(fs::exists(flight / "map.cao"));
 }
 
 TEST_F(Install, ABuildTreeIsFoundAsAnInstallationIs)
