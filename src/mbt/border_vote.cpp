@@ -10,70 +10,79 @@
 namespace bole
 {
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
+using Eigen::Vector3d;
 
 namespace
 {
-float at(const std::vector<float> &response, double offset)
+constexpr double kWeight = 2;    ///< log-likelihood of a full response against none
+constexpr double kStep_px = 1.5; ///< of the grid, at the border that moves most
+constexpr double kSigmas = 3;    ///< half-width of the grid
+constexpr double kMaxPoses = 6000;
+
+struct Axis
 {
-  const int half = int(response.size()) / 2, k = int(std::lround(offset)) + half;
-  return k < 0 || k >= int(response.size()) ? 0.f : response[std::size_t(k)];
+  int half = 0;
+  double step = 0; ///< [standard deviations]
+};
+
+/// A grid over the modes, coarsened along its widest axis until it has at most kMaxPoses points.
+std::array<Axis, 3> gridFor(const MatrixXd &moves)
+{
+  std::array<Axis, 3> axes;
+  for (int i = 0; i < moves.cols(); ++i) {
+    axes[std::size_t(i)].step = std::max(kStep_px / std::max(moves.col(i).cwiseAbs().maxCoeff(), 1e-9), 0.25);
+    axes[std::size_t(i)].half = int(kSigmas / axes[std::size_t(i)].step);
+  }
+  const auto points = [&] { return (2. * axes[0].half + 1) * (2. * axes[1].half + 1) * (2. * axes[2].half + 1); };
+  while (points() > kMaxPoses) {
+    Axis &widest =
+        *std::max_element(axes.begin(), axes.end(), [](const Axis &a, const Axis &b) { return a.half < b.half; });
+    widest.step *= 1.5;
+    widest.half = int(kSigmas / widest.step);
+  }
+  return axes;
 }
 } // namespace
 
-Vote vote(const std::vector<BallotBorder> &borders, const Matrix6d &covariance, const VoteOptions &options)
+Vote vote(const std::vector<BallotBorder> &borders, const Matrix6d &covariance)
 {
   Vote best;
   if (borders.empty())
     return best;
+  const int n = int(borders.size());
   const Matrix6d root = Eigen::LLT<Matrix6d>(covariance).matrixL();
-  MatrixXd M(int(borders.size()), 6);
-  for (int b = 0; b < M.rows(); ++b)
+  MatrixXd M(n, 6);
+  for (int b = 0; b < n; ++b)
     M.row(b) = borders[std::size_t(b)].offset_by_twist * root;
-  const Eigen::JacobiSVD<MatrixXd> svd(M, Eigen::ComputeThinV);
-  const int modes = std::min<int>(3, int(svd.matrixV().cols()));
-  const MatrixXd V = svd.matrixV().leftCols(modes), moves = M * V;
-
-  std::array<int, 3> half{{0, 0, 0}};
-  std::array<double, 3> step{{0, 0, 0}};
-  double poses = 1;
-  for (int i = 0; i < modes; ++i) {
-    const double most = moves.col(i).cwiseAbs().maxCoeff();
-    step[std::size_t(i)] = std::max(options.step_px / std::max(most, 1e-9), 0.25);
-    half[std::size_t(i)] = int(options.sigmas / step[std::size_t(i)]);
-    poses *= 2 * half[std::size_t(i)] + 1;
-  }
-  while (poses > options.max_poses) { // coarsen the widest
-    const std::size_t widest = std::size_t(std::max_element(half.begin(), half.end()) - half.begin());
-    poses /= 2 * half[widest] + 1;
-    step[widest] *= 1.5;
-    half[widest] = int(options.sigmas / step[widest]);
-    poses *= 2 * half[widest] + 1;
-  }
+  // the directions that move the borders most: the greatest eigenvectors of M^T M
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(Matrix6d(M.transpose() * M));
+  const Eigen::Matrix<double, 6, 3> V = eigen.eigenvectors().rightCols<3>().rowwise().reverse();
+  const Eigen::Matrix<double, Eigen::Dynamic, 3> moves = M * V;
+  const std::array<Axis, 3> axes = gridFor(moves);
 
   double best_value = -1e300;
-  Eigen::Vector3d best_z = Eigen::Vector3d::Zero();
-  const auto value = [&](const Eigen::Vector3d &z, double &hits) {
-    const VectorXd offsets = moves * z.head(modes);
-    float sum = 0;
-    for (int b = 0; b < offsets.size(); ++b)
-      sum += at(borders[std::size_t(b)].response, offsets(b));
-    hits = double(sum);
-    return options.weight * hits - 0.5 * z.squaredNorm();
-  };
-  for (int i = -half[0]; i <= half[0]; ++i)
-    for (int j = -half[1]; j <= half[1]; ++j)
-      for (int k = -half[2]; k <= half[2]; ++k) {
-        const Eigen::Vector3d z(i * step[0], j * step[1], k * step[2]);
-        double hits = 0;
-        const double v = value(z, hits);
-        if (v > best_value) {
-          best_value = v;
-          best_z = z;
-          best.score = hits / double(borders.size());
+  Vector3d best_z = Vector3d::Zero();
+  Eigen::VectorXd base(n);
+  for (int i = -axes[0].half; i <= axes[0].half; ++i)
+    for (int j = -axes[1].half; j <= axes[1].half; ++j) {
+      for (int b = 0; b < n; ++b) // 0.5: to round by cutting off
+        base(b) = i * axes[0].step * moves(b, 0) + j * axes[1].step * moves(b, 1) +
+                  double(borders[std::size_t(b)].response.size() / 2) + 0.5;
+      for (int k = -axes[2].half; k <= axes[2].half; ++k) {
+        const Vector3d z(i * axes[0].step, j * axes[1].step, k * axes[2].step);
+        float hits = 0;
+        for (int b = 0; b < n; ++b) {
+          const std::vector<float> &response = borders[std::size_t(b)].response;
+          const double at = base(b) + z.z() * moves(b, 2);
+          if (at >= 0 && at < double(response.size()))
+            hits += response[std::size_t(at)];
         }
+        const double value = kWeight * double(hits) - 0.5 * z.squaredNorm();
+        if (value > best_value)
+          best_value = value, best_z = z, best.score = double(hits) / n;
       }
-  best.twist = root * (V * best_z.head(modes));
+    }
+  best.twist = root * (V * best_z);
   return best;
 }
 } // namespace bole

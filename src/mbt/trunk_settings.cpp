@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "mbt/trunk_settings.h"
 
+#include "geometry/require_range.h"
+
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <visp3/core/vpException.h>
 #include <visp3/core/vpMath.h>
@@ -127,41 +129,26 @@ double number(const XmlText &xml, const std::string &key, const Leaf &leaf)
   return value;
 }
 
-using Setter = std::function<void(vpMbTrunkTracker::Options &, double)>;
+using Options = vpMbTrunkTracker::Options;
 
-const std::map<std::string, Setter> &trunkKeys()
+/// An option of `trunk`: its key and its range.
+struct OptionKey
 {
-  using O = vpMbTrunkTracker::Options;
-  static const std::map<std::string, Setter> keys = {
-      {"pieces", [](O &o, double v) { o.trunk.pieces = int(v); }},
-      {"samples", [](O &o, double v) { o.trunk.samples = int(v); }},
-      {"margin_px", [](O &o, double v) { o.trunk.margin_px = v; }},
-      {"min_length_px", [](O &o, double v) { o.trunk.min_length_px = v; }},
-      {"min_width_px", [](O &o, double v) { o.trunk.min_width_px = v; }},
-      {"min_contrast", [](O &o, double v) { o.trunk.min_contrast = v; }},
-      {"border_sigma_px", [](O &o, double v) { o.border_sigma_px = v; }},
-      {"lean_sigma_rad", [](O &o, double v) { o.lean_sigma_rad = v; }},
-      {"radius_sigma", [](O &o, double v) { o.radius_sigma = v; }},
-      {"scan_min_px", [](O &o, double v) { o.scan_min_px = v; }},
-      {"scan_max_px", [](O &o, double v) { o.scan_max_px = v; }},
-      {"refine_px", [](O &o, double v) { o.refine_px = v; }},
-      {"refinements", [](O &o, double v) { o.refinements = int(v); }},
-      {"step_sigma_m", [](O &o, double v) { o.step_sigma_m = v; }},
-      {"climb_sigma_m", [](O &o, double v) { o.climb_sigma_m = v; }},
-      {"turn_sigma_rad", [](O &o, double v) { o.turn_sigma_rad = v; }},
-      {"accel_sigma_m", [](O &o, double v) { o.accel_sigma_m = v; }},
-      {"memory_rate", [](O &o, double v) { o.memory_rate = v; }},
-      {"min_support", [](O &o, double v) { o.min_support = v; }},
-      {"min_agreement", [](O &o, double v) { o.min_agreement = v; }},
-      {"max_jump", [](O &o, double v) { o.max_jump = v; }},
-      {"max_sigma_m", [](O &o, double v) { o.max_sigma_m = v; }},
-      {"max_sigma_rad", [](O &o, double v) { o.max_sigma_rad = v; }},
-      {"unobserved_m", [](O &o, double v) { o.unobserved_m = v; }},
-      {"lever_m", [](O &o, double v) { o.lever_m = v; }},
-      {"detect_frozen", [](O &o, double v) { o.health.detect_frozen = v != 0; }},
-  };
-  return keys;
-}
+  const char *name;
+  double Options::*member;
+  double low, high;
+};
+
+constexpr OptionKey kOptions[] = {
+    {"border_sigma_px", &Options::border_sigma_px, 0.1, 20}, {"lean_sigma_rad", &Options::lean_sigma_rad, 1e-4, 0.5},
+    {"radius_sigma", &Options::radius_sigma, 1e-3, 1},       {"min_length_px", &Options::min_length_px, 4, 1000},
+    {"min_width_px", &Options::min_width_px, 1, 100},        {"min_contrast", &Options::min_contrast, 0, 50},
+    {"scan_max_px", &Options::scan_max_px, 8, 100},          {"step_sigma_m", &Options::step_sigma_m, 1e-3, 10},
+    {"turn_sigma_rad", &Options::turn_sigma_rad, 1e-4, 1},   {"min_support", &Options::min_support, 0.05, 1},
+    {"max_sigma_m", &Options::max_sigma_m, 1e-3, 100},       {"max_sigma_rad", &Options::max_sigma_rad, 1e-3, 3.2},
+    {"unobserved_m", &Options::unobserved_m, 0.01, 10},      {"lever_m", &Options::lever_m, 0.1, 100},
+    {"detect_frozen", &Options::detect_frozen, 0, 1},
+};
 
 void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf> &leaves, TrunkSettings &settings)
 {
@@ -169,12 +156,13 @@ void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf>
   for (auto it = leaves.lower_bound(section); it != leaves.end() && it->first.compare(0, section.size(), section) == 0;
        ++it) {
     const std::string key = it->first.substr(section.size());
-    const auto setter = trunkKeys().find(key);
-    if (setter == trunkKeys().end())
+    const auto option = std::find_if(std::begin(kOptions), std::end(kOptions),
+                                     [&](const OptionKey &known) { return key == known.name; });
+    if (option == std::end(kOptions))
       xml.fail(it->second.line, fmt::format("trunk/{}: no such key", key));
     if (leaves.count(it->first) > 1)
       xml.fail(it->second.line, fmt::format("trunk/{}: given twice", key));
-    setter->second(settings.options, number(xml, key, it->second));
+    settings.options.*option->member = number(xml, key, it->second);
     try {
       settings.options.validate();
     }
@@ -218,3 +206,9 @@ TrunkSettings readTrunkSettings(const std::string &path, const vpMbTrunkTracker:
   return settings;
 }
 } // namespace bole
+
+void vpMbTrunkTracker::Options::validate() const
+{
+  for (const bole::OptionKey &option : bole::kOptions)
+    bole::requireRange(option.name, this->*option.member, option.low, option.high);
+}

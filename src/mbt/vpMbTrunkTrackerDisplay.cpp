@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What vpMbTrunkTracker shows, and how well its model lies on the image.
-#include "tracking/borders.h"
-
-#include <bole/vpMbTrunkTracker.h>
+#include "mbt/trunk_tracker_impl.h"
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <visp3/core/vpDisplay.h>
-
-using bole::Border;
-using bole::kBorders;
 
 namespace
 {
@@ -22,26 +18,33 @@ void draw(const Image &I, const std::vector<std::vector<double>> &lines,
   for (const auto &f : features)
     vpDisplay::displayCross(I, vpImagePoint(f[1], f[2]), 5, f[3] > 0 ? vpColor::red : vpColor::green, 1);
 }
+
+/// Angle [degrees] between the edge of the image at \p p and the direction \p along; 90 where there is no edge.
+double edgeAngle(const vpImage<unsigned char> &I, const Eigen::Vector2i &p, const Eigen::Vector2d &along)
+{
+  const auto grey = [&](int du, int dv) { return double(I[unsigned(p.y() + dv)][unsigned(p.x() + du)]); };
+  const Eigen::Vector2d g(grey(1, -1) + 2 * grey(1, 0) + grey(1, 1) - grey(-1, -1) - 2 * grey(-1, 0) - grey(-1, 1),
+                          grey(-1, 1) + 2 * grey(0, 1) + grey(1, 1) - grey(-1, -1) - 2 * grey(0, -1) - grey(1, -1));
+  const double norm = g.norm();
+  return norm > 0 ? std::asin(std::min(1.0, std::abs(g.dot(along)) / norm)) * 180 / M_PI : 90;
+}
 } // namespace
 
-void vpMbTrunkTracker::drawBorders(const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam, unsigned int width,
-                                   unsigned int height, bool all, std::vector<std::vector<double>> &lines) const
+void vpMbTrunkTracker::Impl::add(const bole::Cylinder &trunk)
 {
-  vpMbtDistanceTrunk::Options options = m_options.trunk;
-  options.margin_px = 0;
-  if (all)
-    options.min_length_px = 4, options.min_width_px = 1;
-  for (const vpMbtDistanceTrunk &own : m_trunks) {
-    vpMbtDistanceTrunk trunk(options);
-    trunk.buildFrom(own.object());
-    trunk.setCameraParameters(cam);
-    trunk.predict(cMo, width, height);
-    for (Border side : kBorders)
-      if (trunk.border(side).visible) {
-        const bole::VisibleBorder &line = trunk.border(side).line;
-        lines.push_back({0, line.foot_px.y(), line.foot_px.x(), line.top_px.y(), line.top_px.x()});
-      }
-  }
+  if (!(trunk.radius > 0))
+    throw vpException(vpException::badValue, fmt::format("radius = {}, must be above 0", trunk.radius));
+  if (!((trunk.top - trunk.foot).norm() > 1e-6))
+    throw vpException(vpException::badValue, "the two points of the axis of a trunk must differ");
+  estimator.trunks.emplace_back(trunk);
+}
+
+vpColVector vpMbTrunkTracker::Impl::collected(double bole::FoundPiece::*member) const
+{
+  std::vector<double> values;
+  estimator.forEachPiece(
+      [&](const bole::FoundPiece &piece, const bole::ModelBorder &) { values.push_back(piece.*member); });
+  return vpColVector(values);
 }
 
 std::vector<std::vector<double>> vpMbTrunkTracker::getModelForDisplay(unsigned int width, unsigned int height,
@@ -49,26 +52,30 @@ std::vector<std::vector<double>> vpMbTrunkTracker::getModelForDisplay(unsigned i
                                                                       const vpCameraParameters &cam,
                                                                       bool displayFullModel)
 {
+  Options options = getOptions();
+  if (displayFullModel)
+    options.min_length_px = 4, options.min_width_px = 1;
+  const bole::PinholeCamera camera = bole::PinholeCamera::fromVisp(cam, int(width), int(height));
   std::vector<std::vector<double>> lines;
-  drawBorders(cMo, cam, width, height, displayFullModel, lines);
+  for (bole::ModelTrunk trunk : m_impl->estimator.trunks) {
+    trunk.predict(bole::Pose::fromVisp(cMo), camera, options, 0);
+    for (const bole::ModelBorder &border : trunk.borders())
+      if (border.visible) {
+        const bole::BorderLine &line = border.image.line;
+        const Eigen::Vector2d a = border.image.at(line.row_begin), b = border.image.at(line.row_end - 1);
+        lines.push_back({0, a.y(), a.x(), b.y(), b.x()});
+      }
+  }
   return lines;
 }
 
 std::vector<std::vector<double>> vpMbTrunkTracker::getFeaturesForDisplay()
 {
   std::vector<std::vector<double>> features;
-  unsigned int at = 0;
-  for (std::size_t k : m_in_view)
-    for (Border side : kBorders) {
-      const auto &state = m_trunks[k].border(side);
-      if (!state.visible)
-        continue;
-      for (const auto &piece : state.pieces)
-        if (piece.used) {
-          features.push_back({0, piece.found_px.y(), piece.found_px.x(), m_w[at] > 0.3 ? 0.0 : 3.0});
-          ++at;
-        }
-    }
+  m_impl->estimator.forEachPiece([&](const bole::FoundPiece &piece, const bole::ModelBorder &) {
+    features.push_back({0, m_cam.get_py() * piece.m.y() + m_cam.get_v0(), m_cam.get_px() * piece.m.x() + m_cam.get_u0(),
+                        piece.robust > 0.3 ? 0.0 : 3.0});
+  });
   return features;
 }
 
@@ -90,24 +97,15 @@ void vpMbTrunkTracker::display(const vpImage<vpRGBa> &I, const vpHomogeneousMatr
 double vpMbTrunkTracker::computeCurrentProjectionError(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cMo,
                                                        const vpCameraParameters &cam)
 {
-  std::vector<std::vector<double>> lines;
-  drawBorders(cMo, cam, I.getWidth(), I.getHeight(), false, lines);
   double sum = 0;
   int n = 0;
-  for (const auto &l : lines) {
-    const Eigen::Vector2d foot(l[2], l[1]), top(l[4], l[3]);
-    const Eigen::Vector2d along = (top - foot).normalized();
-    const int length = int((top - foot).norm());
-    for (int k = 0; k < length; k += 2) {
-      const Eigen::Vector2d p = foot + k * along;
-      const int u = int(std::lround(p.x())), v = int(std::lround(p.y()));
-      if (u < 1 || v < 1 || u + 1 >= int(I.getWidth()) || v + 1 >= int(I.getHeight()))
+  for (const auto &l : getModelForDisplay(I.getWidth(), I.getHeight(), cMo, cam)) {
+    const Eigen::Vector2d foot(l[2], l[1]), top(l[4], l[3]), along = (top - foot).normalized();
+    for (int k = 0; k < int((top - foot).norm()); k += 2) {
+      const Eigen::Vector2i p = (foot + k * along).array().round().cast<int>();
+      if (p.x() < 1 || p.y() < 1 || p.x() + 1 >= int(I.getWidth()) || p.y() + 1 >= int(I.getHeight()))
         continue;
-      const auto grey = [&](int du, int dv) { return double(I[unsigned(v + dv)][unsigned(u + du)]); };
-      const Eigen::Vector2d g(grey(1, -1) + 2 * grey(1, 0) + grey(1, 1) - grey(-1, -1) - 2 * grey(-1, 0) - grey(-1, 1),
-                              grey(-1, 1) + 2 * grey(0, 1) + grey(1, 1) - grey(-1, -1) - 2 * grey(0, -1) - grey(1, -1));
-      const double norm = g.norm();
-      sum += norm > 0 ? std::asin(std::min(1.0, std::abs(g.dot(along)) / norm)) * 180 / M_PI : 90;
+      sum += edgeAngle(I, p, along);
       ++n;
     }
   }

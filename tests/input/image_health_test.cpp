@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What is known of an image before a trunk is looked for: whether to believe it, and how far the camera turned.
+// Whether an image can be believed, before a trunk is looked for in it.
 #include "support/drawn_trunks.h"
 
 #include "input/gyro_agreement.h"
 #include "input/image_health.h"
-#include "mbt/border_profile.h"
-#include "mbt/border_vote.h"
-#include "mbt/rotation_aligner.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>
@@ -113,76 +110,5 @@ TEST(GyroAgreement, TellsLateAndMirroredImagesFromGoodOnes)
   EXPECT_EQ(verdictOf(1, 1), GyroAgreement::Verdict::late);
   EXPECT_EQ(verdictOf(-2, 1), GyroAgreement::Verdict::late);
   EXPECT_EQ(verdictOf(0, -1), GyroAgreement::Verdict::mirrored);
-}
-
-TEST(RotationAligner, FindsTurnsOfUpToFortyPixels)
-{
-  const PinholeCamera camera;
-  const RotationAligner aligner;
-  const Pose first = cameraAt({0, 0, 1.2});
-  const auto reference = RotationAligner::reduce(wood(first, 1));
-  for (const double yaw_px : {-40.0, -16.0, -3.0, 0.0, 8.0, 30.0}) {
-    const Pose second = cameraAt({0, 0, 1.2}, std::atan(yaw_px / camera.fx), 0.02);
-    const RotationAlignment turn = aligner.align(reference, RotationAligner::reduce(wood(second, 2)), camera);
-    EXPECT_TRUE(turn.ok) << yaw_px;
-    const Eigen::Matrix3d truth = second.R * first.R.transpose();
-    EXPECT_LT(logSo3(turn.c2Rc1.transpose() * truth).norm() * camera.fx, 1.5) << yaw_px; // pixels
-  }
-}
-
-TEST(RotationAligner, DoesNotAlignWhatIsNotTheSameScene)
-{
-  vpImage<unsigned char> other(240, 320);
-  for (unsigned v = 0; v < 240; ++v)
-    for (unsigned u = 0; u < 320; ++u)
-      other[v][u] = static_cast<unsigned char>(127 + 100 * std::sin(0.11 * u + 0.07 * v));
-  const RotationAligner aligner;
-  EXPECT_FALSE(aligner
-                   .align(RotationAligner::reduce(wood(cameraAt({0, 0, 1.2}), 1)), RotationAligner::reduce(other),
-                          PinholeCamera())
-                   .ok);
-}
-
-TEST(BorderProfile, ThePeakOfADrawnBorderIsWhereTheModelHasIt)
-{
-  const PinholeCamera camera;
-  const Pose cMo = cameraAt({0, 0, 1.2}, 0.05, 0.1);
-  const vpImage<unsigned char> I = wood(cMo, 3);
-  for (const Cylinder &trunk : test::smallWood())
-    for (const Border side : {Border::left, Border::right}) {
-      const Cylinder c = cMo * trunk;
-      const auto border = visibleBorder(camera, c, relativeTrunk(c), side, 0.1, 3);
-      ASSERT_TRUE(border);
-      const BorderProfile profile = sampleBorder(I, *border, 4, 32, 4, {});
-      const auto peaks = contrastPeaks(profile.contrast(-1));
-      double off = 1e9, contrast = 0;
-      for (const ContrastPeak &peak : peaks)
-        if (std::abs(peak.contrast) > std::abs(contrast))
-          contrast = peak.contrast, off = peak.offset_px;
-      EXPECT_LT(std::abs(off), 0.25);
-      EXPECT_GT(contrast, 5); // the background is brighter
-    }
-}
-
-TEST(BorderVote, AllBordersTogetherFindATwistThatOneAloneDoesNot)
-{
-  // borders that move by their own share of two directions; each has its true maximum and a stronger wrong one
-  std::vector<BallotBorder> borders;
-  for (int b = 0; b < 12; ++b) {
-    BallotBorder border;
-    border.offset_by_twist << 100 * std::cos(0.5 * b), 0, 100 * std::sin(0.5 * b), 0, 0, 0;
-    const double truth = 100 * (0.06 * std::cos(0.5 * b) - 0.03 * std::sin(0.5 * b));
-    border.response.assign(41, 0.f);
-    for (int k = -1; k <= 1; ++k)
-      border.response[std::size_t(20 + int(std::lround(truth)) + k)] = k == 0 ? 0.8f : 0.7f;
-    border.response[std::size_t((7 * b + 3) % 41)] = 1.f;
-    borders.push_back(border);
-  }
-  const Matrix6d covariance = Matrix6d::Identity() * 0.05 * 0.05;
-  const Vote result = vote(borders, covariance, VoteOptions());
-  EXPECT_NEAR(result.twist(0), 0.06, 0.015);
-  EXPECT_NEAR(result.twist(2), -0.03, 0.015);
-  EXPECT_GT(result.score, 0.6);
-  EXPECT_EQ(vote({}, covariance, VoteOptions()).twist.norm(), 0);
 }
 } // namespace

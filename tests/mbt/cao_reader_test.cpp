@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/drawn_trunks.h"
+
 #include "mbt/cao_reader.h"
+#include <bole/vpMbTrunkTracker.h>
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <sstream>
 #include <unistd.h>
 #include <visp3/core/vpException.h>
+#include <visp3/mbt/vpMbGenericTracker.h>
 
 namespace
 {
@@ -60,6 +65,47 @@ TEST_F(CaoReader, ReadsWhatItWrote)
   EXPECT_EQ(read[0].name, "tree 7");
   EXPECT_EQ(read[1].name, "");
   EXPECT_DOUBLE_EQ(read[1].radius, 0.3);
+}
+
+TEST_F(CaoReader, AModelOfAMapIsLoadedByOurTrackerAndByViSPsOwn)
+{
+  Trunk upright, leaning;
+  upright.xy = {4, 0.8};
+  leaning.xy = {5, -1}, leaning.lean = {0.05, -0.1};
+  writeCao(m_path, {cylinderOf(upright, 0, 3, "1"), cylinderOf(leaning, 0.2, 2.5)}, "the trunks of a map");
+
+  vpMbTrunkTracker ours;
+  ours.loadModel(m_path);
+  std::streambuf *const visp_says = std::cout.rdbuf(nullptr);
+  vpMbGenericTracker visp;
+  visp.setCameraParameters(PinholeCamera().toVisp());
+  visp.loadModel(m_path);
+  std::cout.rdbuf(visp_says);
+  std::list<vpMbtDistanceCylinder *> cylinders;
+  visp.getLcylinder(cylinders);
+  ASSERT_EQ(cylinders.size(), 2u);
+
+  // both draw the two borders of each trunk in the same places
+  const Pose cMo = test::cameraAt({0, 0, 1.2}, 0.02, 0.03);
+  const auto lines = ours.getModelForDisplay(320, 240, cMo.toVisp(), PinholeCamera().toVisp(), true);
+  ASSERT_EQ(lines.size(), 4u);
+  for (vpMbtDistanceCylinder *cylinder : cylinders) {
+    vpCylinder limbs(*cylinder->getCylinder());
+    limbs.track(cMo.toVisp());
+    for (const auto &[rho, theta] :
+         {std::pair(limbs.getRho1(), limbs.getTheta1()), std::pair(limbs.getRho2(), limbs.getTheta2())}) {
+      double nearest_px = 1e9;
+      for (const auto &line : lines) {
+        const Eigen::Vector3d foot = PinholeCamera().ray({line[2], line[1]}),
+                              top = PinholeCamera().ray({line[4], line[3]});
+        const auto off = [rho = rho, theta = theta](const Eigen::Vector3d &m) {
+          return 200 * std::abs(m.x() * std::cos(theta) + m.y() * std::sin(theta) - rho);
+        };
+        nearest_px = std::min(nearest_px, std::max(off(foot), off(top)));
+      }
+      EXPECT_LT(nearest_px, 1e-3);
+    }
+  }
 }
 
 TEST_F(CaoReader, ViSPsCylinderModelsAreRefusedForTheirCircleAtItsLine)

@@ -3,7 +3,7 @@
 #include "support/drawn_trunks.h"
 
 #include "mbt/cao_reader.h"
-#include <bole/vpMbTrunkTracker.h>
+#include "mbt/model_trunk.h"
 
 #include <gmock/gmock.h>
 
@@ -121,8 +121,8 @@ TEST_F(MbTrunkTracker, ErrorsWeightsAndCovarianceBelongToTheLastFrame)
   const vpMatrix covariance = m_tracker->getCovarianceMatrix();
   ASSERT_EQ(covariance.getRows(), 6u);
   EXPECT_LT(std::sqrt(covariance[0][0]), 0.1);
-  const double climb = dynamic_cast<vpMbTrunkTracker &>(*m_tracker).getOptions().climb_sigma_m;
-  EXPECT_NEAR(std::sqrt(covariance[1][1]), std::hypot(0.01, climb),
+  const double step = dynamic_cast<vpMbTrunkTracker &>(*m_tracker).getOptions().step_sigma_m;
+  EXPECT_NEAR(std::sqrt(covariance[1][1]), std::hypot(0.01, step / 4),
               1e-3); // the height is not seen: as it was and one frame more
 }
 
@@ -150,9 +150,9 @@ TEST_F(MbTrunkTracker, DrawsTheBordersWhereViSPDrawsTheLimbsOfACylinder)
     for (const Cylinder &trunk : m_wood)
       for (const Border side : {Border::left, Border::right}) {
         const Cylinder c = pose(0) * trunk;
-        nearest = std::min(nearest,
-                           std::max(std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[2], line[1]}))),
-                                    std::abs(vpMbtDistanceTrunk::residual(c, side, m_camera.ray({line[4], line[3]})))));
+        const BorderPlane plane(c, relativeTrunk(c), side);
+        nearest = std::min(nearest, std::max(std::abs(plane.residual(m_camera.ray({line[2], line[1]}))),
+                                             std::abs(plane.residual(m_camera.ray({line[4], line[3]})))));
       }
     EXPECT_LT(nearest, 1e-6);
   }
@@ -196,7 +196,8 @@ TEST_F(MbTrunkTracker, ResetForgetsTheModelAndReInitModelLoadsAnother)
   EXPECT_THROW(m_tracker->initFromPose(image(0), pose(0).toVisp()), vpException); // no model
   auto &ours = dynamic_cast<vpMbTrunkTracker &>(*m_tracker);
   ours.reInitModel(image(2), m_cao, pose(2).toVisp());
-  EXPECT_EQ(ours.getTrunks().size(), m_wood.size());
+  const auto lines = ours.getModelForDisplay(320, 240, pose(2).toVisp(), m_camera.toVisp());
+  EXPECT_EQ(lines.size(), 2 * m_wood.size()); // no trunk twice
   m_tracker->track(image(3));
   expectAt(pose(3));
 }
@@ -250,7 +251,7 @@ TEST_F(MbTrunkTracker, RefusesOptionsOutOfRange)
     FAIL() << "accepted";
   }
   catch (const vpException &error) {
-    EXPECT_THAT(error.what(), HasSubstr("min_support = 2, must be 0.05 .. 1"));
+    EXPECT_THAT(error.what(), HasSubstr("min_support = 2, must be in [0.05, 1]"));
   }
 }
 } // namespace

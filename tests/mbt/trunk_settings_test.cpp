@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <unistd.h>
@@ -51,22 +52,23 @@ TEST_F(TrunkSettingsFile, ViSPsOwnSettingsAreRead)
 
 TEST_F(TrunkSettingsFile, TheSectionOfTrunksIsRead)
 {
-  const TrunkSettings settings =
-      read("<conf>\n<!-- a comment --><trunk><pieces>6</pieces>\n<radius_sigma> 0.05 </radius_sigma></trunk></conf>");
-  EXPECT_EQ(settings.options.trunk.pieces, 6);
+  const TrunkSettings settings = read("<conf>\n<!-- a comment --><trunk><scan_max_px>16</scan_max_px>\n<radius_sigma> "
+                                      "0.05 </radius_sigma></trunk></conf>");
+  EXPECT_EQ(settings.options.scan_max_px, 16);
   EXPECT_EQ(settings.options.radius_sigma, 0.05);
   EXPECT_FALSE(settings.has_camera);
 }
 
 TEST_F(TrunkSettingsFile, WhatDoesNotFitIsRefusedWithItsLine)
 {
-  EXPECT_THAT(messageOf("<conf>\n<trunk>\n<piece>6</piece></trunk></conf>"), HasSubstr(":3: trunk/piece: no such key"));
-  EXPECT_THAT(messageOf("<conf>\n<trunk><pieces>60</pieces></trunk></conf>"),
-              HasSubstr(":2: pieces = 60, must be 1 .. 16"));
+  EXPECT_THAT(messageOf("<conf>\n<trunk>\n<pieces>6</pieces></trunk></conf>"),
+              HasSubstr(":3: trunk/pieces: no such key"));
+  EXPECT_THAT(messageOf("<conf>\n<trunk><lever_m>600</lever_m></trunk></conf>"),
+              HasSubstr(":2: lever_m = 600, must be in [0.1, 100]"));
   EXPECT_THAT(messageOf("<conf><trunk>\n<min_support>much</min_support></trunk></conf>"),
               HasSubstr(":2: min_support = much, must be a number"));
-  EXPECT_THAT(messageOf("<conf><trunk><pieces>4</pieces><pieces>5</pieces></trunk></conf>"),
-              HasSubstr("trunk/pieces: given twice"));
+  EXPECT_THAT(messageOf("<conf><trunk><lever_m>4</lever_m><lever_m>5</lever_m></trunk></conf>"),
+              HasSubstr("trunk/lever_m: given twice"));
   EXPECT_THAT(messageOf("<conf><camera><u0>1</u0></camera></conf>"), HasSubstr("camera: must hold u0, v0, px and py"));
   EXPECT_THAT(messageOf("<conf><trunk></conf>"), HasSubstr("</conf> closes what is not open"));
   EXPECT_THAT(messageOf("<conf><trunk>"), HasSubstr("<trunk> is never closed"));
@@ -88,40 +90,22 @@ TEST_F(TrunkSettingsFile, TheFilesInModelsAreReadAndTrunksXmlHoldsTheDefaults)
     }
   }
   EXPECT_GE(models_read, 4);
-  vpMbTrunkTracker::Options changed, defaults; // the file sets everything that was changed back to its default
-  changed.trunk.pieces = 9, changed.trunk.samples = 99, changed.trunk.min_length_px = 99,
-  changed.trunk.min_width_px = 9;
-  changed.trunk.min_contrast = 9, changed.border_sigma_px = 9, changed.lean_sigma_rad = 0.4, changed.radius_sigma = 0.9;
-  changed.scan_min_px = 9, changed.scan_max_px = 99, changed.refine_px = 9, changed.refinements = 4,
-  changed.step_sigma_m = 9, changed.climb_sigma_m = 9;
-  changed.turn_sigma_rad = 0.9, changed.accel_sigma_m = 0.1, changed.min_support = 0.9, changed.min_agreement = 0.9,
-  changed.max_jump = 9, changed.max_sigma_m = 9, changed.max_sigma_rad = 0.9, changed.unobserved_m = 9,
-  changed.lever_m = 9;
-  changed.health.detect_frozen = false;
-  const auto o = readTrunkSettings((models / "trunks.xml").string(), changed).options;
-  EXPECT_EQ(o.trunk.pieces, defaults.trunk.pieces);
-  EXPECT_EQ(o.trunk.samples, defaults.trunk.samples);
-  EXPECT_EQ(o.trunk.min_length_px, defaults.trunk.min_length_px);
-  EXPECT_EQ(o.trunk.min_width_px, defaults.trunk.min_width_px);
-  EXPECT_EQ(o.trunk.min_contrast, defaults.trunk.min_contrast);
-  EXPECT_EQ(o.border_sigma_px, defaults.border_sigma_px);
-  EXPECT_EQ(o.lean_sigma_rad, defaults.lean_sigma_rad);
-  EXPECT_EQ(o.radius_sigma, defaults.radius_sigma);
-  EXPECT_EQ(o.scan_min_px, defaults.scan_min_px);
-  EXPECT_EQ(o.scan_max_px, defaults.scan_max_px);
-  EXPECT_EQ(o.refine_px, defaults.refine_px);
-  EXPECT_EQ(o.refinements, defaults.refinements);
-  EXPECT_EQ(o.step_sigma_m, defaults.step_sigma_m);
-  EXPECT_EQ(o.turn_sigma_rad, defaults.turn_sigma_rad);
-  EXPECT_EQ(o.climb_sigma_m, defaults.climb_sigma_m);
-  EXPECT_EQ(o.accel_sigma_m, defaults.accel_sigma_m);
-  EXPECT_EQ(o.min_support, defaults.min_support);
-  EXPECT_EQ(o.min_agreement, defaults.min_agreement);
-  EXPECT_EQ(o.max_jump, defaults.max_jump);
-  EXPECT_EQ(o.max_sigma_m, defaults.max_sigma_m);
-  EXPECT_EQ(o.max_sigma_rad, defaults.max_sigma_rad);
-  EXPECT_EQ(o.unobserved_m, defaults.unobserved_m);
-  EXPECT_EQ(o.lever_m, defaults.lever_m);
-  EXPECT_EQ(o.health.detect_frozen, defaults.health.detect_frozen);
+  vpMbTrunkTracker::Options changed; // the file sets everything that was changed back to its default
+  const vpMbTrunkTracker::Options defaults;
+  constexpr auto kCount = sizeof(changed) / sizeof(double);
+  static_assert(sizeof(changed) == kCount * sizeof(double), "options are numbers");
+  double before[kCount], after[kCount], wanted[kCount];
+  for (double &value : before)
+    value = 8;
+  before[kCount - 1] = 0; // detect_frozen
+  std::memcpy(&changed, before, sizeof(changed));
+  changed.lean_sigma_rad = 0.4, changed.radius_sigma = 0.9, changed.turn_sigma_rad = 0.9, changed.min_support = 0.9;
+  changed.max_sigma_rad = 0.9;
+  ASSERT_NO_THROW(changed.validate());
+  const auto read = readTrunkSettings((models / "trunks.xml").string(), changed).options;
+  std::memcpy(after, &read, sizeof(read));
+  std::memcpy(wanted, &defaults, sizeof(defaults));
+  for (std::size_t k = 0; k < kCount; ++k)
+    EXPECT_EQ(after[k], wanted[k]) << "option " << k;
 }
 } // namespace

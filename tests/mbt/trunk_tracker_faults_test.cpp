@@ -6,7 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <random>
@@ -18,13 +18,20 @@ using namespace bole;
 using test::cameraAt;
 using Status = vpMbTrunkTracker::Status;
 
+vpPoint pointAt(const Eigen::Vector3d &p)
+{
+  vpPoint point;
+  point.setWorldCoordinates(p.x(), p.y(), p.z());
+  return point;
+}
+
 struct Scene
 {
   explicit Scene(const std::vector<Cylinder> &wood = test::smallWood()) : trunks(wood)
   {
     tracker.setCameraParameters(camera.toVisp());
     for (const Cylinder &trunk : trunks)
-      tracker.addTrunk(trunk);
+      tracker.addTrunk(pointAt(trunk.foot), pointAt(trunk.top), trunk.radius);
     tracker.initFromPose(image(0), pose(0).toVisp());
   }
   static Pose pose(int k) { return cameraAt({0.04 * k, 0.01 * k, 1.2}, 0.006 * k); }
@@ -79,20 +86,20 @@ int framesToRecovery(Scene &scene, int k)
 
 TEST(TrunkTrackerFaults, BlackNoiseFrozenSmearedAndWrongSizeImagesAreToldApart)
 {
-  const auto statusAfter = [](const auto &spoil) {
+  const auto expectTold = [](const std::string &word, const auto &spoil) {
     Scene scene;
     EXPECT_FALSE(scene.complains(scene.image(1)));
-    EXPECT_TRUE(scene.complains(spoil(scene)));
-    EXPECT_LT(scene.metresOff(2), 0.15); // the prediction
-    const Status status = scene.tracker.getStatus();
-    EXPECT_LE(framesToRecovery(scene, 3), 5);
-    return status;
+    EXPECT_TRUE(scene.complains(spoil(scene))) << word;
+    EXPECT_LT(scene.metresOff(2), 0.15) << word; // the prediction
+    EXPECT_EQ(scene.tracker.getStatus(), Status::bad_image) << word;
+    EXPECT_THAT(scene.tracker.getMessage(), testing::HasSubstr(word));
+    EXPECT_LE(framesToRecovery(scene, 3), 5) << word;
   };
-  EXPECT_EQ(statusAfter([](Scene &) { return vpImage<unsigned char>(240, 320, 0); }), Status::black);
-  EXPECT_EQ(statusAfter([](Scene &) { return noise(5); }), Status::noise);
-  EXPECT_EQ(statusAfter([](Scene &s) { return s.image(1); }), Status::frozen);
-  EXPECT_EQ(statusAfter([](Scene &s) { return smeared(s.image(2)); }), Status::smeared);
-  EXPECT_EQ(statusAfter([](Scene &) { return vpImage<unsigned char>(120, 160, 90); }), Status::wrong_size);
+  expectTold("black", [](Scene &) { return vpImage<unsigned char>(240, 320, 0); });
+  expectTold("noise", [](Scene &) { return noise(5); });
+  expectTold("frozen", [](Scene &s) { return s.image(1); });
+  expectTold("smeared", [](Scene &s) { return smeared(s.image(2)); });
+  expectTold("size", [](Scene &) { return vpImage<unsigned char>(120, 160, 90); });
 }
 
 TEST(TrunkTrackerFaults, RecoversByItselfAfterFiveBlackFrames)
@@ -105,6 +112,19 @@ TEST(TrunkTrackerFaults, RecoversByItselfAfterFiveBlackFrames)
     ASSERT_TRUE(scene.complains(vpImage<unsigned char>(240, 320, 0)));
   EXPECT_GT(scene.tracker.getPoseCovariance()[2][2], 4 * before[2][2]); // it knows that it does not know
   EXPECT_LE(framesToRecovery(scene, 10), 5);
+}
+
+TEST(TrunkTrackerFaults, ThroughBlackFramesTheCameraGoesOnAtItsVelocity)
+{
+  Scene scene;
+  const auto poseAt = [](int k) { return cameraAt({0.03 * k, 0.05 * k, 1.2}, 0.01 * k); };
+  for (int k = 1; k <= 6; ++k)
+    ASSERT_FALSE(scene.complains(test::drawTrunks(scene.camera, poseAt(k), scene.trunks, unsigned(k) + 1)));
+  for (int k = 7; k <= 9; ++k)
+    ASSERT_TRUE(scene.complains(vpImage<unsigned char>(240, 320, 0)));
+  const Pose found = Pose::fromVisp(scene.tracker.getPose());
+  EXPECT_LT(test::metresApart(found, poseAt(9)), 0.08);   // of 0.17 since the last good frame
+  EXPECT_LT(test::radiansApart(found, poseAt(9)), 0.015); // of 0.03
 }
 
 TEST(TrunkTrackerFaults, AnotherPlaceIsLostAndNotTracked)
@@ -191,7 +211,8 @@ TEST(TrunkTrackerFaults, WithOneTrunkTheHeightAndTheTurnAboutItStayOnThePrior)
   EXPECT_EQ(tracker.getStatus(), Status::partly_on_prior);
   const vpMatrix U = tracker.getUnobserved();
   ASSERT_GE(U.getCols(), 2u);
-  const Eigen::Vector3d axis = tracker.getTrunks()[0].inCamera().axis(), foot = tracker.getTrunks()[0].inCamera().foot;
+  const Cylinder c = Pose::fromVisp(tracker.getPose()) * scene.trunks[0];
+  const Eigen::Vector3d axis = c.axis(), foot = c.foot;
   Vector6d along;
   along << axis, Eigen::Vector3d::Zero();
   about << -axis.cross(foot), axis * tracker.getOptions().lever_m; // in m and rad * lever_m

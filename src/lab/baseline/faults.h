@@ -9,30 +9,21 @@
 /// beyond what Help says.
 
 #include "lab/baseline/comparison.h"
+#include "lab/faults/image_fault.h"
 
 namespace bole
 {
-enum class Fault
-{
-  black,
-  noise,
-  smear,
-  frozen,
-  wrong_size
-};
 struct FaultCase
 {
-  Fault fault = Fault::black;
+  FaultKind kind = FaultKind::black;
   int frames = 1; ///< in a row
   std::string text() const;
 };
 /// Black and noise for 1 and 5 frames, a smeared half for 1, frozen for 10, a wrong size for 1.
 std::vector<FaultCase> allFaults();
 
-/// Image \p k of the flight as the fault that began at frame \p first shows it; the noise is seeded by \p k.
-vpImage<unsigned char> faultyImage(const TestFlight &flight, std::size_t k, std::size_t first, Fault fault);
-
-struct FaultOptions
+/// Where the pieces of the flight lie.
+struct FaultRuns
 {
   std::vector<std::size_t> begins{20, 40, 60,
                                   80}; ///< frames at which the fault begins; those near the end are left out
@@ -53,5 +44,5 @@ struct FaultRow
 
 /// Rows of all \p contenders, a fault each, in the order of allFaults().
 std::vector<FaultRow> faults(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                             const FaultOptions &options = {}, const Limits &limits = {});
+                             const FaultRuns &runs = {}, const Limits &limits = {});
 } // namespace bole

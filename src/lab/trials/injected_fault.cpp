@@ -3,33 +3,8 @@
 
 #include "geometry/require_range.h"
 
-#include <visp3/core/vpException.h>
-
 namespace bole
 {
-const char *toString(FaultKind kind)
-{
-  switch (kind) {
-  case FaultKind::none:
-    return "none";
-  case FaultKind::black:
-    return "black";
-  case FaultKind::freeze:
-    return "freeze";
-  case FaultKind::noise:
-    return "noise";
-  }
-  return "?";
-}
-
-FaultKind faultKindFromString(const std::string &word)
-{
-  for (FaultKind kind : {FaultKind::none, FaultKind::black, FaultKind::freeze, FaultKind::noise})
-    if (word == toString(kind))
-      return kind;
-  throw vpException(vpException::badValue, "fault = %s, must be none, black, freeze or noise", word.c_str());
-}
-
 void FaultOptions::validate() const
 {
   requireRange("fault start_s", start_s, 0, 3600);
@@ -49,20 +24,7 @@ bool FaultInjector::apply(Frame &frame, double servoing_s)
     m_last = frame.image;
     return false;
   }
-  switch (m_options.kind) {
-  case FaultKind::black:
-    frame.image = 0;
-    break;
-  case FaultKind::freeze:
-    frame.image = m_last;
-    break;
-  case FaultKind::noise:
-    for (unsigned i = 0; i < frame.image.getSize(); ++i)
-      frame.image.bitmap[i] = static_cast<unsigned char>(m_random.next() >> 56);
-    break;
-  case FaultKind::none:
-    break;
-  }
+  spoil(frame.image, m_options.kind, m_last, unsigned(m_random.next() >> 32));
   return true;
 }
 } // namespace bole

@@ -1,26 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Faults of a camera and its link, put into frames on purpose.
+/// A fault of the camera during a servo trial: which, when and for how long.
 
+#include "lab/faults/image_fault.h"
 #include "lab/simulation/random.h"
 #include <bole/frame.h>
 
-#include <string>
-
 namespace bole
 {
-enum class FaultKind
-{
-  none,
-  black,  ///< every pixel 0
-  freeze, ///< the last picture again and again
-  noise   ///< every pixel a random grey
-};
-const char *toString(FaultKind kind);
-/// Throws vpException for another word.
-FaultKind faultKindFromString(const std::string &word);
-
 struct FaultOptions
 {
   FaultKind kind = FaultKind::none;

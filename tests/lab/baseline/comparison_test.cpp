@@ -166,29 +166,16 @@ TEST_F(Comparison, TheSweepReturnsTheBestOfWhatItTried)
   EXPECT_EQ(best->tracked, most);
 }
 
-TEST(Faults, ImagesAreSpoiltAsSaid)
-{
-  const TestFlight flight = drawnFlight(4);
-  const auto &seen = flight.frames[2].image;
-  EXPECT_EQ(faultyImage(flight, 2, 2, Fault::black).getMaxValue(), 0);
-  EXPECT_TRUE(faultyImage(flight, 3, 2, Fault::frozen) == flight.frames[1].image);
-  EXPECT_EQ(faultyImage(flight, 2, 2, Fault::wrong_size).getWidth(), 160u);
-  EXPECT_FALSE(faultyImage(flight, 2, 2, Fault::noise) == faultyImage(flight, 3, 2, Fault::noise));
-  const vpImage<unsigned char> smear = faultyImage(flight, 2, 2, Fault::smear);
-  EXPECT_TRUE(std::equal(smear[0], smear[120], seen[0]));
-  EXPECT_TRUE(std::equal(smear[119], smear[120], smear[239]));
-}
-
 TEST_F(Comparison, FaultsAreNoticedAndRecoveredFromWithoutHelp)
 {
   const TestFlight flight = drawnFlight(24);
   writeCao(m_cao, flight.trunks);
-  FaultOptions options;
-  options.begins = {5};
-  options.lead = 3;
-  options.tail = 6;
+  FaultRuns runs;
+  runs.begins = {5};
+  runs.lead = 3;
+  runs.tail = 6;
   std::vector<Contender> contenders = one(TrackerKind::trunk, Help::alone);
-  const std::vector<FaultRow> rows = faults(flight, m_cao, contenders, options, flight.limits);
+  const std::vector<FaultRow> rows = faults(flight, m_cao, contenders, runs, flight.limits);
   ASSERT_EQ(rows.size(), allFaults().size());
   for (const FaultRow &row : rows) {
     EXPECT_EQ(row.runs, 1);

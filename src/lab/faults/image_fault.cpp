@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/faults/image_fault.h"
+
+#include <algorithm>
+#include <random>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+constexpr FaultKind kKinds[] = {FaultKind::none,  FaultKind::black,  FaultKind::noise,
+                                FaultKind::smear, FaultKind::freeze, FaultKind::wrong_size};
+
+vpImage<unsigned char> halved(const vpImage<unsigned char> &image)
+{
+  vpImage<unsigned char> small(image.getHeight() / 2, image.getWidth() / 2);
+  for (unsigned v = 0; v < small.getHeight(); ++v)
+    for (unsigned u = 0; u < small.getWidth(); ++u)
+      small[v][u] = image[2 * v][2 * u];
+  return small;
+}
+} // namespace
+
+const char *toString(FaultKind kind)
+{
+  switch (kind) {
+  case FaultKind::none:
+    return "none";
+  case FaultKind::black:
+    return "black";
+  case FaultKind::noise:
+    return "noise";
+  case FaultKind::smear:
+    return "smear";
+  case FaultKind::freeze:
+    return "freeze";
+  case FaultKind::wrong_size:
+    return "wrong size";
+  }
+  return "?";
+}
+
+FaultKind faultKindFromString(const std::string &word)
+{
+  for (const FaultKind kind : kKinds)
+    if (word == toString(kind))
+      return kind;
+  throw vpException(vpException::badValue, "fault = %s, must be none, black, noise, smear, freeze or wrong size",
+                    word.c_str());
+}
+
+void spoil(vpImage<unsigned char> &image, FaultKind kind, const vpImage<unsigned char> &last_good, unsigned seed)
+{
+  const unsigned w = image.getWidth(), h = image.getHeight();
+  std::mt19937 random(seed);
+  switch (kind) {
+  case FaultKind::none:
+    break;
+  case FaultKind::black:
+    image = static_cast<unsigned char>(0);
+    break;
+  case FaultKind::noise:
+    for (unsigned i = 0; i < image.getSize(); ++i)
+      image.bitmap[i] = static_cast<unsigned char>(random() & 255u);
+    break;
+  case FaultKind::smear:
+    for (unsigned v = h / 2; v < h; ++v)
+      std::copy(image[h / 2 - 1], image[h / 2 - 1] + w, image[v]);
+    break;
+  case FaultKind::freeze:
+    image = last_good;
+    break;
+  case FaultKind::wrong_size:
+    image = halved(image);
+    break;
+  }
+}
+} // namespace bole
