@@ -21,6 +21,7 @@ struct BodyState
   Pose wMb;                                           ///< see NavdataOdometry
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
   std::optional<Eigen::Vector3d> rate;                ///< [rad/s], body frame; with full navdata only
+  std::optional<Eigen::Vector3d> force;               ///< specific force [m/s^2], body frame; with full navdata only
   double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
   double battery = 0;                                 ///< share of full, 0 to 1
   std::uint32_t state = 0;                            ///< bits of DroneState
@@ -82,7 +83,7 @@ public:
   /// in a gap.
   std::optional<BodyState> at(std::int64_t stamp_ns) const;
   std::optional<BodyState> newest() const;
-  /// Angular rates in (from, to], oldest first.
+  /// Angular rates and specific forces in (from, to], oldest first.
   std::vector<GyroSample> gyro(std::int64_t from_ns, std::int64_t to_ns) const;
   /// Covariance of the motion between two instants.
   Matrix6d stepCovariance(std::int64_t from_ns, std::int64_t to_ns) const;
