@@ -164,7 +164,7 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   const Matrix3d turn = expSo3((rate - m_gyro_bias) * dt);
   const Vector3d specific = force - m_force_bias;
   const Matrix3d by_attitude = -m_wRb * skew(specific) * dt;
-  Covariance F = Covariance::Identity();
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(kStates, kStates);
   F.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
   F.block<3, 3>(kAttitude, kGyro) = -dt * Matrix3d::Identity();
   F.block<3, 3>(kVelocity, kAttitude) = by_attitude;
@@ -188,19 +188,17 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   m_turned = m_turned * turn;
 }
 
-template <int N>
-bool InertialScale::update(const Eigen::Matrix<double, N, kStates> &H, const Eigen::Matrix<double, N, 1> &residual,
-                           const Eigen::Matrix<double, N, N> &noise)
+/// Kalman's update; a residual far beyond its covariance is left out.
+void InertialScale::update(const Eigen::MatrixXd &H, const Eigen::VectorXd &residual, const Eigen::MatrixXd &noise)
 {
-  const Eigen::Matrix<double, kStates, N> PHt = m_covariance * H.transpose();
-  const Eigen::Matrix<double, N, N> S = H * PHt + noise;
-  const Eigen::LDLT<Eigen::Matrix<double, N, N>> solver(S);
-  const Eigen::Matrix<double, N, 1> solved = solver.solve(residual);
+  const Eigen::MatrixXd PHt = m_covariance * H.transpose(), S = H * PHt + noise;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+  const Eigen::VectorXd solved = solver.solve(residual);
   if (!(residual.dot(solved) < kGate))
-    return false;
-  const State change = PHt * solved;
-  const Eigen::Matrix<double, kStates, N> gain = solver.solve(PHt.transpose()).transpose();
-  const Covariance left = Covariance::Identity() - gain * H;
+    return;
+  const Eigen::VectorXd change = PHt * solved;
+  const Eigen::MatrixXd gain = solver.solve(PHt.transpose()).transpose();
+  const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(kStates, kStates) - gain * H;
   m_covariance = (left * m_covariance * left.transpose() + gain * noise * gain.transpose()).eval();
   m_wRb = m_wRb * expSo3(change.segment<3>(kAttitude));
   m_velocity += change.segment<3>(kVelocity);
@@ -208,7 +206,6 @@ bool InertialScale::update(const Eigen::Matrix<double, N, kStates> &H, const Eig
   m_gyro_bias += change.segment<3>(kGyro);
   m_force_bias += change.segment<3>(kForce);
   m_log_scale += change(kScale);
-  return true;
 }
 
 /// Where is up, by the odometry's roll and pitch?
@@ -216,9 +213,9 @@ void InertialScale::compareTilt(const Pose &wMb)
 {
   const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ(), measured = wMb.R.transpose() * Vector3d::UnitZ();
   const Eigen::Matrix<double, 2, 3> rows = across(up);
-  Eigen::Matrix<double, 2, kStates> H = Eigen::Matrix<double, 2, kStates>::Zero();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
   H.middleCols<3>(kAttitude) = rows * skew(up);
-  update<2>(H, rows * (measured - up), std::pow(m_options.tilt_sigma, 2) * Eigen::Matrix2d::Identity());
+  update(H, rows * (measured - up), std::pow(m_options.tilt_sigma, 2) * Eigen::Matrix2d::Identity());
 }
 
 /// The displacement by the odometry, in the heading of this filter: its horizontal part has the scale.
@@ -227,13 +224,13 @@ void InertialScale::compareOdometry(const Pose &wMb, double duration)
   const Vector3d in_body = wMb.R.transpose() * (wMb.t - m_anchor->wMb.t);
   const double scale = std::exp(m_log_scale);
   const Vector3d factor(scale, scale, 1);
-  Eigen::Matrix<double, 3, kStates> H = Eigen::Matrix<double, 3, kStates>::Zero();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
   H.middleCols<3>(kMoved) = factor.asDiagonal();
   H.middleCols<3>(kAttitude) = m_wRb * skew(in_body);
   H.block<2, 1>(0, kScale) = scale * m_moved.head<2>();
   const double walk2 = std::pow(m_options.odometry_walk, 2) * duration;
   const Vector3d noise(walk2, walk2, std::pow(m_options.odometry_height_sigma, 2));
-  update<3>(H, m_wRb * in_body - factor.cwiseProduct(m_moved), noise.asDiagonal());
+  update(H, m_wRb * in_body - factor.cwiseProduct(m_moved), Matrix3d(noise.asDiagonal()));
 }
 
 /// The direction of the displacement of the camera, by the points.
@@ -247,22 +244,22 @@ void InertialScale::compareDirection(const RelativeMotion &motion)
     return;
   const Vector3d direction = wRa * m_bMc.R * motion.points.direction;
   const Eigen::Matrix<double, 2, 3> rows = across(direction);
-  Eigen::Matrix<double, 2, kStates> H = Eigen::Matrix<double, 2, kStates>::Zero();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
   H.middleCols<3>(kMoved) = rows / length;
   H.middleCols<3>(kAttitude) = rows * m_wRb * skew(m_wRb.transpose() * direction);
   const double variance = 0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace();
-  update<2>(H, -rows * moved / length, variance * Eigen::Matrix2d::Identity());
+  update(H, -rows * moved / length, variance * Eigen::Matrix2d::Identity());
 }
 
 /// The rotation by the points: it shows the bias of the gyro.
 void InertialScale::compareRotation(const RelativeMotion &motion, double duration)
 {
   const Matrix3d aRb = m_bMc.R * motion.points.aRb * m_bMc.R.transpose();
-  Eigen::Matrix<double, 3, kStates> H = Eigen::Matrix<double, 3, kStates>::Zero();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
   H.middleCols<3>(kGyro) = -duration * Matrix3d::Identity();
   const Matrix3d noise = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose() +
                          std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
-  update<3>(H, logSo3(m_turned.transpose() * aRb), noise);
+  update(H, logSo3(m_turned.transpose() * aRb), noise);
 }
 
 std::optional<LogScale> InertialScale::scale(double prior_sigma) const

@@ -63,8 +63,6 @@ public:
 
 private:
   static constexpr int kStates = 16;
-  using State = Eigen::Matrix<double, kStates, 1>;
-  using Covariance = Eigen::Matrix<double, kStates, kStates>;
   struct Anchor ///< where the window begins
   {
     std::int64_t stamp_ns = 0;
@@ -82,9 +80,7 @@ private:
   void compareOdometry(const Pose &wMb, double duration);
   void compareRotation(const RelativeMotion &motion, double duration);
   void compareDirection(const RelativeMotion &motion);
-  template <int N>
-  bool update(const Eigen::Matrix<double, N, kStates> &H, const Eigen::Matrix<double, N, 1> &residual,
-              const Eigen::Matrix<double, N, N> &noise);
+  void update(const Eigen::MatrixXd &H, const Eigen::VectorXd &residual, const Eigen::MatrixXd &noise);
 
   Pose m_bMc;
   InertialScaleOptions m_options;
@@ -102,6 +98,6 @@ private:
   Eigen::Vector3d m_moved = Eigen::Vector3d::Zero(); ///< since the anchor, world
   Eigen::Vector3d m_gyro_bias = Eigen::Vector3d::Zero(), m_force_bias = Eigen::Vector3d::Zero();
   double m_log_scale = 0;
-  Covariance m_covariance = Covariance::Zero();
+  Eigen::MatrixXd m_covariance = Eigen::MatrixXd::Zero(kStates, kStates); ///< dynamic: compiles faster
 };
 } // namespace bole
