@@ -27,11 +27,12 @@ enum class FrameStatus
 };
 const char *toString(FrameStatus status);
 
-/// Angular rate in the body frame [rad/s], timestamp in [ns].
+/// Angular rate in the body frame [rad/s], timestamp in [ns], and what an accelerometer beside the gyro measured.
 struct GyroSample
 {
   std::int64_t stamp_ns = 0;
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  std::optional<Eigen::Vector3d> force = {}; ///< specific force in the body frame [m/s^2]: +9.81 upwards at rest
 };
 
 struct Frame

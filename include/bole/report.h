@@ -61,6 +61,15 @@ struct SaliencyField
   bool isKnown(unsigned row, unsigned column) const { return confidence[row][column] >= unknown_below; }
 };
 
+/// A sensor that contradicts the others. It is not used any more; the map goes on without it.
+struct SensorVerdict
+{
+  std::string sensor; ///< "gyro", "odometry" or "images"
+  std::string kind;   ///< for programs: rotation, bias, time, stuck, ended, jump, noise, direction or tilt
+  double since_s = 0; ///< stamp at which the contradiction began [s]
+  std::string text;   ///< for the user: "odometry: frozen since 5.0 s"
+};
+
 struct FrameReport
 {
   std::size_t index = 0; ///< frames processed before this one
@@ -74,6 +83,7 @@ struct FrameReport
   std::vector<TrunkInView> trunks;                 ///< known trunks looked for
   std::vector<KnownTrunk> map;                     ///< all that a frame has to reckon with, in view or not
   std::vector<TriangulatedRay> points;             ///< none where the frame was not ok
+  std::vector<SensorVerdict> verdicts;             ///< all of the flight so far
   std::optional<SaliencyField> saliency;
   std::vector<std::pair<const char *, double>> timing_ms; ///< a stage each, in flow order
 };

@@ -24,6 +24,7 @@ struct BodyState
   Pose wMb;                  ///< integrated from the start; the world stands on the ground, z up
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< [m/s], body frame
   std::optional<Eigen::Vector3d> rate;                ///< [rad/s], body frame; with full navdata only
+  std::optional<Eigen::Vector3d> force;               ///< specific force [m/s^2], body frame; with full navdata only
   double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
   double battery = 0;                                 ///< share of full, 0 to 1
   std::uint32_t state = 0;                            ///< the drone's state word

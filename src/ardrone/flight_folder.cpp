@@ -61,8 +61,9 @@ FlightFolder::FlightFolder(const std::string &folder, const MountedCamera &camer
   m_cam0 = (mav0 / "cam0").string();
   ::close(create(mav0 / "cam0" / "sensor.yaml", sensorYaml(camera)));
   m_images_csv = create(mav0 / "cam0" / "data.csv", "#timestamp [ns],filename\n");
-  m_gyro_csv = create(mav0 / "imu0" / "data.csv",
-                      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1]\n");
+  m_gyro_csv =
+      create(mav0 / "imu0" / "data.csv", "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+                                         "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n");
   m_odometry_csv = create(mav0 / "odom0" / "data.csv", "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z "
                                                        "[m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n");
 }
@@ -88,8 +89,9 @@ void FlightFolder::write(const LiveFrame &frame)
   const std::int64_t stamp_ns = frame.stamp_ns - m_first_stamp_ns; // the flight starts at zero
   for (const GyroSample &sample : frame.gyro)
     if (const std::int64_t at_ns = sample.stamp_ns - m_first_stamp_ns; at_ns >= 0 && at_ns > m_last_gyro_ns) {
-      append(m_gyro_csv,
-             fmt::format("{},{:.6f},{:.6f},{:.6f}\n", at_ns, sample.rate.x(), sample.rate.y(), sample.rate.z()));
+      const Eigen::Vector3d force = sample.force.value_or(Eigen::Vector3d(0, 0, 9.81)); // still: as if none were there
+      append(m_gyro_csv, fmt::format("{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", at_ns, sample.rate.x(),
+                                     sample.rate.y(), sample.rate.z(), force.x(), force.y(), force.z()));
       m_last_gyro_ns = at_ns;
     }
   if (stamp_ns <= m_last_stamp_ns)

@@ -13,6 +13,7 @@ namespace bole
 namespace
 {
 constexpr double kDegree = M_PI / 180;
+constexpr double kGravity = 9.81;      // [m/s^2]
 constexpr double kCorrelation_s = 0.1; // of the velocity's error
 
 double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
@@ -30,8 +31,10 @@ BodyState readState(std::int64_t stamp_ns, const Navdata &navdata)
   const Eigen::Vector3d angles = navdata.demo->phi_theta_psi_mdeg.cast<double>() * 1e-3 * kDegree;
   state.wMb.R = attitudeFromDrone(angles.x(), angles.y(), angles.z());
   state.velocity = flipDroneAxes(navdata.demo->velocity_mm_s.cast<double>() * 1e-3);
-  if (navdata.physical)
+  if (navdata.physical) {
     state.rate = flipDroneAxes(navdata.physical->rate_deg_s.cast<double>() * kDegree);
+    state.force = flipDroneAxes(navdata.physical->acceleration_mg.cast<double>() * 1e-3 * kGravity);
+  }
   return state;
 }
 
@@ -157,7 +160,7 @@ std::vector<GyroSample> NavdataOdometry::gyro(std::int64_t from_ns, std::int64_t
   std::vector<GyroSample> samples;
   for (const BodyState &state : m_history)
     if (state.rate && state.stamp_ns > from_ns && state.stamp_ns <= to_ns)
-      samples.push_back({state.stamp_ns, *state.rate});
+      samples.push_back({state.stamp_ns, *state.rate, state.force});
   return samples;
 }
 

@@ -67,7 +67,7 @@ public:
   /// in a gap.
   std::optional<BodyState> at(std::int64_t stamp_ns) const;
   std::optional<BodyState> newest() const;
-  /// Angular rates in (from, to], oldest first.
+  /// Angular rates and specific forces in (from, to], oldest first.
   std::vector<GyroSample> gyro(std::int64_t from_ns, std::int64_t to_ns) const;
   /// Covariance of the motion between two instants.
   Matrix6d stepCovariance(std::int64_t from_ns, std::int64_t to_ns) const;

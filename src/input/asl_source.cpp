@@ -95,6 +95,8 @@ std::vector<GyroSample> readGyro(const fs::path &imu0)
   while (csv.next()) {
     const std::int64_t stamp_ns = csv.risingStampNs(0);
     gyro.push_back({stamp_ns, bRs * Eigen::Vector3d(csv.number(1, "w_x"), csv.number(2, "w_y"), csv.number(3, "w_z"))});
+    if (csv.columns() >= 7)
+      gyro.back().force = bRs * Eigen::Vector3d(csv.number(4, "a_x"), csv.number(5, "a_y"), csv.number(6, "a_z"));
   }
   requirePlausible(gyro, (imu0 / "data.csv").string());
   return gyro;

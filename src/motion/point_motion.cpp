@@ -93,7 +93,11 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
   }
-  step.estimate = estimateRelativePose(m_tracker.matches(frames_back), m_camera, prior, m_options.relative_pose);
+  const std::vector<PointMatch> matches = m_tracker.matches(frames_back);
+  step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
+  if (frames_back == *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end()))
+    step.points = prior.aRb || prior.translation ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose)
+                                                 : step.estimate;
   return step;
 }
 

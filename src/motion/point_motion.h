@@ -52,6 +52,9 @@ struct RelativeMotion
   std::int64_t a_ns = 0, b_ns = 0;
   std::size_t a_index = 0, b_index = 0; ///< numbers of the two frames, as they came: 0, 1, ...
   RelativePoseEstimate estimate;
+  /// By the points alone: neither gyro nor odometry is in it, so it can judge both. Only for the longest of the
+  /// options' frames_back, else too_few_points.
+  RelativePoseEstimate points;
   std::optional<GyroRotation> gyro;        ///< of the body, the prior that was used
   std::optional<Eigen::Vector3d> odometry; ///< aMb's translation by the pose filter, camera axes [m]
 };

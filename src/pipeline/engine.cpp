@@ -309,6 +309,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   report.pose_covariance = m_smoother.currentPoseCovariance();
   report.is_translation_seen = motion.step.step_from_odometry;
   report.has_ranges = m_motion->hasRanges();
+  report.verdicts = m_motion->verdicts();
   toMetres(report, m_bMc, m_metres);
   return report;
 }

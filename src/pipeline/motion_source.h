@@ -7,6 +7,7 @@
 
 #include "pipeline/motion_model.h"
 #include "pipeline/stage_options.h"
+#include <bole/report.h>
 #include <bole/world_reference.h>
 
 #include "motion/point_motion.h"
@@ -73,6 +74,8 @@ public:
   virtual std::optional<double> groundZ() const = 0;
   /// As far as the motion itself tells.
   virtual ScaleEstimate scale() const = 0;
+  /// Sensors that contradicted the others so far.
+  virtual std::vector<SensorVerdict> verdicts() const { return {}; }
   /// Gravity and ranges; the scale as scale() says.
   virtual WorldReference reference() const = 0;
 

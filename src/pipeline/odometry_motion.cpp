@@ -28,27 +28,41 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_has_odometry(has_odometry),
       m_use_points(options.flow.use_points),
       m_scale_sigma(options.motion.scale_sigma),
-      m_model(options.motion, options.points.gyro)
+      m_model(options.motion, options.points.gyro),
+      m_inertial(bMc, {}, options.points.gyro),
+      m_monitor(bMc)
 {
 }
 
 PosePrior OdometryMotion::first(const Frame &frame)
 {
-  if (m_use_points)
-    m_points.process(frame);
+  observe(frame);
   const PosePrior prior = m_model.first(frame);
   m_model.advance(frame);
   return prior;
+}
+
+/// The motion by the points; the sensors are compared with it.
+std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
+{
+  std::vector<RelativeMotion> seen;
+  if (m_use_points)
+    seen = m_points.process(m_monitor.trusted(frame));
+  m_inertial.process(frame, seen);
+  m_monitor.process(frame, seen);
+  return seen;
 }
 
 Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
 {
   Motion motion;
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
-  motion.step = m_model.step(frame, wMa, bias, velocity);
-  motion.is_rotation_seen = motion.step.step_from_odometry || !frame.gyro.empty();
-  if (m_use_points)
-    addPoints(motion, m_points.process(frame));
+  const std::vector<RelativeMotion> seen = observe(frame);
+  const Frame trusted = m_monitor.trusted(frame);
+  motion.step = m_model.step(trusted, wMa, bias, velocity);
+  motion.is_rotation_seen = motion.step.step_from_odometry || !trusted.gyro.empty();
+  if (m_monitor.trusts(Sensor::images))
+    addPoints(motion, seen);
   m_model.advance(frame);
   return motion;
 }
@@ -70,7 +84,12 @@ std::optional<double> OdometryMotion::groundZ() const
   return m_has_odometry ? std::optional<double>(0.0) : std::nullopt;
 }
 
-ScaleEstimate OdometryMotion::scale() const { return {0, m_scale_sigma, ScaleSource::odometry}; }
+ScaleEstimate OdometryMotion::scale() const
+{
+  if (const std::optional<LogScale> scale = m_inertial.scale(m_scale_sigma))
+    return {-scale->mean, scale->sigma, ScaleSource::odometry};
+  return {0, m_scale_sigma, ScaleSource::odometry};
+}
 
 WorldReference OdometryMotion::reference() const
 {

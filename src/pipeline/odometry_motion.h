@@ -5,9 +5,14 @@
 
 #include "pipeline/motion_source.h"
 
+#include "motion/inertial_scale.h"
+#include "motion/sensor_monitor.h"
+
 namespace bole
 {
-/// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames.
+/// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames. The
+/// scale of the pose filter comes from the accelerometer where there is one. A sensor that contradicts the others is
+/// left out from then on.
 class OdometryMotion : public MotionSource
 {
 public:
@@ -19,14 +24,18 @@ public:
   bool isTranslationMeasured() const override { return m_has_odometry; }
   std::optional<double> groundZ() const override;
   ScaleEstimate scale() const override;
+  std::vector<SensorVerdict> verdicts() const override { return m_monitor.verdicts(); }
   WorldReference reference() const override;
 
 private:
+  std::vector<RelativeMotion> observe(const Frame &frame);
   void addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const;
 
   Pose m_bMc;
   bool m_has_odometry, m_use_points;
   double m_scale_sigma;
   MotionModel m_model;
+  InertialScale m_inertial; ///< of the pose filter, by the accelerometer
+  SensorMonitor m_monitor;
 };
 } // namespace bole

@@ -63,6 +63,16 @@ TEST(NavdataOdometry, GyroAndAttitudeAgreeAboutEachAxis)
   }
 }
 
+TEST(NavdataOdometry, ADroneAtRestFeelsItsWeightUpwards)
+{
+  NavdataOdometry odometry;
+  odometry.add(seconds(0.1), packet({0, 0, 0}, {0, 0, 0}));
+  const std::vector<GyroSample> samples = odometry.gyro(0, seconds(1));
+  ASSERT_EQ(samples.size(), 1u);
+  ASSERT_TRUE(samples[0].force);
+  EXPECT_LT((*samples[0].force - Eigen::Vector3d(0, 0, 9.81)).norm(), 1e-6);
+}
+
 TEST(NavdataOdometry, FlyingForwardAfterATurnToTheRightGoesToTheRight)
 {
   NavdataOdometry odometry;

@@ -37,6 +37,18 @@ TEST(AslSource, DeliversEveryFrameWithStampPixelsOdometryAndGyro)
   }
   EXPECT_EQ(frames[2].gyro.front().stamp_ns, 110000000);
   EXPECT_EQ(frames[2].gyro.back().stamp_ns, 200000000);
+  ASSERT_TRUE(frames[2].gyro.front().force);
+  EXPECT_EQ(*frames[2].gyro.front().force, Eigen::Vector3d(0, 0, 9.81));
+}
+
+TEST(AslSource, AGyroWithoutAnAccelerometerHasNoForce)
+{
+  const FlightFolder flight(2);
+  flight.write("mav0/imu0/data.csv", "0,0,0,0.1\n50000000,0,0,0.1\n");
+  AslSource source(flight.path());
+  const std::vector<Frame> frames = readAll(source);
+  ASSERT_EQ(frames[1].gyro.size(), 1u);
+  EXPECT_FALSE(frames[1].gyro.front().force);
 }
 
 TEST(AslSource, TakesTheSequenceOrItsMav0)

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/inertial_scale.h"
+
+#include "motion/require.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace
+{
+// Where the errors stand in the state: attitude (right tangent), velocity, displacement, biases, log of the scale.
+constexpr int kAttitude = 0, kVelocity = 3, kMoved = 6, kGyro = 9, kForce = 12, kScale = 15;
+const Vector3d kGravity(0, 0, -9.81); // [m/s^2]
+constexpr double kGate = 30;          // squared innovation over its variance: not of this model
+
+double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+/// Two rows that span what is across \p unit.
+Eigen::Matrix<double, 2, 3> across(const Vector3d &unit)
+{
+  Eigen::Matrix<double, 2, 3> rows;
+  rows.row(0) = unit.unitOrthogonal().transpose();
+  rows.row(1) = unit.cross(Vector3d(rows.row(0))).transpose();
+  return rows;
+}
+} // namespace
+
+void InertialScaleOptions::validate() const
+{
+  const auto positive = [](const char *name, double value) { motion::require(value > 0, name, value, "above 0"); };
+  positive("inertial_scale.accelerometer_noise", accelerometer_noise);
+  positive("inertial_scale.accelerometer_bias_sigma", accelerometer_bias_sigma);
+  motion::require(accelerometer_bias_walk >= 0, "inertial_scale.accelerometer_bias_walk", accelerometer_bias_walk,
+                  "0 or more");
+  positive("inertial_scale.tilt_sigma", tilt_sigma);
+  positive("inertial_scale.odometry_walk", odometry_walk);
+  positive("inertial_scale.odometry_height_sigma", odometry_height_sigma);
+  positive("inertial_scale.start_sigma", start_sigma);
+  positive("inertial_scale.window", window);
+}
+
+InertialScale::InertialScale(const Pose &bMc, const InertialScaleOptions &options, const GyroOptions &gyro)
+    : m_bMc(bMc), m_options(options), m_gyro(gyro)
+{
+  options.validate();
+  gyro.validate();
+  m_covariance.diagonal().segment<3>(kGyro).setConstant(std::pow(gyro.bias_sigma, 2));
+  m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(options.accelerometer_bias_sigma, 2));
+  m_covariance(kScale, kScale) = std::pow(options.start_sigma, 2);
+}
+
+void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
+{
+  if (!collect(frame) || !frame.wMb_odometry || !m_anchor) {
+    restart(frame);
+    return;
+  }
+  const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
+  const auto seen = std::find_if(motions.begin(), motions.end(), [this](const RelativeMotion &motion) {
+    return motion.a_index == m_anchor->index && motion.points.hasRotation();
+  });
+  if (duration < m_options.window || (seen == motions.end() && duration < 2 * m_options.window))
+    return;
+  if (!m_started)
+    start(frame);
+  if (!predict(frame.stamp_ns)) {
+    restart(frame);
+    return;
+  }
+  compareTilt(*frame.wMb_odometry);
+  compareOdometry(*frame.wMb_odometry, duration);
+  if (seen != motions.end()) {
+    if (seen->points.hasDirection())
+      compareDirection(*seen);
+    compareRotation(*seen, duration);
+  }
+  ++m_compared;
+  begin(frame);
+}
+
+/// Keeps the samples of the frame; false where they have no force.
+bool InertialScale::collect(const Frame &frame)
+{
+  for (const GyroSample &sample : frame.gyro) {
+    if (!sample.force)
+      return false;
+    if (!m_first_force)
+      m_first_force = sample.force;
+    m_force_varies = m_force_varies || *m_first_force != *sample.force;
+    m_samples.push_back(sample);
+  }
+  return !m_samples.empty();
+}
+
+/// What moves is forgotten; what is constant stays.
+void InertialScale::restart(const Frame &frame)
+{
+  m_started = false;
+  m_anchor.reset();
+  if (m_samples.size() > 1)
+    m_samples.erase(m_samples.begin(), m_samples.end() - 1);
+  m_covariance.topRows<kGyro>().setZero();
+  m_covariance.leftCols<kGyro>().setZero();
+  if (frame.wMb_odometry)
+    begin(frame);
+}
+
+void InertialScale::begin(const Frame &frame)
+{
+  m_anchor = Anchor{frame.stamp_ns, frame.index, *frame.wMb_odometry};
+  if (m_samples.size() > 1)
+    m_samples.erase(m_samples.begin(), m_samples.end() - 1);
+  m_moved.setZero();
+  m_turned.setIdentity();
+  m_covariance.middleRows<3>(kMoved).setZero();
+  m_covariance.middleCols<3>(kMoved).setZero();
+}
+
+/// Attitude and velocity at the anchor from the odometry: the velocity loosely, since its scale is what is asked for.
+void InertialScale::start(const Frame &frame)
+{
+  const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
+  m_wRb = m_anchor->wMb.R;
+  m_velocity = (frame.wMb_odometry->t - m_anchor->wMb.t) / duration;
+  const double tilt2 = std::pow(m_options.tilt_sigma, 2), velocity_sigma = 0.3 + 0.3 * m_velocity.norm();
+  m_covariance.diagonal().segment<3>(kAttitude) << tilt2, tilt2, 1e-6;
+  m_covariance.diagonal().segment<3>(kVelocity).setConstant(velocity_sigma * velocity_sigma);
+  m_started = true;
+}
+
+/// From the anchor to \p to_ns through the samples, their means held in between; false where samples are missing.
+bool InertialScale::predict(std::int64_t to_ns)
+{
+  std::int64_t at_ns = m_anchor->stamp_ns;
+  const GyroSample *before = nullptr;
+  for (const GyroSample &sample : m_samples) {
+    const std::int64_t end_ns = std::min(sample.stamp_ns, to_ns);
+    if (end_ns > at_ns) {
+      if (seconds(end_ns - at_ns) > m_gyro.max_gap)
+        return false;
+      const GyroSample &first = before != nullptr ? *before : sample;
+      propagate(0.5 * (first.rate + sample.rate), 0.5 * (*first.force + *sample.force), seconds(end_ns - at_ns));
+      at_ns = end_ns;
+    }
+    before = &sample;
+  }
+  if (before == nullptr || seconds(to_ns - at_ns) > m_gyro.max_gap)
+    return false;
+  if (to_ns > at_ns)
+    propagate(before->rate, *before->force, seconds(to_ns - at_ns));
+  m_wRb = orthonormalized(m_wRb);
+  return true;
+}
+
+void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, double dt)
+{
+  const Matrix3d turn = expSo3((rate - m_gyro_bias) * dt);
+  const Vector3d specific = force - m_force_bias;
+  const Matrix3d by_attitude = -m_wRb * skew(specific) * dt;
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(kStates, kStates);
+  F.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
+  F.block<3, 3>(kAttitude, kGyro) = -dt * Matrix3d::Identity();
+  F.block<3, 3>(kVelocity, kAttitude) = by_attitude;
+  F.block<3, 3>(kVelocity, kForce) = -dt * m_wRb;
+  F.block<3, 3>(kMoved, kVelocity) = dt * Matrix3d::Identity();
+  F.block<3, 3>(kMoved, kAttitude) = 0.5 * dt * by_attitude;
+  F.block<3, 3>(kMoved, kForce) = -0.5 * dt * dt * m_wRb;
+  m_covariance = (F * m_covariance * F.transpose()).eval();
+  const auto white = [&](int at, double density) {
+    m_covariance.diagonal().segment<3>(at).array() += density * density * dt;
+  };
+  white(kAttitude, m_gyro.noise_density);
+  white(kVelocity, m_options.accelerometer_noise);
+  white(kGyro, m_gyro.bias_walk);
+  white(kForce, m_options.accelerometer_bias_walk);
+
+  const Vector3d acceleration = m_wRb * specific + kGravity;
+  m_moved += dt * m_velocity + 0.5 * dt * dt * acceleration;
+  m_velocity += dt * acceleration;
+  m_wRb = m_wRb * turn;
+  m_turned = m_turned * turn;
+}
+
+/// Kalman's update; a residual far beyond its covariance is left out.
+void InertialScale::update(const Eigen::MatrixXd &H, const Eigen::VectorXd &residual, const Eigen::MatrixXd &noise)
+{
+  const Eigen::MatrixXd PHt = m_covariance * H.transpose(), S = H * PHt + noise;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+  const Eigen::VectorXd solved = solver.solve(residual);
+  if (!(residual.dot(solved) < kGate))
+    return;
+  const Eigen::VectorXd change = PHt * solved;
+  const Eigen::MatrixXd gain = solver.solve(PHt.transpose()).transpose();
+  const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(kStates, kStates) - gain * H;
+  m_covariance = (left * m_covariance * left.transpose() + gain * noise * gain.transpose()).eval();
+  m_wRb = m_wRb * expSo3(change.segment<3>(kAttitude));
+  m_velocity += change.segment<3>(kVelocity);
+  m_moved += change.segment<3>(kMoved);
+  m_gyro_bias += change.segment<3>(kGyro);
+  m_force_bias += change.segment<3>(kForce);
+  m_log_scale += change(kScale);
+}
+
+/// Where is up, by the odometry's roll and pitch?
+void InertialScale::compareTilt(const Pose &wMb)
+{
+  const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ(), measured = wMb.R.transpose() * Vector3d::UnitZ();
+  const Eigen::Matrix<double, 2, 3> rows = across(up);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
+  H.middleCols<3>(kAttitude) = rows * skew(up);
+  update(H, rows * (measured - up), std::pow(m_options.tilt_sigma, 2) * Eigen::Matrix2d::Identity());
+}
+
+/// The displacement by the odometry, in the heading of this filter: its horizontal part has the scale.
+void InertialScale::compareOdometry(const Pose &wMb, double duration)
+{
+  const Vector3d in_body = wMb.R.transpose() * (wMb.t - m_anchor->wMb.t);
+  const double scale = std::exp(m_log_scale);
+  const Vector3d factor(scale, scale, 1);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
+  H.middleCols<3>(kMoved) = factor.asDiagonal();
+  H.middleCols<3>(kAttitude) = m_wRb * skew(in_body);
+  H.block<2, 1>(0, kScale) = scale * m_moved.head<2>();
+  const double walk2 = std::pow(m_options.odometry_walk, 2) * duration;
+  const Vector3d noise(walk2, walk2, std::pow(m_options.odometry_height_sigma, 2));
+  update(H, m_wRb * in_body - factor.cwiseProduct(m_moved), Matrix3d(noise.asDiagonal()));
+}
+
+/// The direction of the displacement of the camera, by the points.
+void InertialScale::compareDirection(const RelativeMotion &motion)
+{
+  const Matrix3d aRb = m_bMc.R * motion.points.aRb * m_bMc.R.transpose(), wRa = m_wRb * aRb.transpose();
+  const Vector3d moved = m_moved + (m_wRb - wRa) * m_bMc.t;
+  constexpr double kLeast = 0.02; // [m]: shorter displacements have no direction
+  const double length = moved.norm();
+  if (length < kLeast)
+    return;
+  const Vector3d direction = wRa * m_bMc.R * motion.points.direction;
+  const Eigen::Matrix<double, 2, 3> rows = across(direction);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
+  H.middleCols<3>(kMoved) = rows / length;
+  H.middleCols<3>(kAttitude) = rows * m_wRb * skew(m_wRb.transpose() * direction);
+  const double variance = 0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace();
+  update(H, -rows * moved / length, variance * Eigen::Matrix2d::Identity());
+}
+
+/// The rotation by the points: it shows the bias of the gyro.
+void InertialScale::compareRotation(const RelativeMotion &motion, double duration)
+{
+  const Matrix3d aRb = m_bMc.R * motion.points.aRb * m_bMc.R.transpose();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
+  H.middleCols<3>(kGyro) = -duration * Matrix3d::Identity();
+  const Matrix3d noise = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose() +
+                         std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
+  update(H, logSo3(m_turned.transpose() * aRb), noise);
+}
+
+std::optional<LogScale> InertialScale::scale(double prior_sigma) const
+{
+  if (m_compared == 0 || !m_force_varies)
+    return std::nullopt;
+  const double variance = m_covariance(kScale, kScale), prior2 = prior_sigma * prior_sigma;
+  LogScale result;
+  result.contradicts_prior = m_log_scale * m_log_scale > 9 * (variance + prior2);
+  if (result.contradicts_prior)
+    return LogScale{m_log_scale, std::sqrt(variance), true};
+  const double measured = std::max(0.0, 1 / variance - std::pow(m_options.start_sigma, -2)); // without its own prior
+  const double information = measured + 1 / std::max(1e-12, prior2);
+  result.mean = m_log_scale / variance / information;
+  result.sigma = 1 / std::sqrt(information);
+  return result;
+}
+} // namespace bole

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/sensor_monitor.h"
+
+#include "geometry/median.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace bole
+{
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace
+{
+constexpr double kMemory_s = 4;
+constexpr double kDegree = M_PI / 180;
+
+double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
+
+double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &covariance)
+{
+  const Vector3d error = logSo3(orthonormalized(aRb.transpose() * aRb_other));
+  return error.dot(covariance.ldlt().solve(error));
+}
+} // namespace
+
+const char *toString(Sensor sensor)
+{
+  constexpr const char *kNames[] = {"gyro", "odometry", "images"};
+  return kNames[static_cast<int>(sensor)];
+}
+
+SensorMonitor::SensorMonitor(const Pose &bMc, const SensorMonitorOptions &options) : m_bMc(bMc), m_options(options) {}
+
+void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
+{
+  collect(frame);
+  checkGyroSamples(frame);
+  checkSteps(frame, motions);
+  for (const RelativeMotion &motion : motions)
+    if (motion.points.hasRotation())
+      compare(frame, motion);
+  checkRotations();
+  checkDirection();
+  checkTilt(frame);
+}
+
+Frame SensorMonitor::trusted(const Frame &frame) const
+{
+  Frame result = frame;
+  if (!trusts(Sensor::gyro))
+    result.gyro.clear();
+  if (!trustsStep())
+    result.wMb_odometry.reset();
+  return result;
+}
+
+void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, bool lasts)
+{
+  bool &distrusted = m_distrusted[static_cast<int>(sensor)];
+  if (distrusted)
+    return;
+  distrusted = lasts;
+  m_verdicts.push_back({toString(sensor), kind, since_s, text});
+}
+
+void SensorMonitor::collect(const Frame &frame)
+{
+  for (const GyroSample &sample : frame.gyro)
+    m_samples.push_back(sample);
+  const std::int64_t oldest = frame.stamp_ns - nanoseconds(kMemory_s);
+  while (!m_samples.empty() && m_samples.front().stamp_ns < oldest)
+    m_samples.pop_front();
+  while (!m_comparisons.empty() && m_comparisons.front().a_ns < oldest)
+    m_comparisons.pop_front();
+  while (!m_steps.empty() && m_steps.front().stamp_ns < oldest)
+    m_steps.pop_front();
+}
+
+std::optional<Matrix3d> SensorMonitor::gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const
+{
+  constexpr std::int64_t kSlack_ns = 60'000'000; // the ends may lie between two samples
+  if (m_samples.empty() || m_samples.front().stamp_ns > from_ns + kSlack_ns ||
+      m_samples.back().stamp_ns < to_ns - kSlack_ns)
+    return std::nullopt;
+  const std::vector<GyroSample> samples(m_samples.begin(), m_samples.end());
+  const GyroRotation turned = integrateGyro(samples, from_ns, to_ns);
+  return turned.complete ? std::optional<Matrix3d>(turned.R) : std::nullopt;
+}
+
+/// A gyro that repeats its value or says nothing more.
+void SensorMonitor::checkGyroSamples(const Frame &frame)
+{
+  const GyroSample *before = nullptr;
+  for (const GyroSample &sample : m_samples) {
+    if (sample.stamp_ns > m_last_gyro_ns && (before == nullptr || sample.rate != before->rate))
+      m_gyro_changed_ns = sample.stamp_ns;
+    before = &sample;
+  }
+  if (!frame.gyro.empty()) {
+    m_had_gyro = true;
+    m_last_gyro_ns = frame.gyro.back().stamp_ns;
+  }
+  if (!m_had_gyro)
+    return;
+  if (seconds(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
+    raise(Sensor::gyro, "ended", seconds(m_last_gyro_ns),
+          fmt::format("gyro: nothing since {:.1f} s", seconds(m_last_gyro_ns)));
+  const bool moves = std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.parallax_px > 1; });
+  if (moves && m_gyro_changed_ns && seconds(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
+    raise(Sensor::gyro, "stuck", seconds(*m_gyro_changed_ns),
+          fmt::format("gyro: repeats its value since {:.1f} s", seconds(*m_gyro_changed_ns)));
+}
+
+/// The odometry from frame to frame.
+void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
+{
+  const double time_s = seconds(frame.stamp_ns);
+  m_step_jumped = false;
+  if (!frame.wMb_odometry) {
+    if (m_had_odometry && seconds(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
+      raise(Sensor::odometry, "ended", seconds(m_last_odometry_ns),
+            fmt::format("odometry: nothing since {:.1f} s", seconds(m_last_odometry_ns)));
+    m_steps.clear();
+    return;
+  }
+  m_had_odometry = true;
+  m_last_odometry_ns = frame.stamp_ns;
+  Step step;
+  step.stamp_ns = frame.stamp_ns;
+  step.wMb = *frame.wMb_odometry;
+  for (const RelativeMotion &motion : motions)
+    if (motion.points.hasDirection())
+      step.parallax_px = std::max(step.parallax_px, motion.points.parallax_px);
+  if (!m_steps.empty()) {
+    const Step &before = m_steps.back();
+    const double dt = std::max(1e-3, seconds(step.stamp_ns - before.stamp_ns));
+    step.velocity = (step.wMb.t - before.wMb.t) / dt;
+    if (m_steps.size() > 1) {
+      const Vector3d change = (step.velocity - before.velocity) * dt;
+      constexpr double kAcceleration = 3; // that flights reach for long [m/s^2]
+      const double expected = 2 * std::pow(m_options.odometry_walk, 2) * dt + std::pow(kAcceleration * dt * dt, 2);
+      step.scatter = 0.5 * change.head<2>().squaredNorm() / expected;
+      const double extent = change.head<2>().norm();
+      if (extent > m_options.jump + 10 * dt * dt) {
+        m_step_jumped = true;
+        step.velocity = before.velocity;
+        step.scatter = 0;
+        raise(Sensor::odometry, "jump", time_s, fmt::format("odometry: jump of {:.1f} m at {:.1f} s", extent, time_s),
+              false);
+      }
+    }
+  }
+  m_steps.push_back(step);
+  checkStandingStill(time_s);
+  checkScatter();
+}
+
+/// An odometry that stays where it is while the points move.
+void SensorMonitor::checkStandingStill(double time_s)
+{
+  double since_s = time_s;
+  int frames = 0;
+  bool moves = false;
+  for (auto step = m_steps.rbegin(); step + 1 != m_steps.rend(); ++step) {
+    if ((step->wMb.t - (step + 1)->wMb.t).norm() > 1e-6)
+      break;
+    ++frames;
+    moves = moves || step->parallax_px > 1;
+    since_s = seconds((step + 1)->stamp_ns);
+  }
+  if (frames >= 3 && moves)
+    raise(Sensor::odometry, "stuck", since_s, fmt::format("odometry: frozen since {:.1f} s", since_s));
+}
+
+/// White noise on the positions, by the change from step to step.
+void SensorMonitor::checkScatter()
+{
+  constexpr std::size_t kSteps = 12;
+  if (m_steps.size() < kSteps)
+    return;
+  std::vector<double> scatters;
+  for (auto step = m_steps.end() - kSteps; step != m_steps.end(); ++step)
+    scatters.push_back(step->scatter);
+  if (medianOf(scatters) > std::pow(m_options.noise_factor, 2))
+    raise(Sensor::odometry, "noise", seconds(m_steps[m_steps.size() - kSteps].stamp_ns),
+          "odometry: its positions scatter from frame to frame");
+}
+
+void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
+{
+  Comparison now;
+  now.a_ns = motion.a_ns;
+  now.b_ns = motion.b_ns;
+  const double dt = seconds(now.b_ns - now.a_ns);
+  now.points = Matrix3d(m_bMc.R * motion.points.aRb * m_bMc.R.transpose());
+  now.points_covariance = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose();
+  const Matrix3d one = Matrix3d::Identity();
+  const double bias2 = std::pow(m_options.gyro_bias_sigma * dt, 2) + std::pow(8e-4, 2) * dt;
+  const double turn2 = std::pow(m_options.odometry_turn_sigma, 2);
+  now.gyro = gyroBetween(now.a_ns, now.b_ns);
+  const auto a = std::find_if(m_steps.begin(), m_steps.end(), [&](const Step &s) { return s.stamp_ns == now.a_ns; });
+  if (frame.wMb_odometry && a != m_steps.end()) {
+    now.odometry = Matrix3d(a->wMb.R.transpose() * frame.wMb_odometry->R);
+    const Vector3d moved = a->wMb.R.transpose() * (frame.wMb_odometry->t - a->wMb.t);
+    const double length = moved.norm();
+    if (motion.points.hasDirection() && length > 0.05 && motion.points.parallax_px > 1) {
+      now.askew = (moved / length).cross(m_bMc.R * motion.points.direction);
+      now.askew_variance = 0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() +
+                           (std::pow(m_options.odometry_walk, 2) * dt + std::pow(m_options.odometry_height_sigma, 2)) /
+                               (length * length) +
+                           std::pow(m_options.odometry_relative, 2);
+    }
+  }
+  if (now.gyro)
+    now.gyro_points = squared(*now.gyro, *now.points, now.points_covariance + bias2 * one);
+  if (now.odometry)
+    now.odometry_points = squared(*now.odometry, *now.points, now.points_covariance + turn2 * one);
+  if (now.gyro && now.odometry)
+    now.gyro_odometry = squared(*now.gyro, *now.odometry, (bias2 + turn2) * one);
+  m_comparisons.push_back(now);
+}
+
+/// The sensor that stands in all failing pairs.
+void SensorMonitor::checkRotations()
+{
+  const int window = m_options.window;
+  if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
+    return;
+  const auto first = m_comparisons.end() - std::min<std::ptrdiff_t>(window, std::ptrdiff_t(m_comparisons.size()));
+  int gyro_points = 0, gyro_odometry = 0, odometry_points = 0, with_odometry = 0;
+  double since_s = seconds(m_comparisons.back().a_ns);
+  for (auto c = first; c != m_comparisons.end(); ++c) {
+    gyro_points += c->gyro_points > m_options.limit_points;
+    gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
+    odometry_points += c->odometry_points > m_options.limit_odometry;
+    with_odometry += c->odometry.has_value();
+    if (c->gyro_points > m_options.limit_points || c->odometry_points > m_options.limit_odometry)
+      since_s = std::min(since_s, seconds(c->a_ns));
+  }
+  const int enough = m_options.of_window;
+  const bool gyro_failed = gyro_points >= enough && !has(Sensor::gyro);
+  const bool odometry_failed = odometry_points >= enough && !has(Sensor::odometry);
+  if (gyro_failed && odometry_points * 2 >= gyro_points && odometry_points > 0 && gyro_odometry == 0)
+    raise(Sensor::images, "rotation", since_s,
+          fmt::format("images: contradict gyro and odometry since {:.1f} s (late, skewed or of another camera)",
+                      since_s));
+  else if (gyro_failed && !has(Sensor::images)) {
+    raise(Sensor::gyro, "rotation", since_s,
+          fmt::format("gyro: contradicts the points {}since {:.1f} s", gyro_odometry > 0 ? "and the odometry " : "",
+                      since_s));
+    nameGyro();
+  }
+  else if (odometry_failed && gyro_points == 0 && !has(Sensor::images))
+    raise(Sensor::odometry, "rotation", since_s,
+          fmt::format("odometry: its rotation contradicts the points since {:.1f} s", since_s));
+}
+
+/// Mean squared difference with the points that is left when the gyro is read \p offset_s later and a constant \p bias
+/// is taken off.
+std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) const
+{
+  const std::int64_t offset = nanoseconds(offset_s);
+  std::vector<std::pair<Vector3d, const Comparison *>> errors;
+  Matrix3d information = 1e-6 * Matrix3d::Identity();
+  Vector3d sum = Vector3d::Zero();
+  for (const Comparison &c : m_comparisons) {
+    const auto turned = gyroBetween(c.a_ns + offset, c.b_ns + offset);
+    if (!turned || c.gyro_points <= 0.5 * m_options.limit_points)
+      continue;
+    const double dt = seconds(c.b_ns - c.a_ns);
+    const Vector3d error = logSo3(orthonormalized(turned->transpose() * *c.points)) / dt;
+    const Matrix3d weight = (c.points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).inverse();
+    information += weight;
+    sum += weight * error;
+    errors.push_back({error, &c});
+  }
+  if (errors.size() < 3)
+    return std::nullopt;
+  *bias = -information.ldlt().solve(sum);
+  double total = 0;
+  for (const auto &[error, c] : errors) {
+    const double dt = seconds(c->b_ns - c->a_ns);
+    const Vector3d left = error + *bias;
+    total += left.dot((c->points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).ldlt().solve(left));
+  }
+  return total / (3 * double(errors.size()));
+}
+
+/// What is wrong with the gyro: a constant bias, another clock, or something else.
+void SensorMonitor::nameGyro()
+{
+  SensorVerdict &verdict = m_verdicts.back();
+  if (verdict.sensor != toString(Sensor::gyro))
+    return;
+  constexpr double kExplained = 6; // mean squared difference that is left when the cause is found
+  Vector3d bias;
+  const auto constant = misfitAt(0, &bias);
+  if (constant && *constant < kExplained && bias.norm() > 3 * m_options.gyro_bias_sigma) {
+    verdict.kind = "bias";
+    verdict.text = fmt::format("gyro: bias {:.2f} rad/s", bias.norm());
+    return;
+  }
+  double best = kExplained, best_offset = 0;
+  for (int k = -15; k <= 15; ++k) {
+    Vector3d ignored;
+    const auto misfit = misfitAt(0.01 * k, &ignored);
+    if (k != 0 && misfit && *misfit < best) {
+      best = *misfit;
+      best_offset = 0.01 * k;
+    }
+  }
+  if (best_offset != 0 && (!constant || best < 0.3 * *constant)) {
+    verdict.kind = "time";
+    verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(best_offset));
+  }
+  else if (verdict.since_s < seconds(m_comparisons.front().b_ns)) {
+    verdict.text = "gyro: axes, sign or units wrong";
+  }
+}
+
+/// A constant rotation between the direction of the odometry and that of the points.
+void SensorMonitor::checkDirection()
+{
+  constexpr std::size_t kLeast = 24; // comparisons
+  constexpr double kTogether = 3;    // that overlap
+  std::vector<double> x, y, z;
+  double information = 0;
+  for (const Comparison &c : m_comparisons) {
+    if (c.askew_variance <= 0)
+      continue;
+    x.push_back(c.askew.x());
+    y.push_back(c.askew.y());
+    z.push_back(c.askew.z());
+    information += 1 / c.askew_variance;
+  }
+  if (x.size() < kLeast)
+    return;
+  const Vector3d askew(medianOf(x), medianOf(y), medianOf(z));
+  const double sigma = std::sqrt(1.6 * kTogether / information); // 1.6: of a median
+  if (askew.norm() > std::max(m_options.direction_limit, 5 * sigma))
+    raise(Sensor::odometry, "direction", seconds(m_comparisons.front().a_ns),
+          fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
+}
+
+/// Gravity of the odometry's roll and pitch against the accelerometer's, accelerations by the odometry's own velocity.
+void SensorMonitor::checkTilt(const Frame &frame)
+{
+  constexpr double kGravity = 9.81;
+  constexpr std::size_t kLeast = 20; // steps
+  if (m_steps.size() < kLeast || !frame.wMb_odometry)
+    return;
+  Vector3d sum = Vector3d::Zero();
+  int count = 0;
+  bool varies = false;
+  auto step = m_steps.begin() + 1;
+  const Vector3d *first = nullptr;
+  for (const GyroSample &sample : m_samples) {
+    while (step != m_steps.end() && step->stamp_ns < sample.stamp_ns)
+      ++step;
+    if (step == m_steps.end())
+      break;
+    if (!sample.force || sample.stamp_ns <= m_steps[1].stamp_ns)
+      continue;
+    first = first == nullptr ? &*sample.force : first;
+    varies = varies || *first != *sample.force;
+    sum += step->wMb.R * *sample.force;
+    ++count;
+  }
+  if (count < 40 || !varies)
+    return;
+  const double dt = seconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
+  const std::size_t n = m_steps.size();
+  const auto velocity = [&](std::size_t i) {
+    return Vector3d((m_steps[i].velocity + m_steps[i + 1].velocity + m_steps[i + 2].velocity) / 3);
+  };
+  const Vector3d mean = sum / count - (velocity(n - 3) - velocity(1)) / dt;
+  const double tilt = std::atan2(mean.head<2>().norm(), mean.z());
+  constexpr double kLongest = 0.2; // beyond it the limit does not grow
+  const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));
+  if (tilt > allowed)
+    raise(Sensor::odometry, "tilt", seconds(m_steps.front().stamp_ns),
+          fmt::format("odometry: its roll and pitch are {:.0f} degrees off gravity", tilt / kDegree));
+}
+} // namespace bole

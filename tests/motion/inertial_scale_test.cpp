@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/inertial_scale.h"
+
+#include "motion/made_flight.h"
+
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+using test::MadeFlight;
+
+InertialScale fly(double duration, MadeFlight flight)
+{
+  InertialScale inertial(forwardCamera());
+  for (std::size_t i = 0; i < static_cast<std::size_t>(10 * duration); ++i)
+    inertial.process(flight.frame(i), flight.seen(i));
+  return inertial;
+}
+constexpr double kWide = 10; // of the log of the scale: nothing is expected
+} // namespace
+
+TEST(InertialScale, ExactSensorsGiveTheScaleOfTheOdometry)
+{
+  for (const double factor : {0.8, 0.97, 1.05, 1.3}) {
+    MadeFlight made;
+    made.factor = factor;
+    const auto scale = fly(12, made).scale(kWide);
+    ASSERT_TRUE(scale);
+    EXPECT_NEAR(scale->mean, std::log(factor), 0.006) << factor;
+  }
+}
+
+TEST(InertialScale, NoiseAndBiasStayWithinThreeStandardDeviations)
+{
+  MadeFlight made;
+  made.odometry_noise = 0.012;
+  made.force_noise = 0.1;
+  made.force_bias = {0.05, -0.08, 0.04};
+  const auto scale = fly(12, made).scale(kWide);
+  ASSERT_TRUE(scale);
+  EXPECT_LT(scale->sigma, 0.03);
+  EXPECT_LT(std::abs(scale->mean - std::log(made.factor)), 3 * scale->sigma);
+}
+
+TEST(InertialScale, ASteadyFlightLeavesTheScaleUnknown)
+{
+  MadeFlight made;
+  made.sway = 0;
+  made.odometry_noise = 0.012;
+  made.force_noise = 0.1;
+  const auto scale = fly(12, made).scale(0.03);
+  ASSERT_TRUE(scale);
+  EXPECT_GT(scale->sigma, 0.02);
+}
+
+TEST(InertialScale, AnAccelerometerThatRepeatsOneValueIsNotBelieved)
+{
+  MadeFlight made;
+  made.has_constant_force = true;
+  EXPECT_FALSE(fly(6, made).scale(0.03));
+}
+
+TEST(InertialScale, AnOdometryAThirdTooLongContradictsWhatWasExpected)
+{
+  MadeFlight made;
+  made.factor = 1.33;
+  const auto scale = fly(12, made).scale(0.03);
+  ASSERT_TRUE(scale);
+  EXPECT_TRUE(scale->contradicts_prior);
+  EXPECT_NEAR(scale->mean, std::log(1.33), 0.02);
+}
+} // namespace bole

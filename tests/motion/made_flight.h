@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// A flight from side to side that is made up: ten frames and 200 samples of gyro and accelerometer a second, an
+/// odometry with a scale, and what points would say.
+
+#include "motion/point_motion.h"
+
+#include "input/camera_file.h"
+
+#include <cmath>
+#include <random>
+
+namespace bole::test
+{
+struct MadeFlight
+{
+  double sway = 1.2;         ///< amplitude of the path from side to side [m]
+  double factor = 1;         ///< of the odometry's horizontal lengths
+  double odometry_noise = 0; ///< horizontal, a frame [m]
+  double force_noise = 0;    ///< a sample [m/s^2]
+  Eigen::Vector3d force_bias = Eigen::Vector3d::Zero();
+  bool has_constant_force = false;
+  std::mt19937 random{1};
+  Eigen::Vector3d walked = Eigen::Vector3d::Zero(); ///< of the odometry from the truth
+
+  static Pose truth(double t, double sway)
+  {
+    const double w = 2 * M_PI / 6, lead = 0.3 * std::sin(0.9 * t);
+    return {expSo3({0, 0, lead}) * expSo3({0.1 * std::sin(1.3 * t), 0.05 * std::cos(t), 0}),
+            {t, sway * std::sin(w * t), 1.2 + 0.1 * std::sin(0.7 * t)}};
+  }
+  Pose truth(double t) const { return truth(t, sway); }
+
+  static std::int64_t nanoseconds(double t) { return static_cast<std::int64_t>(std::llround(t * 1e9)); }
+
+  Eigen::Vector3d white()
+  {
+    std::normal_distribution<double> normal;
+    return {normal(random), normal(random), normal(random)};
+  }
+
+  GyroSample sample(double t)
+  {
+    constexpr double h = 1e-3;
+    const Eigen::Vector3d rate = logSo3(truth(t - h).R.transpose() * truth(t + h).R) / (2 * h);
+    const Eigen::Vector3d acceleration = (truth(t + h).t - 2 * truth(t).t + truth(t - h).t) / (h * h);
+    Eigen::Vector3d force = truth(t).R.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + force_bias;
+    force += force_noise * white();
+    return {nanoseconds(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
+  }
+
+  /// The frame at 0.1 s times \p index; to be asked for in the order of time.
+  Frame frame(std::size_t index)
+  {
+    const double t = 0.1 * static_cast<double>(index);
+    Frame frame;
+    frame.index = index;
+    frame.stamp_ns = nanoseconds(t);
+    walked += odometry_noise * white().cwiseProduct(Eigen::Vector3d(1, 1, 0));
+    frame.wMb_odometry = truth(t);
+    frame.wMb_odometry->t.head<2>() *= factor;
+    frame.wMb_odometry->t += walked;
+    for (int k = 1; k <= 20 && index > 0; ++k)
+      frame.gyro.push_back(sample(t - 0.1 + 0.005 * k));
+    return frame;
+  }
+
+  /// What points say of the motion since three frames before.
+  std::vector<RelativeMotion> seen(std::size_t index) const
+  {
+    if (index < 3)
+      return {};
+    const Pose bMc = forwardCamera();
+    const double to = 0.1 * static_cast<double>(index), from = to - 0.3;
+    const Pose aMb = (truth(from) * bMc).inverse() * (truth(to) * bMc);
+    RelativeMotion motion;
+    motion.frames_back = 3;
+    motion.a_index = index - 3;
+    motion.b_index = index;
+    motion.a_ns = nanoseconds(from);
+    motion.b_ns = nanoseconds(to);
+    motion.points.status = RelativePoseStatus::ok;
+    motion.points.aRb = aMb.R;
+    motion.points.direction = aMb.t.normalized();
+    motion.points.parallax_px = 3;
+    motion.points.covariance = 1e-4 * Matrix5d::Identity();
+    motion.points.covariance.topLeftCorner<3, 3>() *= 1e-2;
+    return {motion};
+  }
+};
+} // namespace bole::test

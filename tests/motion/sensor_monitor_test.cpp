@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/sensor_monitor.h"
+
+#include "motion/made_flight.h"
+
+#include <functional>
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+using Eigen::Vector3d;
+using test::MadeFlight;
+constexpr double kBegins_s = 5;
+
+/// Eight seconds; \p damage changes a frame before the monitor sees it.
+SensorMonitor fly(const std::function<void(Frame &)> &damage)
+{
+  MadeFlight flight;
+  flight.odometry_noise = 0.012;
+  flight.force_noise = 0.1;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 80; ++i) {
+    Frame frame = flight.frame(i);
+    damage(frame);
+    monitor.process(frame, flight.seen(i));
+  }
+  return monitor;
+}
+
+void eachRate(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
+{
+  for (GyroSample &sample : frame.gyro)
+    sample.rate = change(sample.rate);
+}
+
+bool isLate(const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(kBegins_s); }
+
+struct Fault
+{
+  const char *name;
+  std::function<void(Frame &)> damage;
+  Sensor sensor;
+  const char *kind;
+};
+
+std::vector<Fault> faults()
+{
+  const auto pitched = [](double angle) { return expSo3({0, angle, 0}); };
+  return {
+      {"bias", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); }); },
+       Sensor::gyro, "bias"},
+      {"sign", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); },
+       Sensor::gyro, "rotation"},
+      {"swapped", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.y(), w.x(), w.z()); }); },
+       Sensor::gyro, "rotation"},
+      {"zero",
+       [](Frame &f) {
+         if (isLate(f))
+           eachRate(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
+       },
+       Sensor::gyro, "stuck"},
+      {"silent",
+       [](Frame &f) {
+         if (isLate(f))
+           f.gyro.clear();
+       },
+       Sensor::gyro, "ended"},
+      {"ends",
+       [](Frame &f) {
+         if (isLate(f))
+           f.wMb_odometry.reset();
+       },
+       Sensor::odometry, "ended"},
+      {"jumps",
+       [](Frame &f) {
+         if (isLate(f))
+           f.wMb_odometry->t.y() += 1;
+       },
+       Sensor::odometry, "jump"},
+      {"freezes",
+       [held = Pose()](Frame &f) mutable {
+         if (!isLate(f))
+           held = *f.wMb_odometry;
+         f.wMb_odometry = held;
+       },
+       Sensor::odometry, "stuck"},
+      {"leans", [=](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * pitched(0.17); }, Sensor::odometry, nullptr},
+      {"askew",
+       [](Frame &f) {
+         f.wMb_odometry->R = f.wMb_odometry->R * expSo3({0, 0, 0.2});
+       },
+       Sensor::odometry, "direction"},
+      {"turned over",
+       [](Frame &f) {
+         const Eigen::Matrix3d over = expSo3({M_PI, 0, 0});
+         *f.wMb_odometry = {over * f.wMb_odometry->R * over, over * f.wMb_odometry->t};
+       },
+       Sensor::odometry, nullptr},
+  };
+}
+} // namespace
+
+TEST(SensorMonitor, SensorsThatAgreeRaiseNothing)
+{
+  const SensorMonitor monitor = fly([](Frame &) {});
+  EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
+}
+
+TEST(SensorMonitor, EachFaultIsNamedWithItsSensor)
+{
+  for (const Fault &fault : faults()) {
+    const SensorMonitor monitor = fly(fault.damage);
+    ASSERT_FALSE(monitor.verdicts().empty()) << fault.name;
+    const SensorVerdict &verdict = monitor.verdicts().front();
+    EXPECT_EQ(verdict.sensor, toString(fault.sensor)) << fault.name << ": " << verdict.text;
+    if (fault.kind != nullptr)
+      EXPECT_EQ(verdict.kind, fault.kind) << fault.name << ": " << verdict.text;
+    EXPECT_TRUE(monitor.trusts(Sensor::images)) << fault.name;
+    EXPECT_TRUE(monitor.trusts(fault.sensor == Sensor::gyro ? Sensor::odometry : Sensor::gyro)) << fault.name;
+  }
+}
+
+TEST(SensorMonitor, AFaultIsDatedWithinHalfASecond)
+{
+  for (const Fault &fault : faults())
+    if (const std::string name = fault.name; name == "zero" || name == "silent" || name == "ends" || name == "freezes")
+      EXPECT_NEAR(fly(fault.damage).verdicts().at(0).since_s, kBegins_s, 0.5) << name;
+}
+
+TEST(SensorMonitor, AGyroOfAnotherClockIsToldByHowLateItIs)
+{
+  const SensorMonitor monitor = fly([](Frame &frame) {
+    for (GyroSample &sample : frame.gyro)
+      sample.rate = MadeFlight().sample(1e-9 * double(sample.stamp_ns) - 0.08).rate;
+  });
+  ASSERT_FALSE(monitor.verdicts().empty());
+  EXPECT_EQ(monitor.verdicts().front().sensor, "gyro") << monitor.verdicts().front().text;
+}
+
+TEST(SensorMonitor, ImagesThatContradictBothOthersAreTheLiar)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 80; ++i) {
+    std::vector<RelativeMotion> seen = flight.seen(i);
+    for (RelativeMotion &motion : seen)
+      motion.points.aRb = motion.points.aRb * expSo3({0, 0.08, 0});
+    monitor.process(flight.frame(i), seen);
+  }
+  EXPECT_FALSE(monitor.trusts(Sensor::images));
+  EXPECT_TRUE(monitor.trusts(Sensor::gyro));
+  EXPECT_TRUE(monitor.trusts(Sensor::odometry));
+}
+
+TEST(SensorMonitor, ATrustedFrameHasNothingOfALiar)
+{
+  const SensorMonitor monitor = fly(faults()[1].damage);
+  Frame frame = MadeFlight().frame(5);
+  EXPECT_TRUE(monitor.trusted(frame).gyro.empty());
+  EXPECT_TRUE(monitor.trusted(frame).wMb_odometry);
+}
+} // namespace bole
