@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/inertial_scale.h"
 
-#include "motion/require.h"
+#include "geometry/require_range.h"
 
 #include <Eigen/Dense>
 
@@ -34,11 +34,10 @@ Eigen::Matrix<double, 2, 3> across(const Vector3d &unit)
 
 void InertialScaleOptions::validate() const
 {
-  const auto positive = [](const char *name, double value) { motion::require(value > 0, name, value, "above 0"); };
+  const auto positive = [](const char *name, double value) { requireRange(name, value, 1e-12, 1e6); };
   positive("inertial_scale.accelerometer_noise", accelerometer_noise);
   positive("inertial_scale.accelerometer_bias_sigma", accelerometer_bias_sigma);
-  motion::require(accelerometer_bias_walk >= 0, "inertial_scale.accelerometer_bias_walk", accelerometer_bias_walk,
-                  "0 or more");
+  requireRange("inertial_scale.accelerometer_bias_walk", accelerometer_bias_walk, 0, 1e6);
   positive("inertial_scale.tilt_sigma", tilt_sigma);
   positive("inertial_scale.odometry_walk", odometry_walk);
   positive("inertial_scale.odometry_height_sigma", odometry_height_sigma);
