@@ -9,7 +9,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kMostGap_s = 0.1;    ///< a longer gap between samples is not bridged as known
 constexpr double kGapRateSigma = 0.5; ///< of the rate in such a gap [rad/s]
 
 /// Rate at a stamp: linear between the samples around it, held before the first and after the last.

@@ -21,6 +21,8 @@
 
 namespace bole
 {
+constexpr double kMostGap_s = 0.1; ///< a longer gap between samples is not bridged as known
+
 struct GyroOptions
 {
   /// White noise of the rate [rad/s/sqrt(Hz)], > 0. Measured on the rendered flights: 0.0022 rad/s

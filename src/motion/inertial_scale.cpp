@@ -49,7 +49,6 @@ InertialScale::InertialScale(const Pose &bMc, const InertialScaleOptions &option
     : m_bMc(bMc), m_options(options), m_gyro(gyro)
 {
   options.validate();
-  gyro.validate();
   m_covariance.diagonal().segment<3>(kGyro).setConstant(std::pow(gyro.bias_sigma, 2));
   m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(options.accelerometer_bias_sigma, 2));
   m_covariance(kScale, kScale) = std::pow(options.start_sigma, 2);
@@ -142,7 +141,7 @@ bool InertialScale::predict(std::int64_t to_ns)
   for (const GyroSample &sample : m_samples) {
     const std::int64_t end_ns = std::min(sample.stamp_ns, to_ns);
     if (end_ns > at_ns) {
-      if (seconds(end_ns - at_ns) > m_gyro.max_gap)
+      if (seconds(end_ns - at_ns) > kMostGap_s)
         return false;
       const GyroSample &first = before != nullptr ? *before : sample;
       propagate(0.5 * (first.rate + sample.rate), 0.5 * (*first.force + *sample.force), seconds(end_ns - at_ns));
@@ -150,7 +149,7 @@ bool InertialScale::predict(std::int64_t to_ns)
     }
     before = &sample;
   }
-  if (before == nullptr || seconds(to_ns - at_ns) > m_gyro.max_gap)
+  if (before == nullptr || seconds(to_ns - at_ns) > kMostGap_s)
     return false;
   if (to_ns > at_ns)
     propagate(before->rate, *before->force, seconds(to_ns - at_ns));
