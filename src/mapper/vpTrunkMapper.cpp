@@ -84,7 +84,7 @@ public:
 
   vpCameraParameters m_cam;
   MountedCamera m_mounted;
-  StageOptions m_options;
+  Options m_options;
   double m_period_s = 1.0 / 25;
   double m_next_s = 0; ///< stamp of the next image that comes without one
   std::optional<FrameBuilder> m_builder;
@@ -199,7 +199,7 @@ void vpTrunkMapper::setCameraHeight(double height)
   m_impl->requireUnstarted("vpTrunkMapper::setCameraHeight()");
   if (!(height >= 0.1 && height <= 100))
     throw vpException(vpException::badValue, "height = %g, must be 0.1 to 100 m", height);
-  m_impl->m_options.visual.camera_height = height;
+  m_impl->m_options.camera.height = height;
 }
 
 void vpTrunkMapper::setFrameRate(double rate)
