@@ -65,6 +65,7 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
   ++m_summary.frames[frame.status];
   if (frame.status != FrameStatus::ok && !frame.message.empty())
     m_summary.reasons.emplace(frame.status, frame.message);
+  m_summary.sensors = report.verdicts;
   m_first_ns = m_is_begun ? m_first_ns : frame.stamp_ns;
   m_is_begun = true;
   m_last_ns = frame.stamp_ns;

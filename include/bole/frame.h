@@ -35,6 +35,15 @@ struct GyroSample
   std::optional<Eigen::Vector3d> force = {}; ///< specific force in the body frame [m/s^2]: +9.81 upwards at rest
 };
 
+/// A sensor that contradicts the others.
+struct SensorVerdict
+{
+  std::string sensor; ///< "gyro", "odometry" or "images"
+  std::string kind;   ///< for programs: rotation, bias, time, stuck, ended, jump, noise, direction or tilt
+  double since_s = 0; ///< stamp at which the contradiction began [s]
+  std::string text;   ///< for the user: "odometry: frozen since 5.0 s"
+};
+
 struct Frame
 {
   std::int64_t stamp_ns = 0;

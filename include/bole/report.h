@@ -61,15 +61,6 @@ struct SaliencyField
   bool isKnown(unsigned row, unsigned column) const { return confidence[row][column] >= unknown_below; }
 };
 
-/// A sensor that contradicts the others. It is not used any more; the map goes on without it.
-struct SensorVerdict
-{
-  std::string sensor; ///< "gyro", "odometry" or "images"
-  std::string kind;   ///< for programs: rotation, bias, time, stuck, ended, jump, noise, direction or tilt
-  double since_s = 0; ///< stamp at which the contradiction began [s]
-  std::string text;   ///< for the user: "odometry: frozen since 5.0 s"
-};
-
 struct FrameReport
 {
   std::size_t index = 0; ///< frames processed before this one

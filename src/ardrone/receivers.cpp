@@ -13,7 +13,7 @@ constexpr Milliseconds kPoll{50};
 // With the pause and half a second to a key frame: within a second.
 constexpr Milliseconds kConnect{250};
 constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
 constexpr int kMostDatagrams = 1000; // a second: the drone sends 15, an emulator at its fastest 600
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
 } // namespace
@@ -110,7 +110,7 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
     if (read != Socket::Read::data)
       continue;
     last_data_ns = steadyNowNs();
-    if (last_data_ns - second_ns > kSecond_ns) {
+    if (last_data_ns - second_ns > kOneSecond_ns) {
       second_ns = last_data_ns;
       count = 0;
     }

@@ -19,7 +19,7 @@ namespace
 constexpr double kMemory_s = 4;
 constexpr double kDegree = M_PI / 180;
 
-double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+double inSeconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &covariance)
@@ -108,24 +108,24 @@ void SensorMonitor::checkGyroSamples(const Frame &frame)
   }
   if (!m_had_gyro)
     return;
-  if (seconds(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
-    raise(Sensor::gyro, "ended", seconds(m_last_gyro_ns),
-          fmt::format("gyro: nothing since {:.1f} s", seconds(m_last_gyro_ns)));
+  if (inSeconds(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
+    raise(Sensor::gyro, "ended", inSeconds(m_last_gyro_ns),
+          fmt::format("gyro: nothing since {:.1f} s", inSeconds(m_last_gyro_ns)));
   const bool moves = std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.parallax_px > 1; });
-  if (moves && m_gyro_changed_ns && seconds(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
-    raise(Sensor::gyro, "stuck", seconds(*m_gyro_changed_ns),
-          fmt::format("gyro: repeats its value since {:.1f} s", seconds(*m_gyro_changed_ns)));
+  if (moves && m_gyro_changed_ns && inSeconds(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
+    raise(Sensor::gyro, "stuck", inSeconds(*m_gyro_changed_ns),
+          fmt::format("gyro: repeats its value since {:.1f} s", inSeconds(*m_gyro_changed_ns)));
 }
 
 /// The odometry from frame to frame.
 void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
-  const double time_s = seconds(frame.stamp_ns);
+  const double time_s = inSeconds(frame.stamp_ns);
   m_step_jumped = false;
   if (!frame.wMb_odometry) {
-    if (m_had_odometry && seconds(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
-      raise(Sensor::odometry, "ended", seconds(m_last_odometry_ns),
-            fmt::format("odometry: nothing since {:.1f} s", seconds(m_last_odometry_ns)));
+    if (m_had_odometry && inSeconds(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
+      raise(Sensor::odometry, "ended", inSeconds(m_last_odometry_ns),
+            fmt::format("odometry: nothing since {:.1f} s", inSeconds(m_last_odometry_ns)));
     m_steps.clear();
     return;
   }
@@ -139,7 +139,7 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
       step.parallax_px = std::max(step.parallax_px, motion.points.parallax_px);
   if (!m_steps.empty()) {
     const Step &before = m_steps.back();
-    const double dt = std::max(1e-3, seconds(step.stamp_ns - before.stamp_ns));
+    const double dt = std::max(1e-3, inSeconds(step.stamp_ns - before.stamp_ns));
     step.velocity = (step.wMb.t - before.wMb.t) / dt;
     if (m_steps.size() > 1) {
       const Vector3d change = (step.velocity - before.velocity) * dt;
@@ -172,7 +172,7 @@ void SensorMonitor::checkStandingStill(double time_s)
       break;
     ++frames;
     moves = moves || step->parallax_px > 1;
-    since_s = seconds((step + 1)->stamp_ns);
+    since_s = inSeconds((step + 1)->stamp_ns);
   }
   if (frames >= 3 && moves)
     raise(Sensor::odometry, "stuck", since_s, fmt::format("odometry: frozen since {:.1f} s", since_s));
@@ -188,7 +188,7 @@ void SensorMonitor::checkScatter()
   for (auto step = m_steps.end() - kSteps; step != m_steps.end(); ++step)
     scatters.push_back(step->scatter);
   if (medianOf(scatters) > std::pow(m_options.noise_factor, 2))
-    raise(Sensor::odometry, "noise", seconds(m_steps[m_steps.size() - kSteps].stamp_ns),
+    raise(Sensor::odometry, "noise", inSeconds(m_steps[m_steps.size() - kSteps].stamp_ns),
           "odometry: its positions scatter from frame to frame");
 }
 
@@ -197,7 +197,7 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
   Comparison now;
   now.a_ns = motion.a_ns;
   now.b_ns = motion.b_ns;
-  const double dt = seconds(now.b_ns - now.a_ns);
+  const double dt = inSeconds(now.b_ns - now.a_ns);
   now.points = Matrix3d(m_bMc.R * motion.points.aRb * m_bMc.R.transpose());
   now.points_covariance = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose();
   const Matrix3d one = Matrix3d::Identity();
@@ -234,14 +234,14 @@ void SensorMonitor::checkRotations()
     return;
   const auto first = m_comparisons.end() - std::min<std::ptrdiff_t>(window, std::ptrdiff_t(m_comparisons.size()));
   int gyro_points = 0, gyro_odometry = 0, odometry_points = 0, with_odometry = 0;
-  double since_s = seconds(m_comparisons.back().a_ns);
+  double since_s = inSeconds(m_comparisons.back().a_ns);
   for (auto c = first; c != m_comparisons.end(); ++c) {
     gyro_points += c->gyro_points > m_options.limit_points;
     gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
     odometry_points += c->odometry_points > m_options.limit_odometry;
     with_odometry += c->odometry.has_value();
     if (c->gyro_points > m_options.limit_points || c->odometry_points > m_options.limit_odometry)
-      since_s = std::min(since_s, seconds(c->a_ns));
+      since_s = std::min(since_s, inSeconds(c->a_ns));
   }
   const int enough = m_options.of_window;
   const bool gyro_failed = gyro_points >= enough && !has(Sensor::gyro);
@@ -273,7 +273,7 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
     const auto turned = gyroBetween(c.a_ns + offset, c.b_ns + offset);
     if (!turned || c.gyro_points <= 0.5 * m_options.limit_points)
       continue;
-    const double dt = seconds(c.b_ns - c.a_ns);
+    const double dt = inSeconds(c.b_ns - c.a_ns);
     const Vector3d error = logSo3(orthonormalized(turned->transpose() * *c.points)) / dt;
     const Matrix3d weight = (c.points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).inverse();
     information += weight;
@@ -285,7 +285,7 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
   *bias = -information.ldlt().solve(sum);
   double total = 0;
   for (const auto &[error, c] : errors) {
-    const double dt = seconds(c->b_ns - c->a_ns);
+    const double dt = inSeconds(c->b_ns - c->a_ns);
     const Vector3d left = error + *bias;
     total += left.dot((c->points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).ldlt().solve(left));
   }
@@ -319,7 +319,7 @@ void SensorMonitor::nameGyro()
     verdict.kind = "time";
     verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(best_offset));
   }
-  else if (verdict.since_s < seconds(m_comparisons.front().b_ns)) {
+  else if (verdict.since_s < inSeconds(m_comparisons.front().b_ns)) {
     verdict.text = "gyro: axes, sign or units wrong";
   }
 }
@@ -344,7 +344,7 @@ void SensorMonitor::checkDirection()
   const Vector3d askew(medianOf(x), medianOf(y), medianOf(z));
   const double sigma = std::sqrt(1.6 * kTogether / information); // 1.6: of a median
   if (askew.norm() > std::max(m_options.direction_limit, 5 * sigma))
-    raise(Sensor::odometry, "direction", seconds(m_comparisons.front().a_ns),
+    raise(Sensor::odometry, "direction", inSeconds(m_comparisons.front().a_ns),
           fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
 }
 
@@ -374,7 +374,7 @@ void SensorMonitor::checkTilt(const Frame &frame)
   }
   if (count < 40 || !varies)
     return;
-  const double dt = seconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
+  const double dt = inSeconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
   const std::size_t n = m_steps.size();
   const auto velocity = [&](std::size_t i) {
     return Vector3d((m_steps[i].velocity + m_steps[i + 1].velocity + m_steps[i + 2].velocity) / 3);
@@ -384,7 +384,7 @@ void SensorMonitor::checkTilt(const Frame &frame)
   constexpr double kLongest = 0.2; // beyond it the limit does not grow
   const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));
   if (tilt > allowed)
-    raise(Sensor::odometry, "tilt", seconds(m_steps.front().stamp_ns),
+    raise(Sensor::odometry, "tilt", inSeconds(m_steps.front().stamp_ns),
           fmt::format("odometry: its roll and pitch are {:.0f} degrees off gravity", tilt / kDegree));
 }
 } // namespace bole

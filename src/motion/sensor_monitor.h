@@ -18,7 +18,7 @@
 /// Cost: 0.1 ms a frame. Not thread-safe.
 
 #include "motion/point_motion.h"
-#include <bole/report.h>
+#include <bole/frame.h>
 
 #include <deque>
 #include <optional>

@@ -125,6 +125,10 @@ std::string toJson(const RunSummary &summary)
   json["ranges"] = summary.reference.has_ranges;
   json["motion"] = motionJson(summary);
   json["frames"] = framesJson(summary.frames);
+  json["sensors"] = Json::array();
+  for (const SensorVerdict &sensor : summary.sensors)
+    json["sensors"].push_back(
+        {{"sensor", sensor.sensor}, {"kind", sensor.kind}, {"since_s", sensor.since_s}, {"text", sensor.text}});
   json["trunks"] = trunksJson(summary.trunks, summary.reference.has_ranges);
   json["timing"] = timingJson(summary.timing);
   for (const auto &[name, value] : summary.figures)

@@ -34,6 +34,7 @@ struct RunSummary
   WorldReference reference; ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
   std::map<FrameStatus, std::string> reasons; ///< the first message of each status
+  std::vector<SensorVerdict> sensors;         ///< sensors that contradict the others
   double duration_s = 0;                      ///< from the first frame to the last
   double path_m = 0;                          ///< length of the smoothed trajectory
   double extent_m = 0;                        ///< farthest that the camera was from its first place

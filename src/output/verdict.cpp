@@ -130,6 +130,10 @@ Verdict judge(const RunSummary &summary)
     verdict.doubts.push_back("The run was interrupted: this is what was known by then.");
   judgeMotion(verdict, summary);
   judgeReference(verdict, summary);
+  for (const SensorVerdict &sensor : summary.sensors) {
+    verdict.is_trusted = false;
+    verdict.doubts.push_back(fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));
+  }
   constexpr double kFew = 0.8;
   const double good = static_cast<double>(goodFrames(summary));
   if (good > 0 && good < kFew * static_cast<double>(framesIn(summary)))
