@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole benchmark: simulate, track and evaluate over many forests; medians with intervals.
 #include "commands.h"
-#include "interrupt.h"
 #include "data_files.h"
+#include "interrupt.h"
 
 #include "lab/trials/accuracy_trial.h"
 #include "lab/trials/median_interval.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole servo: flying by trunks, closed over rendered images and the tracker.
 #include "commands.h"
+#include "data_files.h"
 #include "interrupt.h"
 #include "overlay_window.h"
-#include "data_files.h"
 
 #include "lab/trials/error_curves.h"
 #include "lab/trials/median_interval.h"

@@ -58,8 +58,8 @@ Json framesJson(const std::map<FrameStatus, std::size_t> &frames)
 {
   Json json;
   std::size_t all = 0;
-  for (const auto status :
-       {FrameStatus::ok, FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing, FrameStatus::resized, FrameStatus::doubtful}) {
+  for (const auto status : {FrameStatus::ok, FrameStatus::stale, FrameStatus::corrupt, FrameStatus::missing,
+                            FrameStatus::resized, FrameStatus::doubtful}) {
     const auto entry = frames.find(status);
     json[toString(status)] = entry == frames.end() ? 0 : entry->second;
     all += entry == frames.end() ? 0 : entry->second;

@@ -61,7 +61,7 @@ struct TrackingResult
   Matrix4d F = Matrix4d::Zero(); ///< its Hessian, positive semi-definite
   double left_contrast = 0, right_contrast = 0; ///< signed; 0 where the border was not used
   bool left_used = false, right_used = false;
-  double evenness = 0;  ///< mean of evennessAlong() over the borders used, 0 to 1
+  double evenness = 0; ///< mean of evennessAlong() over the borders used, 0 to 1
 };
 
 /// Cost: 30 to 150 us a trunk with the scan. Thread-safe.

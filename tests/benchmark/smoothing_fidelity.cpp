@@ -8,8 +8,8 @@
 
 #include "evaluation/trajectory_metrics.h"
 #include "input/truth.h"
-#include <bole/open_source.h>
 #include "pipeline/engine.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <chrono>

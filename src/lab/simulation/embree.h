@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What differs between Embree 3 and 4, in one place. Where both are installed, the build and this header take the newer.
+/// What differs between Embree 3 and 4, in one place. Where both are installed, the build and this header take the
+/// newer.
 
 #if __has_include(<embree4/rtcore.h>)
 #define BOLE_HAS_EMBREE_4 1

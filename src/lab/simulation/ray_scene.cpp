@@ -61,8 +61,5 @@ bool RayScene::occluded(const Eigen::Vector3d &from, const Eigen::Vector3d &dire
   return ray.tfar < 0;
 }
 
-void RayScene::intersect(const int *valid, RTCRayHit16 &rays) const
-{
-  embree::intersectCoherent(valid, m_scene, rays);
-}
+void RayScene::intersect(const int *valid, RTCRayHit16 &rays) const { embree::intersectCoherent(valid, m_scene, rays); }
 } // namespace bole

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
-#include <bole/open_source.h>
 #include "input/truth.h"
 #include "lab/simulation/simulated_flight.h"
+#include <bole/open_source.h>
 
 #include <filesystem>
 #include <fstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/open_source.h>
 #include "lab/tasks/servo_task.h"
+#include <bole/open_source.h>
 
 #include <Eigen/Geometry>
 

@@ -3,8 +3,8 @@
 #include "support/drawn_trunks.h"
 
 #include "geometry/so3.h"
-#include <bole/open_source.h>
 #include "lab/tasks/trunk_task.h"
+#include <bole/open_source.h>
 #include <bole/pipeline.h>
 
 #include <Eigen/Geometry>
