@@ -1,0 +1,408 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""A campaign: what is flown, and the tables and the page that are made of it. Used by the Snakefile beside it."""
+import base64
+import html
+import io
+import itertools
+import json
+import math
+import os
+import random
+import shlex
+import sys
+
+KEYS = {"name", "bole", "keep_flights", "flights", "logs", "runs", "servo", "compare", "strata"}
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+
+def fail(text):
+    sys.exit("campaign: " + text)
+
+
+def seeds_of(value, key):
+    """1-20, 7 or [1, 5, 9]."""
+    if isinstance(value, int):
+        return [value]
+    if isinstance(value, list) and all(isinstance(v, int) for v in value):
+        return value
+    parts = str(value).split("-")
+    if len(parts) == 2 and all(p.isdigit() for p in parts) and int(parts[0]) <= int(parts[1]):
+        return list(range(int(parts[0]), int(parts[1]) + 1))
+    return fail(f"{key} = {value!r}, must be a number, FIRST-LAST or a list of numbers")
+
+
+class Campaign:
+    """Flights by name, each with its seed and settings; runs (presets, binaries, commits) that each flight goes through."""
+
+    def __init__(self, config):
+        unknown = set(config) - KEYS
+        if unknown:
+            fail(f"unknown key {sorted(unknown)[0]!r}, known are {', '.join(sorted(KEYS))}")
+        self.name = str(config.get("name", "campaign"))
+        self.bole_path = os.environ.get("BOLE") or config.get("bole") or os.path.join(ROOT, "build/release/bole")
+        self.keep_flights = bool(config.get("keep_flights", False))
+        self.runs = config.get("runs") or {"default": {}}
+        self.runs = {name: run or {} for name, run in self.runs.items()}
+        self.strata = config.get("strata", ["light", "density", "path"])
+        self.pairs = config.get("compare") or [list(self.runs)[:1] + [n] for n in list(self.runs)[1:]]
+        for pair in self.pairs:
+            for run in pair:
+                if run not in self.runs:
+                    fail(f"compare names {run!r}, which is no run; runs are {', '.join(self.runs)}")
+        self.flights = {}
+        if config.get("flights"):
+            self._lay_out(config["flights"])
+        self.logs = {}
+        for path in config.get("logs") or []:
+            name = os.path.basename(path.rstrip("/")).replace("%", "")
+            self.logs[name] = os.path.abspath(os.path.expanduser(path))
+        self.servo = {name: task for name, task in (config.get("servo") or {}).items()}
+        for name, task in self.servo.items():
+            if "task" not in task or "seeds" not in task:
+                fail(f"servo.{name} must name a task and seeds")
+
+    def _lay_out(self, flights):
+        """The first seed takes the first value of every list, the next seed the next combination: full factorial."""
+        flights = dict(flights)
+        seeds = seeds_of(flights.pop("seeds", 1), "flights.seeds")
+        lists = {key: value if isinstance(value, list) else [value] for key, value in flights.items()}
+        combinations = list(itertools.product(*lists.values())) or [()]
+        for index, seed in enumerate(seeds):
+            values = dict(zip(lists, combinations[index % len(combinations)]))
+            self.flights[f"{seed:06d}"] = {"seed": seed, **values}
+
+    # what the Snakefile asks
+    def binary(self, run):
+        run = self.runs.get(run, {})
+        if "commit" in run:
+            return os.path.abspath(os.path.join("builds", run["commit"], "bole"))
+        return os.path.abspath(run.get("bole", self.bole_path))
+
+    def build_of(self, run):
+        commit = self.runs[run].get("commit")
+        return [f"builds/{commit}/bole"] if commit else []
+
+    def simulate_command(self, flight):
+        words = [os.path.abspath(self.bole_path), "simulate"]
+        for key, value in self.flights[flight].items():
+            if value is True:
+                words.append("--" + key)
+            elif value not in (None, False):
+                words += ["--" + key, str(value)]
+        return shlex.join(words)
+
+    def input_of(self, flight):
+        return [] if flight in self.logs else "flights/" + flight
+
+    def source_of(self, flight):
+        return shlex.quote(self.logs.get(flight, "flights/" + flight))
+
+    def track_arguments(self, run):
+        run = self.runs[run]
+        words = (["--config", run["config"]] if run.get("config") else []) + [w for s in run.get("set", []) for w in ("--set", s)]
+        return shlex.join(words + [str(w) for w in run.get("arguments", [])])
+
+    def servo_arguments(self, name, flight):
+        task = self.servo[name]
+        words = [task["task"], "--seed", str(int(flight)), "--runs", "1"] + [str(w) for w in task.get("arguments", [])]
+        return shlex.join(words)
+
+    def results(self):
+        wanted = [f"results/{run}/{flight}.json" for run in self.runs for flight in [*self.flights, *self.logs]]
+        for name, task in self.servo.items():
+            wanted += [f"results/servo-{name}/{seed:06d}.json" for seed in seeds_of(task["seeds"], f"servo.{name}.seeds")]
+        return wanted
+
+
+def read(config):
+    return Campaign(dict(config))
+
+
+# --- statistics ---------------------------------------------------------------------------------------------------
+
+
+def wilson(k, n, z=1.959964):
+    """95 % interval of a share (Wilson 1927)."""
+    if n == 0:
+        return None, None
+    p, d = k / n, 1 + z * z / n
+    middle, half = (p + z * z / (2 * n)) / d, z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / d
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def bootstrap_median(values, draws=2000, seed=1):
+    """95 % interval of a median, flights drawn with replacement."""
+    values = sorted(v for v in values if v is not None)
+    if not values:
+        return None, None, None
+    median = lambda v: v[len(v) // 2] if len(v) % 2 else 0.5 * (v[len(v) // 2 - 1] + v[len(v) // 2])
+    if len(values) < 2:
+        return values[0], None, None
+    rng = random.Random(seed)
+    drawn = sorted(median(sorted(rng.choices(values, k=len(values)))) for _ in range(draws))
+    return median(values), drawn[int(0.025 * draws)], drawn[int(0.975 * draws)]
+
+
+def ratio_interval(rows, part, whole, draws=2000, seed=1):
+    """Share over all trunks with a 95 % interval: whole flights are drawn, since trunks of one flight go together."""
+    pairs = [(r[part], r[whole]) for r in rows if r[whole]]
+    total = sum(n for _, n in pairs)
+    if not total:
+        return None, None, None
+    value = sum(k for k, _ in pairs) / total
+    if len(pairs) < 2:
+        return (value, *wilson(sum(k for k, _ in pairs), total))
+    rng = random.Random(seed)
+    drawn = []
+    for _ in range(draws):
+        some = rng.choices(pairs, k=len(pairs))
+        drawn.append(sum(k for k, _ in some) / max(1, sum(n for _, n in some)))
+    drawn.sort()
+    return value, drawn[int(0.025 * draws)], drawn[int(0.975 * draws)]
+
+
+# --- tables -------------------------------------------------------------------------------------------------------
+
+
+def dig(value, *path):
+    for key in path:
+        if not isinstance(value, dict) or value.get(key) is None:
+            return None
+        value = value[key]
+    return value
+
+
+MEASURES = {  # column: where it stands in evaluation.json
+    "position_median_m": ("trunks", "all", "position_m", "xy_yaw", "median"),
+    "position_rmse_m": ("trunks", "all", "position_m", "xy_yaw", "rmse"),
+    "radius_rmse_m": ("trunks", "all", "radius_m", "rmse"),
+    "radius_bias_m": ("trunks", "all", "radius_m", "bias"),
+    "nees_half": ("trunks", "all", "nees_half"),
+    "ate_m": ("trajectory", "smoothed", "ate", "xy_yaw", "rmse_m"),
+    "ate_scaled_m": ("trajectory", "smoothed", "ate", "xy_yaw_scale", "rmse_m"),
+    "ate_odometry_m": ("trajectory", "odometry", "ate", "xy_yaw", "rmse_m"),
+    "scale": ("trajectory", "smoothed", "scale"),
+}
+
+
+def write_csv(path, rows, columns):
+    import csv
+
+    with open(path, "w", newline="", encoding="utf-8") as out:
+        table = csv.writer(out)
+        table.writerow(columns)
+        for row in rows:
+            table.writerow(["" if row.get(c) is None else row.get(c) for c in columns])
+
+
+def collect(campaign, paths):
+    flights, trunks, failures = [], [], []
+    for path in paths:
+        with open(path, encoding="utf-8") as text:
+            result = json.load(text)
+        run, flight = path.split("/")[-2], os.path.splitext(os.path.basename(path))[0]
+        row = {"run": run, "flight": flight, "ok": int(result["ok"]), "cpu_s": result.get("cpu_s"), **campaign.flights.get(flight, {})}
+        if not result["ok"]:
+            failures.append({"run": run, "flight": flight, "log": result["log"],
+                             "status": result.get("track_status", result.get("servo_status"))})
+        evaluation = result.get("evaluation")
+        if evaluation:
+            everything = dig(evaluation, "trunks", "all") or {}
+            row.update(expected=everything.get("expected"), found=everything.get("found"), matches=everything.get("matches"),
+                       confirmed=dig(evaluation, "trunks", "confirmed"), frames=evaluation.get("frames"),
+                       duplicates=dig(evaluation, "trunks", "duplicates"))
+            row.update({name: dig(evaluation, *where) for name, where in MEASURES.items()})
+            for kind in ("matched", "missed", "false_positives"):
+                for trunk in dig(evaluation, "trunks", kind) or []:
+                    trunk = trunk if isinstance(trunk, dict) else {"map": trunk}
+                    trunks.append({"run": run, "flight": flight, "kind": kind, **trunk})
+        each = dig(result, "servo", "each")
+        if each:
+            row.update({k: v for k, v in each[0].items() if k != "seed" and not isinstance(v, (dict, list))})
+        flights.append(row)
+    return flights, trunks, failures
+
+
+def columns_of(rows):
+    columns = []
+    for row in rows:
+        columns += [c for c in row if c not in columns]
+    return columns
+
+
+def summaries(campaign, flights):
+    """Medians and shares with intervals: all flights, and by stratum."""
+    rows = []
+    for run in [*campaign.runs, *("servo-" + name for name in campaign.servo)]:
+        flown = [f for f in flights if f["run"] == run and f["ok"]]
+        strata = [("all", "", flown)]
+        for key in campaign.strata:
+            for value in sorted({str(f[key]) for f in flown if key in f}):
+                strata.append((key, value, [f for f in flown if str(f.get(key)) == value]))
+        for key, value, some in strata:
+            add = lambda name, found: rows.append(dict(zip(
+                ("run", "stratum", "value", "measure", "estimate", "low", "high", "flights"), (run, key, value, name, *found, len(some)))))
+            judged = [f for f in some if f.get("expected") is not None]
+            if judged:
+                add("recall", ratio_interval(judged, "found", "expected"))
+                add("precision", ratio_interval([f for f in judged if f["confirmed"]], "matches", "confirmed"))
+                for name in MEASURES:
+                    add(name, bootstrap_median([f.get(name) for f in judged]))
+            if some and "succeeded" in some[0]:
+                k = sum(bool(f["succeeded"]) for f in some)
+                add("succeeded", (k / len(some), *wilson(k, len(some))))
+    return rows
+
+
+def comparisons(campaign, flights, trunks):
+    """The same seeds through two runs: Wilcoxon's signed ranks by flight, McNemar's exact test by trunk."""
+    from scipy import stats
+
+    rows = []
+    by = {(f["run"], f["flight"]): f for f in flights if f["ok"]}
+    found = {}
+    for t in trunks:
+        if t["kind"] == "matched" and t.get("expected") or t["kind"] == "missed":
+            found[(t["run"], t["flight"], t.get("truth"))] = t["kind"] == "matched"
+    for a, b in campaign.pairs:
+        names = [f for f in [*campaign.flights, *campaign.logs] if (a, f) in by and (b, f) in by]
+        only_a = only_b = 0
+        for (run, flight, truth), is_found in found.items():
+            other = found.get((b, flight, truth)) if run == a else None
+            if other is not None:
+                only_a, only_b = only_a + (is_found and not other), only_b + (other and not is_found)
+        p = stats.binomtest(only_b, only_a + only_b).pvalue if only_a + only_b else None
+        rows.append({"a": a, "b": b, "measure": "trunks found", "pairs": only_a + only_b, "effect": only_b - only_a,
+                     "test": "McNemar", "p": p})
+        for name in ("precision", *MEASURES):
+            value = (lambda f: f["matches"] / f["confirmed"] if f.get("confirmed") else None) if name == "precision" else (lambda f: f.get(name))
+            pairs = [(value(by[a, f]), value(by[b, f])) for f in names]
+            steps = [y - x for x, y in pairs if x is not None and y is not None]
+            if not steps:
+                continue
+            p = stats.wilcoxon(steps).pvalue if any(steps) else 1.0
+            effect, low, high = bootstrap_median(steps)
+            rows.append({"a": a, "b": b, "measure": name, "pairs": len(steps), "effect": effect, "low": low, "high": high,
+                         "test": "Wilcoxon", "p": p})
+    return rows
+
+
+def write_tables(campaign, paths, output):
+    flights, trunks, failures = collect(campaign, paths)
+    write_csv(output.flights, flights, columns_of(flights) or ["run"])
+    write_csv(output.trunks, trunks, columns_of(trunks) or ["run"])
+    write_csv(output.failures, failures, ["run", "flight", "status", "log"])
+    write_csv(output.summary, summaries(campaign, flights), ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])
+    write_csv(output.compare, comparisons(campaign, flights, trunks), ["a", "b", "measure", "pairs", "effect", "low", "high", "test", "p"])
+
+
+# --- the page -----------------------------------------------------------------------------------------------------
+
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]  # Okabe and Ito
+
+
+def picture(draw, width=6.4, height=3.6):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(width, height), layout="constrained")
+    drawn = draw(axes)
+    out = io.BytesIO()
+    figure.savefig(out, format="svg")
+    plt.close(figure)
+    if drawn is False:
+        return ""
+    return '<img alt="" src="data:image/svg+xml;base64,' + base64.b64encode(out.getvalue()).decode() + '">'
+
+
+def recall_by(trunks, runs, key, edges, label):
+    def draw(axes):
+        for colour, run in zip(COLOURS, runs):
+            mine = [t for t in trunks if t["run"] == run and t.get(key) not in (None, "") and (t["kind"] == "missed" or t.get("expected") in (True, "True"))]
+            xs, ys, lows, highs = [], [], [], []
+            for low, high in zip(edges, edges[1:]):
+                some = [t for t in mine if low <= float(t[key]) < high]
+                if some:
+                    k = sum(t["kind"] == "matched" for t in some)
+                    a, b = wilson(k, len(some))
+                    xs.append(0.5 * (low + high)), ys.append(k / len(some)), lows.append(max(0, k / len(some) - a)), highs.append(max(0, b - k / len(some)))
+            if xs:
+                axes.errorbar(xs, ys, [lows, highs], color=colour, marker="o", capsize=3, label=run)
+        if not axes.has_data():
+            return False
+        axes.set(xlabel=label, ylabel="recall (95 % interval)", ylim=(0, 1.05))
+        axes.legend()
+        return True
+
+    return picture(draw)
+
+
+def spread(flights, runs, name, label, honest=None):
+    def draw(axes):
+        data = [[float(f[name]) for f in flights if f["run"] == run and f.get(name) is not None] for run in runs]
+        if not any(data):
+            return False
+        axes.boxplot([d or [float("nan")] for d in data], vert=False)
+        axes.set_yticks(range(1, len(runs) + 1), runs)
+        axes.set_xlabel(label)
+        if honest is not None:
+            axes.axvline(honest, color=COLOURS[2], linestyle="--")
+        return True
+
+    return picture(draw, 6.4, 1.2 + 0.5 * len(runs))
+
+
+def number(value):
+    if value is None or value == "":
+        return "-"
+    value = float(value)
+    return f"{value:.3f}" if abs(value) < 10 else f"{value:.0f}"
+
+
+def as_table(rows, columns):
+    head = "".join(f"<th>{html.escape(c)}</th>" for c in columns)
+    body = ""
+    for row in rows:
+        cells = ""
+        for c in columns:
+            value = row.get(c)
+            cells += f"<td>{html.escape(number(value) if isinstance(value, float) else '-' if value is None else str(value))}</td>"
+        body += f"<tr>{cells}</tr>"
+    return f"<table><tr>{head}</tr>{body}</table>"
+
+
+def write_page(campaign, path):
+    flights, trunks, failures = collect(campaign, campaign.results())
+    runs = [r for r in campaign.runs if any(f["run"] == r for f in flights)]
+    parts = [f"<h1>{html.escape(campaign.name)}</h1>",
+             f"<p>{len(campaign.flights) + len(campaign.logs)} flights, {len(flights)} results, {len(failures)} failed. "
+             f"Intervals hold 95 %; whole flights are drawn anew for them, since trunks of one flight go together.</p>"]
+    summary = summaries(campaign, flights)
+    wide = []
+    for row in summary:
+        if row["stratum"] == "all":
+            wide.append({**row, "estimate": row["estimate"], "interval": f"{number(row['low'])} to {number(row['high'])}"})
+    parts += ["<h2>All flights</h2>", as_table(wide, ["run", "measure", "estimate", "interval", "flights"])]
+    parts += ["<h2>Compared, the same seeds</h2>", as_table(comparisons(campaign, flights, trunks),
+                                                            ["a", "b", "measure", "pairs", "effect", "low", "high", "test", "p"])]
+    parts += ["<h2>Pictures</h2>",
+              recall_by(trunks, runs, "min_range_m", [0, 1, 2, 3, 4, 5, 6, 7, 8], "nearest range [m]"),
+              recall_by(trunks, runs, "bearing_change_deg", [3, 5, 8, 12, 20, 30, 45, 60, 90], "change of bearing [degrees]"),
+              spread(flights, runs, "nees_half", "NEES/2 of trunks by flight (1 is honest)", 1),
+              spread(flights, runs, "position_median_m", "median position error by flight [m]"),
+              spread(flights, runs, "radius_rmse_m", "radius RMSE by flight [m]"),
+              spread(flights, runs, "ate_m", "ATE after x, y, yaw [m]")]
+    parts += ["<h2>By stratum</h2>", as_table([r for r in summary if r["stratum"] != "all" and r["measure"] in
+                                               ("recall", "precision", "position_median_m", "radius_rmse_m", "nees_half", "succeeded")],
+                                              ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])]
+    if failures:
+        parts += ["<h2>Failed</h2>", as_table(failures, ["run", "flight", "status", "log"])]
+    style = ("body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:72em;padding:0 1em}table{border-collapse:collapse;font-size:13px}"
+             "td,th{border-bottom:1px solid #ccc;padding:.2em .8em;text-align:left}img{max-width:100%}")
+    text = (f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+            f"<title>{html.escape(campaign.name)}</title><style>{style}</style></head><body>{''.join(parts)}</body></html>")
+    with open(path + ".partial", "w", encoding="utf-8") as out:
+        out.write(text)
+    os.replace(path + ".partial", path)
