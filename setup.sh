@@ -14,6 +14,7 @@ usage() {
   echo "       ./setup.sh test               pass the test suite"
   echo "       ./setup.sh install [PREFIX]   the command, library and headers (default /usr/local)"
   echo "       ./setup.sh package            Debian packages in build/demo/packages"
+  echo "       ./setup.sh campaign           many simulated flights with tables and a page: the small one, in campaigns/small"
   echo "Each installs the Debian packages that it needs and builds first."
 }
 
@@ -86,6 +87,15 @@ package)
   build_command -DCMAKE_INSTALL_PREFIX=/usr -DCMAKE_SKIP_INSTALL_RPATH=ON
   (cd build/demo && cpack -G DEB)
   say "done: apt install ./build/demo/packages/*.deb, then bole track park-forward -o run in any folder"
+  ;;
+campaign)
+  # shellcheck disable=SC2086
+  install_packages $BUILD_PACKAGES libembree-dev snakemake python3-scipy python3-matplotlib
+  say "building the command with the laboratory"
+  cmake --preset release -DBOLE_BUILD_TESTS=OFF
+  cmake --build --preset release --target bole
+  snakemake -s apps/campaign/Snakefile --configfile config/campaign/small.yaml --cores 2 -d campaigns/small
+  say "done. Look at campaigns/small/page.html"
   ;;
 *)
   usage
