@@ -49,7 +49,7 @@ TEST(Gradient, IsTheConvolutionByItsDefinitionUpToTheEdges)
 {
   const auto I = noise(31, 43);
   for (const double sigma : {0.7, 1.0, 2.2}) {
-    const Gradient gradient = computeGradient(I, {sigma, false, 3});
+    const Gradient gradient = computeGradient(I, {sigma, false});
     for (int v = 0; v < 31; ++v)
       for (int u = 0; u < 43; ++u)
         ASSERT_NEAR(gradient.signed_x[v][u], bruteForce(I, u, v, sigma), 2e-6) << u << "," << v << " sigma " << sigma;
@@ -86,7 +86,7 @@ TEST(Gradient, SplitPartsAreMadeOnlyWhenAskedForAndNeverChangeSign)
 {
   const auto I = noise(40, 60);
   EXPECT_EQ(computeGradient(I).negative.getSize(), 0u);
-  const Gradient gradient = computeGradient(I, {1, true, 3});
+  const Gradient gradient = computeGradient(I, {1, true});
   ASSERT_EQ(gradient.negative.getSize(), I.getSize());
   for (unsigned i = 0; i < I.getSize(); ++i) {
     EXPECT_LE(gradient.negative.bitmap[i], 0);
@@ -98,7 +98,7 @@ TEST(Gradient, SplitPartsAreMadeOnlyWhenAskedForAndNeverChangeSign)
 TEST(Gradient, SplitPartsAddUpToTheBlurredSobelDerivative)
 {
   const auto I = noise(60, 60);
-  const Gradient gradient = computeGradient(I, {1, true, 2});
+  const Gradient gradient = computeGradient(I, {1, true});
   const auto sobel = [&](int u, int v) {
     double sum = 0;
     for (int dv = -1; dv <= 1; ++dv)
@@ -106,9 +106,9 @@ TEST(Gradient, SplitPartsAddUpToTheBlurredSobelDerivative)
     return sum / (8 * 255.0);
   };
   double sum = 0, negative = 0, weight = 0;
-  for (int dv = -8; dv <= 8; ++dv)
-    for (int du = -8; du <= 8; ++du) {
-      const double w = std::exp(-0.5 * (du * du + dv * dv) / 4.0), s = sobel(30 + du, 30 + dv);
+  for (int dv = -12; dv <= 12; ++dv)
+    for (int du = -12; du <= 12; ++du) {
+      const double w = std::exp(-0.5 * (du * du + dv * dv) / 9.0), s = sobel(30 + du, 30 + dv);
       sum += w * s;
       negative += w * std::min(s, 0.0);
       weight += w;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/yaml_file.h"
 
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 
 #include <gmock/gmock.h>
 

@@ -6,7 +6,7 @@
 
 #include "motion/point_motion.h"
 
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 
 #include <cmath>
 #include <random>

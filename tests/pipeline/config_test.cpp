@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/camera_file.h"
+#include <bole/open_source.h>
 #include "pipeline/option_table.h"
 #include <bole/config.h>
 
