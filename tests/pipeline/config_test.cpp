@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include <bole/open_source.h>
 #include "pipeline/option_table.h"
 #include <bole/config.h>
+#include <bole/open_source.h>
 
 #include <gmock/gmock.h>
 
