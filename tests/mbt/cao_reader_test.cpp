@@ -90,7 +90,7 @@ TEST_F(CaoReader, AModelOfAMapIsLoadedByOurTrackerAndByViSPsOwn)
   const auto lines = ours.getModelForDisplay(320, 240, cMo.toVisp(), PinholeCamera().toVisp(), true);
   ASSERT_EQ(lines.size(), 4u);
   for (vpMbtDistanceCylinder *cylinder : cylinders) {
-    vpCylinder limbs(*cylinder->getCylinder());
+    vpCylinder limbs(*cylinder->c);
     limbs.track(cMo.toVisp());
     for (const auto &[rho, theta] :
          {std::pair(limbs.getRho1(), limbs.getTheta1()), std::pair(limbs.getRho2(), limbs.getTheta2())}) {
