@@ -158,7 +158,7 @@ ExpectedPose PoseEstimator::predict() const
   Matrix6d Q = Matrix6d::Zero();
   Q.topLeftCorner<3, 3>() =
       across * across * Matrix3d::Identity() + (along * along - across * across) * up * up.transpose();
-  Q.diagonal().tail<3>().setConstant(std::pow(share * options.turn_sigma_rad, 2));
+  Q.diagonal().tail<3>().setConstant(options.turn_sigma_rad * options.turn_sigma_rad); // a drone turns at will
   expected.covariance = m_covariance + Q;
   return expected;
 }
