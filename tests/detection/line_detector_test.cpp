@@ -115,7 +115,7 @@ TEST(LineDetector, ThePapersPolarityKnowsDarkTrunksOnly)
 TEST(LineDetector, WithoutSaliencyItTakesEveryUprightPair)
 {
   const Scene scene;
-  const Gradient gradient = computeGradient(draw(scene.trunks, scene.wMc, kCamera), {1, false, 3});
+  const Gradient gradient = computeGradient(draw(scene.trunks, scene.wMc, kCamera), {1, false});
   const auto found = detectLines(gradient, nullptr, kCamera, scene.wMc.R, {}, {}, scene.options);
   EXPECT_EQ(found.size(), kTrunks.size());
 }
