@@ -39,7 +39,7 @@ struct Scene
 
   std::vector<LineDetection> detect(const vpImage<float> &p_background) const
   {
-    const Gradient gradient = computeGradient(draw(trunks, wMc, kCamera), {1, is_split, 3});
+    const Gradient gradient = computeGradient(draw(trunks, wMc, kCamera), {1, is_split});
     return detectLines(gradient, &p_background, kCamera, wMc.R, known, {}, options);
   }
   std::vector<LineDetection> detect() const { return detect(salient(trunks, wMc)); }
