@@ -4,7 +4,7 @@
 /// A factor graph as plain data: what the smoother solves, what a g2o file holds, what a reference
 /// solver reads.
 
-#include "smoothing/factors.h"
+#include <bole/factors.h>
 
 #include <cstdint>
 #include <optional>

@@ -26,4 +26,15 @@ struct SummaryFactor
 
   double energyAt(const RelativeTrunk &relative) const;
 };
+
+/// What became of a summary factor that was handed to the smoother.
+enum class SummaryStatus
+{
+  ok,
+  projected,  ///< an eigenvalue just below zero was set to zero
+  indefinite, ///< clearly negative curvature: not a minimum, the view must be dropped (paper,
+              ///< Section 7)
+  not_finite  ///< NaN or infinity, or an optimum that is no rotation or has r >= d
+};
+const char *toString(SummaryStatus status);
 } // namespace bole

@@ -9,10 +9,8 @@
 /// prediction has residual 0.
 
 #include "geometry/direction.h"
-#include "smoothing/loss.h"
 #include "summary/square_root.h"
-
-#include <string>
+#include <bole/factors.h>
 
 namespace bole
 {
@@ -20,50 +18,6 @@ using Matrix65d = Eigen::Matrix<double, 6, 5>;
 using Matrix56d = Eigen::Matrix<double, 5, 6>;
 using Vector1d = Eigen::Matrix<double, 1, 1>;
 using Matrix16d = Eigen::Matrix<double, 1, 6>;
-
-/// A pose that is known: r = S (wMb (-) mean).
-struct PosePrior
-{
-  Pose mean;
-  Matrix6d covariance = Matrix6d::Identity(); ///< of the tangent (rho, phi) at the mean
-};
-
-/// The pose of b in a, as odometry measures it: r = S ((wMa^-1 wMb) (-) aMb).
-struct Odometry
-{
-  Pose aMb;
-  Matrix6d covariance = Matrix6d::Identity(); ///< of the tangent (rho, phi) at aMb
-};
-
-/// What two views of a scene of points say about the motion between them: everything but the length
-/// of the translation. In camera frames: caRcb takes coordinates of camera b to camera a, direction
-/// is the unit vector from the centre of camera a to that of camera b, in a's coordinates.
-///
-/// Residual: (Log(caRcb^T R), angle of the predicted direction in the tangent plane of the measured
-/// one, in the basis directionBasis(direction)). A predicted translation shorter than kMinBaseline
-/// has no direction: those two rows are then zero.
-struct RelativePoseMeasurement
-{
-  Eigen::Matrix3d caRcb = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
-  Matrix5d covariance = Matrix5d::Identity(); ///< (phi [rad], directionBasis angles [rad])
-};
-constexpr double kMinBaseline = 1e-4; ///< [m]
-
-/// Height of the body over the world's z = 0, as a sonar gives it.
-struct Height
-{
-  double z = 0;     ///< [m]
-  double sigma = 1; ///< [m]
-};
-
-/// Independent normal priors on a trunk: with a weak one on x and y a trunk that nobody has seen
-/// twice is still well defined, and its covariance says how little is known of it.
-struct TrunkPrior
-{
-  Trunk mean;
-  Vector5d sigma = Vector5d::Ones();
-};
 
 /// Square roots S of information matrices, S^T S = covariance^-1. Throws vpException(badValue)
 /// naming \p name when \p covariance is not finite, symmetric and positive definite.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "smoothing/loss.h"
+#include <bole/factors.h>
 
 #include <cmath>
 #include <visp3/core/vpException.h>

@@ -12,16 +12,6 @@
 
 namespace bole
 {
-enum class SummaryStatus
-{
-  ok,
-  projected,  ///< an eigenvalue just below zero was set to zero
-  indefinite, ///< clearly negative curvature: not a minimum, the view must be dropped (paper,
-              ///< Section 7)
-  not_finite  ///< NaN or infinity, or an optimum that is no rotation or has r >= d
-};
-const char *toString(SummaryStatus status);
-
 /// Eigenvalues of F above -kIndefiniteTolerance times the largest count as zero (rounding of a
 /// numeric Hessian), those below as negative curvature.
 constexpr double kIndefiniteTolerance = 1e-3;
