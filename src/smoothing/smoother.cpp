@@ -109,10 +109,10 @@ void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseM
   m_state->checkPose(b);
   const int variable_a = m_state->poses[a].variable, variable_b = m_state->poses[b].variable;
   require(a != b, "relative pose, must be between two poses");
-  require(m_state->isOpen(variable_a) && m_state->isOpen(variable_b),
-          "relative pose, must be between poses inside the lag");
   require(measurement.caRcb.allFinite() && std::abs(measurement.direction.norm() - 1) < 1e-6,
           "relative pose, must be finite with a direction of length 1");
+  if (!m_state->isOpen(variable_a) || !m_state->isOpen(variable_b))
+    return;
   m_state->relative_poses.push_back(
       {measurement, squareRootInformation<5>(measurement.covariance, "relative pose covariance")});
   m_state->newFactor(FactorKind::relative_pose, static_cast<int>(m_state->relative_poses.size()) - 1, variable_a,

@@ -144,6 +144,24 @@ TEST(Changes, WorkAFrameDoesNotGrowWithRoundsPastTheSameTrunks)
   EXPECT_LT(replay.smoother.cost(), 1.03 * batch.cost());
 }
 
+TEST(Changes, AFactorWithAMarginalisedEndIsNotAdded)
+{
+  FlightOptions o;
+  o.poses = 100;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions lagged = smootherFor(o);
+  lagged.fixed_lag = 20;
+  Replay window(flight, lagged);
+  window.run();
+  const Graph before = window.smoother.graph();
+
+  window.smoother.addRelativePose(50, 99, RelativePoseMeasurement());
+  window.smoother.addOdometry(99, 50, Odometry());
+
+  EXPECT_EQ(window.smoother.graph().relative_poses.size(), before.relative_poses.size());
+  EXPECT_EQ(window.smoother.graph().odometry.size(), before.odometry.size());
+}
+
 TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
 {
   FlightOptions o;
