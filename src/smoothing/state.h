@@ -9,6 +9,8 @@
 /// that the parent, the first eliminated of the separator, takes into its own front. Every
 /// separator lies on the path from its node to the root.
 
+#include "smoothing/factors.h"
+
 #include <bole/smoother.h>
 
 #include <array>

@@ -15,8 +15,6 @@ void use(const std::vector<std::uint8_t> &bytes)
   bole::Navdata navdata, again;
   if (bole::parseNavdata(bytes.data(), bytes.size(), navdata) != bole::NavdataError::none)
     return;
-  for (const auto &[id, option] : navdata.options)
-    bole::navdataFields(id, option);
   const auto encoded = bole::encodeNavdata(navdata);
   if (bole::parseNavdata(encoded.data(), encoded.size(), again) != bole::NavdataError::none ||
       again.time != navdata.time)
