@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "smoothing/factors.h"
 #include "smoothing/g2o.h"
 
 #include <Eigen/Geometry>

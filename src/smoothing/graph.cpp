@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "smoothing/factors.h"
 #include <bole/graph.h>
 
 #include <numeric>

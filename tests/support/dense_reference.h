@@ -3,6 +3,7 @@
 /// \file
 /// The yardstick of the smoother: dense Levenberg-Marquardt on a whole graph, short and slow.
 
+#include "smoothing/factors.h"
 #include <bole/graph.h>
 
 #include <Eigen/Cholesky>
