@@ -47,7 +47,7 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
 {
   std::vector<RelativeMotion> seen;
   if (m_use_points)
-    seen = m_points.process(frame);
+    seen = m_points.process(m_monitor.trusted(frame));
   m_inertial.process(frame, seen);
   m_monitor.process(frame, seen);
   return seen;
@@ -58,9 +58,11 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   Motion motion;
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
   const std::vector<RelativeMotion> seen = observe(frame);
-  motion.step = m_model.step(frame, wMa, bias, velocity);
-  motion.is_rotation_seen = motion.step.step_from_odometry || !frame.gyro.empty();
-  addPoints(motion, seen);
+  const Frame trusted = m_monitor.trusted(frame);
+  motion.step = m_model.step(trusted, wMa, bias, velocity);
+  motion.is_rotation_seen = motion.step.step_from_odometry || !trusted.gyro.empty();
+  if (m_monitor.trusts(Sensor::images))
+    addPoints(motion, seen);
   m_model.advance(frame);
   return motion;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The same graphs by Ceres: same optimum? And one incremental update against one re-solve.
 // benchmark_smoothing_ceres [poses]
+#include "smoothing/factors.h"
 #include "support/flight.h"
 
 #include <ceres/ceres.h>

@@ -4,6 +4,7 @@
 // made anew at the same optima from the kept images; and with the images themselves, whose energy,
 // gradient and Hessian are taken again at every view's present relative trunk in each iteration.
 // benchmark_smoothing_fidelity [sequence ...]
+#include "smoothing/factors.h"
 #include "support/rendered_flights.h"
 
 #include "evaluation/trajectory_metrics.h"

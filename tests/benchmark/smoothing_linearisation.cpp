@@ -3,6 +3,7 @@
 // prior's radius, so at twice the range first believed, seen while the baseline widens: summary
 // factors against the same views linearised once, at the estimate of their time (Gaussian factors
 // in x, y, log r). benchmark_smoothing_linearisation [figure.svg]
+#include "smoothing/factors.h"
 #include "support/dense_reference.h"
 #include "support/line_chart.h"
 

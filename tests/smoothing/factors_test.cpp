@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
+#include "smoothing/factors.h"
 #include <bole/smoother.h>
 
 #include <functional>

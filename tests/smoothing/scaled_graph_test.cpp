@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A graph whose metre is found late.
+#include "smoothing/factors.h"
 #include "support/flight.h"
 
 #include <gtest/gtest.h>
