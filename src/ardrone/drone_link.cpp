@@ -13,7 +13,7 @@ namespace bole
 {
 namespace
 {
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kSilence_ns = 1'000'000'000;
 } // namespace
 
 /// What the two receiving threads bring together for the consumer.
@@ -118,7 +118,7 @@ struct DroneLink::State
       return std::nullopt;
     }
     if (last_sequence && navdata.sequence <= *last_sequence) {
-      const bool restart = navdata.sequence == 1 || arrival_ns - last_navdata_ns > kSecond_ns;
+      const bool restart = navdata.sequence == 1 || arrival_ns - last_navdata_ns > kSilence_ns;
       if (!restart) {
         ++counters.navdata_late;
         return std::nullopt;
@@ -238,7 +238,7 @@ void DroneLink::addMotion(LiveFrame &frame)
 std::optional<BodyState> DroneLink::body() const
 {
   const std::lock_guard<std::mutex> lock(m_state->mutex);
-  if (steadyNowNs() - m_state->last_navdata_ns > kSecond_ns)
+  if (steadyNowNs() - m_state->last_navdata_ns > kSilence_ns)
     return std::nullopt;
   return m_state->odometry.newest();
 }

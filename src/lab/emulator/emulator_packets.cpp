@@ -9,13 +9,13 @@ namespace bole
 {
 namespace
 {
-constexpr std::int64_t kSecond_ns = 1'000'000'000, kDemoEvery_ns = kSecond_ns / 15;
+constexpr std::int64_t kOneSecond_ns = 1'000'000'000, kDemoEvery_ns = kOneSecond_ns / 15;
 constexpr std::int64_t kWrapSoon_ms = 3000;
 constexpr std::uint32_t kUsualState = 0x0f800080 | 0x10; // threads up, camera ready, altitude control
 constexpr std::uint32_t kLanded = 2, kFlying = 3;
 } // namespace
 
-DronePackets::DronePackets(const Options &options) : m_options(options), m_last_demo_ns(-kSecond_ns)
+DronePackets::DronePackets(const Options &options) : m_options(options), m_last_demo_ns(-kOneSecond_ns)
 {
   if (options.clock_wrap) {
     m_clock_ms = kPaveTimePeriod_ms - kWrapSoon_ms;
