@@ -141,8 +141,10 @@ GyroAgreement::Verdict GyroAgreement::add(const Interval &interval)
   if (m_intervals.size() > kWindow + kLags)
     m_intervals.pop_front();
   const Verdict verdict = judgeWindow();
-  m_same = verdict == m_suspected ? m_same + 1 : 1;
+  const bool is_same = verdict == m_suspected && (verdict != Verdict::late || std::abs(m_lag - m_suspected_lag) <= 1);
+  m_same = is_same ? m_same + 1 : 1;
   m_suspected = verdict;
+  m_suspected_lag = m_lag;
   if (verdict != Verdict::agrees && m_same >= kConfirm)
     return verdict;
   return hasJumped() ? Verdict::jumped : Verdict::agrees;

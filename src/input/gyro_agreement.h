@@ -50,6 +50,7 @@ private:
   int m_lag = 0;
   bool m_is_late = false;
   Verdict m_suspected = Verdict::agrees;
+  int m_suspected_lag = 0;
   int m_same = 0;
 };
 } // namespace bole
