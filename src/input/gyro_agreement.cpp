@@ -16,6 +16,7 @@ constexpr std::size_t kBelieved = 8;   // of them; the others are wrong matches 
 constexpr double kFloor_rad = 3e-4;    // the shifts are no better
 constexpr double kEnough_rad = 4e-3;   // rms of the gyro's shifts in a window that can tell anything
 constexpr double kFactor = 4;          // between the sums; clean flights stay below 2.4
+constexpr double kFits = 0.3;          // of the variance of the gyro's shifts: what another hypothesis may leave
 constexpr double kFactorToClear = 1.5; // a verdict is taken back only when the images agree again
 constexpr int kConfirm = 3;            // intervals that must say the same of the window
 constexpr double kJump_rad = 0.03;     // more than the parallax of a flight among trees changes between two frames
@@ -67,8 +68,8 @@ double GyroAgreement::cost(int lag, double sign_x, double sign_y, bool is_odomet
   return sum / static_cast<double>(kBelieved) + kFloor_rad * kFloor_rad;
 }
 
-/// Whether the gyro's shifts in the window vary enough to tell anything.
-bool GyroAgreement::isRotating() const
+/// Variance of the gyro's shifts in the window [rad^2].
+double GyroAgreement::variance() const
 {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   double squares = 0;
@@ -77,14 +78,14 @@ bool GyroAgreement::isRotating() const
     mean += m_intervals[k].gyro / static_cast<double>(count);
     squares += m_intervals[k].gyro.squaredNorm() / static_cast<double>(count);
   }
-  return squares - mean.squaredNorm() > kEnough_rad * kEnough_rad;
+  return squares - mean.squaredNorm();
 }
 
 /// The last interval against those before it.
 bool GyroAgreement::hasJumped() const
 {
   constexpr std::size_t kLeast = 6;
-  if (m_intervals.size() < kLeast + 1 || !isRotating())
+  if (m_intervals.size() < kLeast + 1 || variance() < kEnough_rad * kEnough_rad)
     return false;
   std::vector<Eigen::Vector2d> before;
   const std::size_t first = m_intervals.size() - 1 - std::min(m_intervals.size() - 1, kWindow);
@@ -104,7 +105,7 @@ GyroAgreement::Verdict GyroAgreement::judgeWindow()
 {
   if (m_intervals.size() < kWindow + kLags)
     return Verdict::agrees;
-  if (!isRotating())
+  if (variance() < kEnough_rad * kEnough_rad)
     return m_is_late ? Verdict::late : Verdict::agrees;
 
   struct Hypothesis
@@ -129,7 +130,7 @@ GyroAgreement::Verdict GyroAgreement::judgeWindow()
   const bool odometry_agrees =
       by_odometry >= 0 && by_odometry < kFactorToClear * cost(winner->lag, winner->x, winner->y, true);
   const double factor = m_is_late && winner->verdict == Verdict::late ? kFactorToClear : kFactor;
-  const bool is_believed = as_it_is > factor * best && !odometry_agrees;
+  const bool is_believed = as_it_is > factor * best && best < kFits * variance() && !odometry_agrees;
   m_is_late = is_believed && winner->verdict == Verdict::late;
   m_lag = winner->lag;
   return is_believed ? winner->verdict : Verdict::agrees;

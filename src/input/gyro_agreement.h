@@ -42,7 +42,7 @@ public:
 
 private:
   double cost(int lag, double sign_x, double sign_y, bool is_odometry) const;
-  bool isRotating() const;
+  double variance() const;
   bool hasJumped() const;
   Verdict judgeWindow();
 

@@ -28,6 +28,7 @@ constexpr double kFrozenChange = 1.3;   // grey levels of the thumb: noise of 5 
 constexpr double kFrozenShare = 0.12;   // of the least of the last three changes: no flight stops so fast
 constexpr double kStillRotation = 2e-3; // rad: by the gyro the camera may stand still
 constexpr double kSureMatch = 0.75;     // correlation of two images that show the same
+constexpr double kSureMargin = 0.05;    // of it over the correlation at the shift that the gyro says
 constexpr double kFlipGain = 0.3;       // correlation that an exchange of sides must add
 constexpr double kFlipLeast = 0.6;      // correlation that it must reach
 constexpr int kLastsMost = 30;          // frames that blur and noise are refused before they count as usual
@@ -209,7 +210,10 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
   GyroAgreement::Interval interval;
   interval.image = Eigen::Vector2d(moved.x, moved.y) / focal;
   interval.gyro = shiftOf(*gyro);
-  interval.is_sure = moved.correlation > kSureMatch;
+  // Rows of trunks look alike one trunk farther: then the place that the gyro says is nearly as good.
+  const Eigen::Vector2d expected = focal * interval.gyro;
+  interval.is_sure =
+      moved.correlation > kSureMatch && moved.bestNear(expected.x(), expected.y()) < moved.correlation - kSureMargin;
   if (odometry)
     interval.odometry = shiftOf(*odometry);
   const GyroAgreement::Verdict verdict = agreement.add(interval);

@@ -115,7 +115,8 @@ ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now)
   double value = -1;
   cv::Point at;
   cv::minMaxLoc(response, nullptr, &value, nullptr, &at);
-  ImageMatch result{value, static_cast<double>(at.x - reach_x), static_cast<double>(at.y - reach_y)};
+  ImageMatch result{
+      value, static_cast<double>(at.x - reach_x), static_cast<double>(at.y - reach_y), response, {reach_x, reach_y}};
   if (at.x > 0 && at.x + 1 < response.cols)
     result.x +=
         parabola(response.at<float>(at.y, at.x - 1), static_cast<float>(value), response.at<float>(at.y, at.x + 1));
@@ -123,6 +124,18 @@ ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now)
     result.y +=
         parabola(response.at<float>(at.y - 1, at.x), static_cast<float>(value), response.at<float>(at.y + 1, at.x));
   return result;
+}
+
+double ImageMatch::bestNear(double at_x, double at_y) const
+{
+  constexpr int kReach = 2;
+  const cv::Point centre = zero + cv::Point(static_cast<int>(std::lround(at_x)), static_cast<int>(std::lround(at_y)));
+  const cv::Rect around(centre.x - kReach, centre.y - kReach, 2 * kReach + 1, 2 * kReach + 1);
+  const cv::Rect tried = around & cv::Rect(0, 0, correlations.cols, correlations.rows);
+  double best = -1;
+  if (!tried.empty())
+    cv::minMaxLoc(correlations(tried), nullptr, &best);
+  return best;
 }
 
 double changeBetween(const cv::Mat &a, const cv::Mat &b)

@@ -28,7 +28,12 @@ cv::Mat thumbOf(const cv::Mat &image);
 struct ImageMatch
 {
   double correlation = -1;
-  double x = 0, y = 0; ///< shift s [px of the thumb] at which now(u) = before(u + s)
+  double x = 0, y = 0;  ///< shift s [px of the thumb] at which now(u) = before(u + s)
+  cv::Mat correlations; ///< of every shift that was tried
+  cv::Point zero;       ///< of no shift, in `correlations`
+
+  /// The best correlation within two pixels of a shift; -1 where none was tried.
+  double bestNear(double at_x, double at_y) const;
 };
 ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now);
 
