@@ -4,6 +4,7 @@
 
 #include "flight.h"
 
+#include <cmath>
 #include <filesystem>
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>
@@ -24,7 +25,10 @@ TEST(FlightFolder, IsReadBackAsTheFlightThatWasWritten)
       frame.status = i == 2 ? FrameStatus::corrupt : FrameStatus::ok;
       frame.picture.width = 320;
       frame.picture.height = 240;
-      frame.picture.y.assign(320 * 240, static_cast<std::uint8_t>(40 * i + 10));
+      for (int v = 0; v < 240; ++v)
+        for (int u = 0; u < 320; ++u)
+          frame.picture.y.push_back(
+              static_cast<std::uint8_t>(128 + 80 * std::sin(0.06 * (u - 4 * i)) * std::cos(0.05 * v)));
       frame.body = BodyState{};
       frame.body->wMb = test::MadeUpFlight::pose(0.1 * i);
       frame.gyro = {{frame.stamp_ns - 50'000'000, {0.1, 0.2, 0.3}}, {frame.stamp_ns, {0.4, 0.5, 0.6}}};
