@@ -19,6 +19,7 @@ constexpr double kLargestArm_m = 10;                    // of the camera in the 
 bool reaches(const CameraModel &model, const Eigen::Vector2d &goal)
 {
   constexpr double kStep = 0.01, kFarthest = 12; // tan(85 degrees)
+  constexpr double kLargestSlope = 20;           // no lens magnifies so much more beside its axis than on it
   const Eigen::Vector2d direction = goal.normalized();
   double last = 0;
   for (double r = kStep; r < kFarthest; r += kStep) {
@@ -26,7 +27,7 @@ bool reaches(const CameraModel &model, const Eigen::Vector2d &goal)
     const double reached = Eigen::Vector2d((u_px.x() - model.pinhole.cx) / model.pinhole.fx,
                                            (u_px.y() - model.pinhole.cy) / model.pinhole.fy)
                                .dot(direction);
-    if (!std::isfinite(reached) || reached <= last)
+    if (!std::isfinite(reached) || reached <= last || reached - last > kLargestSlope * kStep)
       return false;
     if (reached >= goal.norm())
       return true;

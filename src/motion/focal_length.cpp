@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/focal_length.h"
 
+#include "geometry/require_range.h"
+
 #include "geometry/median.h"
 
 #include "motion/epipolar.h"
@@ -61,6 +63,12 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &curv
 FocalFromTurning::FocalFromTurning(const PinholeCamera &guess, const FocalOptions &options)
     : m_guess(guess), m_options(options)
 {
+  requireRange("frames_back", options.frames_back, 1, 31);
+  requireRange("every", options.every, 1, 100);
+  requireRange("min_flow", options.min_flow, 0.005, 1);
+  requireRange("max_residual", options.max_residual, 0.001, 1);
+  requireRange("min_pairs", options.min_pairs, 2, 1000);
+  requireRange("max_sigma", options.max_sigma, 0.01, 1);
 }
 
 void FocalFromTurning::add(const PointTracker &tracker)

@@ -235,7 +235,7 @@ TEST_F(Comparison, TheReportTellsTheSameInAllThreeForms)
   const std::string html = toHtml(report);
   EXPECT_THAT(html, HasSubstr("a &lt;drawn&gt; flight"));
   EXPECT_THAT(html, HasSubstr("<td>1 of 2<td>"));
-  EXPECT_THAT(html, HasSubstr("<td>1.00 (0.00)<td>0.50 (0.50)<td>4"));
+  EXPECT_THAT(html, HasSubstr("<td>100 % (0 %)<td>50 % (50 %)<td>4"));
   EXPECT_THAT(html, HasSubstr("<polyline"));
   EXPECT_THAT(html, HasSubstr(toSvg(report)));
 }
