@@ -149,7 +149,7 @@ TEST_F(Install, TheCommandFindsItsPresetsAndItsFlightByName)
   const fs::path folder = s_folder / "run";
   const Outcome ran =
       bole::test::runShell("cd / && " + (s_prefix / "bin/bole").string() + " track park-forward --config default -o " +
-                           folder.string() + " --no-video --frames 5");
+                           folder.string() + " --no-video --frames 15");
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_TRUE(fs::exists(folder / "trunks.csv"));
 }

@@ -112,7 +112,7 @@ TEST(Run, ClearsWhatAKilledRunLeftHalfWritten)
   fs::create_directories(folder);
   std::ofstream(folder + "/.overlay.partial.mp4") << "half";
   std::ofstream(folder + "/.hidden") << "somebody's";
-  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 5 --no-video").status, 0);
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 15 --no-video").status, 0);
   EXPECT_FALSE(fs::exists(folder + "/.overlay.partial.mp4"));
   EXPECT_TRUE(fs::exists(folder + "/.hidden"));
 }
@@ -120,7 +120,7 @@ TEST(Run, ClearsWhatAKilledRunLeftHalfWritten)
 TEST(Run, HoldsItsCommandItsOptionsAndItsInput)
 {
   const std::string folder = freshFolder("redo");
-  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 5 --no-video --quiet").text, "");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 15 --no-video --quiet").text, "");
   const auto summary = jsonOf(folder + "/summary.json");
   EXPECT_EQ(summary.at("command").at(1), "track");
   EXPECT_EQ(summary.at("input").at("sha256").get<std::string>().size(), 64u);
@@ -129,7 +129,7 @@ TEST(Run, HoldsItsCommandItsOptionsAndItsInput)
   EXPECT_THAT(textOf(folder + "/options.yaml"), HasSubstr("map:"));
   // what the folder holds makes the same run again
   const std::string again = freshFolder("again");
-  ASSERT_EQ(run("track " + kFlight + " -o " + again + " --frames 5 --no-video -q --config " + folder + "/options.yaml")
+  ASSERT_EQ(run("track " + kFlight + " -o " + again + " --frames 15 --no-video -q --config " + folder + "/options.yaml")
                 .status,
             0);
   EXPECT_EQ(textOf(again + "/trajectory.tum"), textOf(folder + "/trajectory.tum"));
@@ -163,7 +163,7 @@ TEST(Run, IntoAFolderThatAnotherRunWritesToIsRefused)
   const pid_t child = start(folder);
   while (!fs::exists(folder + "/summary.json") && waitpid(child, nullptr, WNOHANG) == 0)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  const Outcome second = run("track " + kFlight + " -o " + folder + " --frames 5 --no-video");
+  const Outcome second = run("track " + kFlight + " -o " + folder + " --frames 15 --no-video");
   EXPECT_EQ(second.status, 1);
   EXPECT_THAT(second.text, HasSubstr("another run writes into this folder"));
   kill(child, SIGKILL);

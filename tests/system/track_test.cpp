@@ -146,7 +146,7 @@ TEST(Track, ShowsItsOverlayInAWindow)
   if (std::system("command -v xvfb-run >/dev/null") != 0)
     GTEST_SKIP() << "xvfb-run is not installed";
   const std::string folder = freshFolder("show");
-  const Outcome outcome = run("track " + kFlight + " -o " + folder + " --frames 5 --no-video --show", "xvfb-run -a ");
+  const Outcome outcome = run("track " + kFlight + " -o " + folder + " --frames 15 --no-video --show", "xvfb-run -a ");
   EXPECT_EQ(outcome.status, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder + "/trunks.csv"));
 }
@@ -154,7 +154,7 @@ TEST(Track, ShowsItsOverlayInAWindow)
 TEST(Track, SaysThatThereIsNoDisplayToShowItOn)
 {
   const Outcome outcome =
-      run("track " + kFlight + " -o " + freshFolder("no_display") + " --frames 5 --no-video --show", "env -u DISPLAY ");
+      run("track " + kFlight + " -o " + freshFolder("no_display") + " --frames 15 --no-video --show", "env -u DISPLAY ");
   EXPECT_NE(outcome.status, 0);
   EXPECT_THAT(outcome.text, HasSubstr("--show: DISPLAY is not set"));
 }
