@@ -153,8 +153,8 @@ TEST(Track, ShowsItsOverlayInAWindow)
 
 TEST(Track, SaysThatThereIsNoDisplayToShowItOn)
 {
-  const Outcome outcome =
-      run("track " + kFlight + " -o " + freshFolder("no_display") + " --frames 15 --no-video --show", "env -u DISPLAY ");
+  const Outcome outcome = run(
+      "track " + kFlight + " -o " + freshFolder("no_display") + " --frames 15 --no-video --show", "env -u DISPLAY ");
   EXPECT_NE(outcome.status, 0);
   EXPECT_THAT(outcome.text, HasSubstr("--show: DISPLAY is not set"));
 }
