@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # cmake -DSOURCE=... -DOUTPUT=... -P commit.cmake: writes the commit into a header, which changes only with it.
+cmake_minimum_required(VERSION 3.24)
 find_package(Git QUIET)
 set(commit "")
 if(GIT_FOUND)

@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <string>
+#include <unistd.h>
 #include <visp3/core/vpException.h>
 
 namespace
@@ -15,7 +17,7 @@ using testing::HasSubstr;
 
 std::string messageOf(const std::string &text)
 {
-  const std::string path = testing::TempDir() + "yaml_file_test.yaml";
+  const std::string path = testing::TempDir() + "yaml_file_test_" + std::to_string(getpid()) + ".yaml";
   std::ofstream(path, std::ios::binary) << text;
   try {
     loadYaml(path);

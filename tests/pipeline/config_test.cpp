@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <sstream>
+#include <string>
+#include <unistd.h>
 #include <visp3/core/vpException.h>
 
 namespace
@@ -19,7 +21,7 @@ using testing::HasSubstr;
 
 std::string written(const std::string &yaml)
 {
-  const std::string path = testing::TempDir() + "config_test.yaml";
+  const std::string path = testing::TempDir() + "config_test_" + std::to_string(getpid()) + ".yaml";
   std::ofstream(path) << yaml;
   return path;
 }
