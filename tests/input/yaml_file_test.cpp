@@ -17,7 +17,7 @@ using testing::HasSubstr;
 
 std::string messageOf(const std::string &text)
 {
-  const std::string path = testing::TempDir() + "yaml_file_test_" + std::to_string(getpid()) + ".yaml";
+  const std::string path = testing::TempDir() + std::to_string(getpid()) + "_yaml_file_test.yaml";
   std::ofstream(path, std::ios::binary) << text;
   try {
     loadYaml(path);

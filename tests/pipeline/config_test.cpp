@@ -21,7 +21,7 @@ using testing::HasSubstr;
 
 std::string written(const std::string &yaml)
 {
-  const std::string path = testing::TempDir() + "config_test_" + std::to_string(getpid()) + ".yaml";
+  const std::string path = testing::TempDir() + std::to_string(getpid()) + "_config_test.yaml";
   std::ofstream(path) << yaml;
   return path;
 }
