@@ -14,13 +14,13 @@ namespace bole::apps
 {
 void addEvaluate(CLI::App &app)
 {
-  struct Arguments
+  struct EvaluateArguments
   {
     std::string run, sequence, json;
     EvaluationOptions options;
     bool is_verbose = false, is_quiet = false;
   };
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App *command = app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
   command->add_option("RUN", arguments->run, "Folder written by `bole track`")->required();
   command

@@ -33,11 +33,11 @@ void printStatistics(const Graph &graph)
 
 void addGraph(CLI::App &app)
 {
-  struct Arguments
+  struct GraphArguments
   {
     std::string run, output;
   };
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<GraphArguments>();
   CLI::App *command = app.add_subcommand("graph", "Statistics and export of the graph of a run");
   command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")->required();
   command->add_option("--export", arguments->output, "write the graph here, in g2o text");

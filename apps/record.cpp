@@ -16,7 +16,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct RecordArguments
 {
   std::string address, folder;
   ArDroneSource::Options source;
@@ -36,7 +36,7 @@ void report(const StatusCounts &counts, const LinkCounters &link, std::size_t by
              static_cast<double>(bytes) * 1e-6, end);
 }
 
-void run(const Arguments &arguments)
+void run(const RecordArguments &arguments)
 {
   RecordingWriter raw(arguments.folder);
   ArDroneSource source(arguments.address, arguments.source,
@@ -70,7 +70,7 @@ void run(const Arguments &arguments)
 
 void addRecord(CLI::App &app)
 {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RecordArguments>();
   CLI::App *command = app.add_subcommand("record", "Record an AR.Drone's flight: raw bytes, and an ASL folder");
   command
       ->add_option("address", arguments->address,

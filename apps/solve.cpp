@@ -37,12 +37,12 @@ void solve(const std::string &file, const std::string &output, double tolerance)
 
 void addSolve(CLI::App &app)
 {
-  struct Arguments
+  struct SolveArguments
   {
     std::string file, output;
     double tolerance = 1e-9;
   };
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<SolveArguments>();
   CLI::App *command = app.add_subcommand("solve", "The optimum of a graph in g2o text");
   command->add_option("FILE", arguments->file, "graph, tags as in bole/smoothing/g2o.h")->required();
   command->add_option("-o,--output", arguments->output, "write the solved graph here");

@@ -25,7 +25,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct TrackArguments
 {
   std::string input, run, config;
   std::vector<std::string> settings;
@@ -38,7 +38,7 @@ struct Arguments
 };
 
 /// A video without a camera file is looked through for a pan that tells its field of view.
-std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, RunSummary &made)
+std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSummary &made)
 {
   auto source = openSource(arguments.input, arguments.source);
   made.note = source->note();
@@ -58,7 +58,7 @@ std::unique_ptr<FrameSource> openVideo(const Arguments &arguments, RunSummary &m
   return source;
 }
 
-std::unique_ptr<FrameSource> openInput(const Arguments &arguments, RunSummary &made)
+std::unique_ptr<FrameSource> openInput(const TrackArguments &arguments, RunSummary &made)
 {
   if (!ArDroneSource::accepts(arguments.input))
     return openVideo(arguments, made);
@@ -67,7 +67,7 @@ std::unique_ptr<FrameSource> openInput(const Arguments &arguments, RunSummary &m
   return std::make_unique<ArDroneSource>(arguments.input, options);
 }
 
-Options readOptions(const Arguments &arguments, bool is_compressed)
+Options readOptions(const TrackArguments &arguments, bool is_compressed)
 {
   Options options;
   options.camera.compressed = is_compressed;
@@ -129,7 +129,7 @@ private:
 };
 
 /// The last lines. They come when all is on the disk.
-void report(const Arguments &arguments, const TrackOutput &output, const Verdict &verdict)
+void report(const TrackArguments &arguments, const TrackOutput &output, const Verdict &verdict)
 {
   std::string text = fmt::format("{}{}\n{}", arguments.run, interrupted() ? " (interrupted)" : "", toText(verdict));
   if (const auto median = output.timing().age_ms(0.5))
@@ -144,7 +144,7 @@ void report(const Arguments &arguments, const TrackOutput &output, const Verdict
 }
 
 /// How the run is made, as far as that is known before it begins.
-RunSummary describeRun(const Arguments &arguments)
+RunSummary describeRun(const TrackArguments &arguments)
 {
   RunSummary made;
   std::error_code error;
@@ -157,7 +157,7 @@ RunSummary describeRun(const Arguments &arguments)
 }
 
 /// Frames from \p source until it ends, enough were taken, or somebody interrupts. Returns how many.
-std::size_t fly(const Arguments &arguments, FrameSource &source, Pipeline &pipeline, TrackOutput &output,
+std::size_t fly(const TrackArguments &arguments, FrameSource &source, Pipeline &pipeline, TrackOutput &output,
                 Flight &flight)
 {
   constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written
@@ -182,7 +182,7 @@ std::size_t fly(const Arguments &arguments, FrameSource &source, Pipeline &pipel
   return count;
 }
 
-void track(const Arguments &arguments)
+void track(const TrackArguments &arguments)
 {
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
     throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
@@ -226,7 +226,7 @@ void track(const Arguments &arguments)
 
 void addTrack(CLI::App &app)
 {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<TrackArguments>();
   CLI::App *command = app.add_subcommand("track", "Map the trunks of a flight and smooth its trajectory");
   command
       ->add_option("INPUT", arguments->input,

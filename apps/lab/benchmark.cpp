@@ -23,7 +23,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct BenchmarkArguments
 {
   int seeds = 5, frames = 120, samples = 4;
   std::uint64_t first_seed = 101;
@@ -34,7 +34,7 @@ struct Arguments
   double h264_kbps = 0;
 };
 
-struct Flight
+struct BenchmarkFlight
 {
   std::uint64_t seed;
   double density;
@@ -78,7 +78,7 @@ std::string titleOf(const Measure &measure)
 }
 double factorOf(const Measure &measure) { return *measure.unit == '%' ? 100 : 1; }
 
-SceneOptions sceneOf(const Arguments &arguments, std::uint64_t seed, double density, const std::string &light)
+SceneOptions sceneOf(const BenchmarkArguments &arguments, std::uint64_t seed, double density, const std::string &light)
 {
   SceneOptions scene;
   scene.setSeed(seed);
@@ -92,12 +92,12 @@ SceneOptions sceneOf(const Arguments &arguments, std::uint64_t seed, double dens
   return scene;
 }
 
-std::string csvOf(const std::vector<Flight> &flights)
+std::string csvOf(const std::vector<BenchmarkFlight> &flights)
 {
   std::string text = "seed,density,light,expected,found,confirmed,matched";
   for (const Measure &measure : measures())
     text += fmt::format(",{}", titleOf(measure));
-  for (const Flight &flight : flights) {
+  for (const BenchmarkFlight &flight : flights) {
     const TrunkMetrics &trunks = flight.result.trunks;
     text += fmt::format("\n{},{},{},{},{},{},{}", flight.seed, flight.density, flight.light, trunks.all.expected,
                         trunks.all.found, trunks.confirmed, trunks.matches.size());
@@ -110,11 +110,11 @@ std::string csvOf(const std::vector<Flight> &flights)
 }
 
 /// Sums over the flights as well as medians: a flight with two trunks counts as two.
-nlohmann::json summarise(const std::string &name, const std::vector<const Flight *> &flights)
+nlohmann::json summarise(const std::string &name, const std::vector<const BenchmarkFlight *> &flights)
 {
   nlohmann::json json{{"name", name}, {"flights", flights.size()}};
   std::size_t expected = 0, found = 0, confirmed = 0, matched = 0;
-  for (const Flight *flight : flights) {
+  for (const BenchmarkFlight *flight : flights) {
     expected += flight->result.trunks.all.expected;
     found += flight->result.trunks.all.found;
     confirmed += flight->result.trunks.confirmed;
@@ -137,7 +137,7 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
                        {"confirmed", confirmed}};
   for (const Measure &measure : measures()) {
     std::vector<double> values;
-    for (const Flight *flight : flights)
+    for (const BenchmarkFlight *flight : flights)
       values.push_back(factorOf(measure) * measure.of(flight->result));
     const MedianInterval median = bootstrapMedian(values);
     fmt::print("  {:26} median {}   [{}, {}]   of {}\n", titleOf(measure), figure(median.median, 8, 3),
@@ -148,13 +148,13 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Flight
   return json;
 }
 
-void report(const Arguments &arguments, const std::vector<Flight> &flights)
+void report(const BenchmarkArguments &arguments, const std::vector<BenchmarkFlight> &flights)
 {
   nlohmann::json json{{"version", BOLE_VERSION}, {"frames", arguments.frames}, {"samples", arguments.samples},
                       {"path", arguments.path},  {"bark", arguments.bark},     {"first_seed", arguments.first_seed}};
   const auto group = [&](const std::string &name, const auto &belongs) {
-    std::vector<const Flight *> members;
-    for (const Flight &flight : flights)
+    std::vector<const BenchmarkFlight *> members;
+    for (const BenchmarkFlight &flight : flights)
       if (belongs(flight))
         members.push_back(&flight);
     if (!members.empty())
@@ -162,18 +162,19 @@ void report(const Arguments &arguments, const std::vector<Flight> &flights)
   };
   if (arguments.densities.size() > 1)
     for (const double density : arguments.densities)
-      group(fmt::format("{} trunks a m^2", density), [density](const Flight &f) { return f.density == density; });
+      group(fmt::format("{} trunks a m^2", density),
+            [density](const BenchmarkFlight &f) { return f.density == density; });
   if (arguments.lights.size() > 1)
     for (const std::string &light : arguments.lights)
-      group(light, [&light](const Flight &f) { return f.light == light; });
-  group("all", [](const Flight &) { return true; });
+      group(light, [&light](const BenchmarkFlight &f) { return f.light == light; });
+  group("all", [](const BenchmarkFlight &) { return true; });
   if (arguments.folder.empty())
     return;
   writeAtomically(arguments.folder + "/flights.csv", csvOf(flights));
   writeAtomically(arguments.folder + "/benchmark.json", json.dump(1) + "\n");
 }
 
-void run(const Arguments &arguments)
+void run(const BenchmarkArguments &arguments)
 {
   Options options;
   if (!arguments.config.empty())
@@ -189,7 +190,7 @@ void run(const Arguments &arguments)
                         error.message().c_str());
   }
   endAtInterrupt();
-  std::vector<Flight> flights;
+  std::vector<BenchmarkFlight> flights;
   const std::size_t total =
       static_cast<std::size_t>(arguments.seeds) * arguments.densities.size() * arguments.lights.size();
   Progress progress(total, stderr, "flight");
@@ -198,7 +199,7 @@ void run(const Arguments &arguments)
     for (const double density : arguments.densities)
       for (const std::string &light : arguments.lights) {
         const std::uint64_t seed = arguments.first_seed + static_cast<std::uint64_t>(k);
-        Flight flight{seed, density, light, {}};
+        BenchmarkFlight flight{seed, density, light, {}};
         flight.result =
             runAccuracyTrial(sceneOf(arguments, seed, density, light), arguments.frames, options, interrupted);
         if (interrupted()) { // the flights that were finished count
@@ -219,7 +220,7 @@ void run(const Arguments &arguments)
 
 void addBenchmark(CLI::App &app)
 {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<BenchmarkArguments>();
   CLI::App *command =
       app.add_subcommand("benchmark", "Simulate, track and evaluate many flights; medians with 95 % intervals");
   command->add_option("-o,--output", arguments->folder, "Folder for flights.csv and benchmark.json");

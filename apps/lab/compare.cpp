@@ -19,7 +19,7 @@ namespace
 {
 namespace fs = std::filesystem;
 
-struct Arguments
+struct CompareArguments
 {
   std::string sequence, out, settings;
   bool has_basin = false, has_faults = false, is_quick = false;
@@ -46,14 +46,15 @@ EdgeSettings bestOf(const std::vector<SweepResult> &sweeps, TrackerKind kind, He
   return {};
 }
 
-EdgeSettings ourSettings(const Arguments &arguments)
+EdgeSettings ourSettings(const CompareArguments &arguments)
 {
   EdgeSettings settings;
   settings.far_m = arguments.far_m;
   return settings;
 }
 
-void compareAll(const Arguments &arguments, const TestFlight &flight, const std::string &cao, ComparisonReport &report)
+void compareAll(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
+                ComparisonReport &report)
 {
   std::vector<Contender> contenders;
   for (const TrackerKind kind : kVisp)
@@ -79,7 +80,7 @@ void compareAll(const Arguments &arguments, const TestFlight &flight, const std:
   report.timing = compare(flight, cao, timed, report.limits);
 }
 
-void measureBasin(const Arguments &arguments, const TestFlight &flight, const std::string &cao,
+void measureBasin(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
                   ComparisonReport &report)
 {
   BasinOptions options;
@@ -111,7 +112,7 @@ void measureBasin(const Arguments &arguments, const TestFlight &flight, const st
   }
 }
 
-void measureFaults(const Arguments &arguments, const TestFlight &flight, const std::string &cao,
+void measureFaults(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
                    ComparisonReport &report)
 {
   std::vector<Contender> contenders;
@@ -124,7 +125,7 @@ void measureFaults(const Arguments &arguments, const TestFlight &flight, const s
   report.faults = faults(flight, cao, contenders, {}, report.limits);
 }
 
-void run(const Arguments &arguments)
+void run(const CompareArguments &arguments)
 {
   const TestFlight flight = readFlight(arguments.sequence);
   fs::create_directories(arguments.out);
@@ -163,7 +164,7 @@ void run(const Arguments &arguments)
 
 void addCompare(CLI::App &app)
 {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CompareArguments>();
   CLI::App *command = app.add_subcommand("compare", "Compare vpMbTrunkTracker with ViSP's edge trackers on one flight");
   command
       ->add_option("SEQUENCE", arguments->sequence,

@@ -13,7 +13,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct EmulateArguments
 {
   std::string input;
   SourceOptions source;
@@ -50,7 +50,7 @@ void serve(ArDroneEmulator &emulator, bool quiet)
                c.reboots, c.refused);
 }
 
-void run(Arguments &arguments)
+void run(EmulateArguments &arguments)
 {
   arguments.emulator.jitter_s = arguments.jitter_ms / 1000;
   arguments.emulator.bit_rate = arguments.bit_rate_kbps * 1000;
@@ -90,7 +90,7 @@ void replay(ReplayArguments &arguments)
 
 void addEmulate(CLI::App &app)
 {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EmulateArguments>();
   ArDroneEmulator::Options &emulator = arguments->emulator;
   CLI::App *command = app.add_subcommand("emulate", "Serve a sequence or video as an AR.Drone would, on loopback");
   command->add_option("input", arguments->input, "ASL folder, numbered images or video")->required();

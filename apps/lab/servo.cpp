@@ -27,7 +27,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct ServoArguments
 {
   ServoTrialOptions trial;
   std::string folder, fault = "none", config;
@@ -132,7 +132,7 @@ int otherGaps(const std::vector<ServoTrialResult> &results)
 }
 
 /// runs.csv and summary.json of the runs so far: written after each, so that what was flown is kept.
-void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+void writeTables(const ServoArguments &arguments, const std::vector<ServoTrialResult> &results)
 {
   if (arguments.folder.empty())
     return;
@@ -159,7 +159,7 @@ void writeTables(const Arguments &arguments, const std::vector<ServoTrialResult>
 }
 
 /// Success, contacts, and medians with their 95 % intervals.
-void print(const Arguments &arguments, const std::vector<ServoTrialResult> &results)
+void print(const ServoArguments &arguments, const std::vector<ServoTrialResult> &results)
 {
   const int runs = static_cast<int>(results.size()), good = successes(results);
   const ShareInterval share = wilson(good, runs);
@@ -181,7 +181,7 @@ void print(const Arguments &arguments, const std::vector<ServoTrialResult> &resu
     fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
 }
 
-std::string runFolder(const Arguments &arguments, std::uint64_t seed)
+std::string runFolder(const ServoArguments &arguments, std::uint64_t seed)
 {
   if (arguments.folder.empty())
     return {};
@@ -193,7 +193,8 @@ std::string runFolder(const Arguments &arguments, std::uint64_t seed)
   return folder;
 }
 
-ServoTrialResult fly(const Arguments &arguments, ServoTrialOptions trial, std::uint64_t seed, OverlayWindow &window)
+ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, std::uint64_t seed,
+                     OverlayWindow &window)
 {
   trial.scenario.seed = seed;
   const std::string folder = runFolder(arguments, seed);
@@ -222,7 +223,7 @@ ServoTrialResult fly(const Arguments &arguments, ServoTrialOptions trial, std::u
   return result;
 }
 
-void run(Arguments &arguments)
+void run(ServoArguments &arguments)
 {
   if (!arguments.config.empty())
     readConfig(findPreset(arguments.config), arguments.trial.pipeline);
@@ -256,7 +257,7 @@ void run(Arguments &arguments)
 
 void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *example)
 {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ServoArguments>();
   ServoTrialOptions &trial = arguments->trial;
   trial.scenario.kind = kind;
   CLI::App *task = servo.add_subcommand(toString(kind), what);

@@ -12,7 +12,7 @@ namespace bole::apps
 {
 namespace
 {
-struct Arguments
+struct SimulateArguments
 {
   std::string scene_file, lens = "none";
   std::uint64_t seed = 1;
@@ -22,7 +22,7 @@ struct Arguments
 };
 
 /// Options of the command line go on top of the file's: only those that were given.
-void run(const CLI::App &command, const Arguments &arguments)
+void run(const CLI::App &command, const SimulateArguments &arguments)
 {
   SceneOptions scene = arguments.scene_file.empty() ? SceneOptions() : readScene(arguments.scene_file);
   if (arguments.scene_file.empty() && command.count("--samples") == 0) {
@@ -66,7 +66,7 @@ void run(const CLI::App &command, const Arguments &arguments)
 
 void addSimulate(CLI::App &app)
 {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   CLI::App *command =
       app.add_subcommand("simulate", "Render a flight through a forest, with its truth, as an ASL folder");
   const std::map<std::string, Light> lights{{"sun", Light::sun}, {"overcast", Light::overcast}};

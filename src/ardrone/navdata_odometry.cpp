@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+#include "geometry/constants.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
 
@@ -12,8 +13,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kDegree = M_PI / 180;
-constexpr double kGravity = 9.81;      // [m/s^2]
 constexpr double kCorrelation_s = 0.1; // of the velocity's error
 
 double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trajectory_metrics.h"
 
+#include "geometry/constants.h"
+
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 
@@ -17,7 +19,6 @@ double rms(double sum_of_squares, std::size_t count)
   return count == 0 ? kNotMeasured : std::sqrt(sum_of_squares / static_cast<double>(count));
 }
 
-constexpr double kDegree = M_PI / 180;
 } // namespace
 
 const char *toString(Alignment alignment)

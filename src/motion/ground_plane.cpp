@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/ground_plane.h"
 
-#include "geometry/degree.h"
+#include "geometry/constants.h"
 #include "geometry/median.h"
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/inertial_scale.h"
 
+#include "geometry/constants.h"
 #include "geometry/require_range.h"
 
 #include <Eigen/Dense>
@@ -17,8 +18,8 @@ namespace
 {
 // Where the errors stand in the state: attitude (right tangent), velocity, displacement, biases, log of the scale.
 constexpr int kAttitude = 0, kVelocity = 3, kMoved = 6, kGyro = 9, kForce = 12, kScale = 15;
-const Vector3d kGravity(0, 0, -9.81); // [m/s^2]
-constexpr double kGate = 30;          // squared innovation over its variance: not of this model
+const Vector3d kGravityVector(0, 0, -kGravity); // [m/s^2]
+constexpr double kGate = 30;                    // squared innovation over its variance: not of this model
 
 double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
@@ -179,7 +180,7 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   white(kGyro, m_gyro.bias_walk);
   white(kForce, m_options.accelerometer_bias_walk);
 
-  const Vector3d acceleration = m_wRb * specific + kGravity;
+  const Vector3d acceleration = m_wRb * specific + kGravityVector;
   m_moved += dt * m_velocity + 0.5 * dt * dt * acceleration;
   m_velocity += dt * acceleration;
   m_wRb = m_wRb * turn;

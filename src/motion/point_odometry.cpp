@@ -3,7 +3,7 @@
 
 #include "geometry/median.h"
 
-#include "geometry/degree.h"
+#include "geometry/constants.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
 #include <Eigen/Dense>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/sensor_monitor.h"
 
+#include "geometry/constants.h"
 #include "geometry/median.h"
 
 #include <Eigen/Dense>
@@ -17,7 +18,6 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kMemory_s = 4;
-constexpr double kDegree = M_PI / 180;
 
 double inSeconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
@@ -351,7 +351,6 @@ void SensorMonitor::checkDirection()
 /// Gravity of the odometry's roll and pitch against the accelerometer's, accelerations by the odometry's own velocity.
 void SensorMonitor::checkTilt(const Frame &frame)
 {
-  constexpr double kGravity = 9.81;
   constexpr std::size_t kLeast = 20; // steps
   if (m_steps.size() < kLeast || !frame.wMb_odometry)
     return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/vertical.h"
 
-#include "geometry/degree.h"
+#include "geometry/constants.h"
 #include "motion/epipolar.h"
 #include <Eigen/Dense>
 #include <opencv2/imgproc.hpp>

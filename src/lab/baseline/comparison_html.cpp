@@ -15,11 +15,6 @@ namespace bole
 {
 namespace
 {
-template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
-{
-  fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
-}
-
 /// A plot with its legend on the right: twelve lines that a colour-blind reader tells apart, by colour and dashes.
 class Plot
 {
@@ -85,14 +80,14 @@ void addBasin(std::string &html, const std::vector<BasinRow> &rows)
 {
   html += "<h2>Basin</h2><table><tr><th>tracker, help: share of right answers (silent failures) after a yaw step of";
   for (const double step : rows[0].steps_px)
-    add(html, "<th>{:g} px", step);
+    html += fmt::format("<th>{:g} px", step);
   html += "<th>pairs<th>settings</tr>\n";
   for (const BasinRow &row : rows) {
-    add(html, "<tr><td>{}, {}", escaped(row.name), row.has_clutter ? "forest" : "plain");
+    html += fmt::format("<tr><td>{}, {}", escaped(row.name), row.has_clutter ? "forest" : "plain");
     for (std::size_t s = 0; s < row.success.size(); ++s)
-      add(html, "<td>{} ({})", row.pairs > 0 ? percent(row.success[s], 0) : "-",
-          row.pairs > 0 ? percent(row.silent[s], 0) : "-");
-    add(html, "<td>{}<td>{}</tr>\n", row.pairs, escaped(row.settings));
+      html += fmt::format("<td>{} ({})", row.pairs > 0 ? percent(row.success[s], 0) : "-",
+                          row.pairs > 0 ? percent(row.silent[s], 0) : "-");
+    html += fmt::format("<td>{}<td>{}</tr>\n", row.pairs, escaped(row.settings));
   }
   html += "</table>\n" + basinPlot(rows);
 }
@@ -104,12 +99,12 @@ void addScores(std::string &html, const std::vector<Score> &scores)
           "<th>position RMSE, all frames [m]<th>rotation [deg]<th>silent failures<th>started again<th>ms median<th>ms "
           "p95<th>settings</tr>\n";
   for (const Score &s : scores)
-    add(html,
-        "<tr><td>{}<td>{} of "
-        "{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
-        escaped(s.name), s.until_loss, s.frames, s.tracked, figure(s.position_rmse_m, 0, 3),
-        figure(s.rotation_rmse_deg, 0, 2), figure(s.all_position_rmse_m, 0, 3), figure(s.all_rotation_rmse_deg, 0, 2),
-        s.silent_failures, s.reinitialisations, figure(s.median_ms, 0, 2), figure(s.p95_ms, 0, 2), escaped(s.settings));
+    html += fmt::format("<tr><td>{}<td>{} of "
+                        "{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+                        escaped(s.name), s.until_loss, s.frames, s.tracked, figure(s.position_rmse_m, 0, 3),
+                        figure(s.rotation_rmse_deg, 0, 2), figure(s.all_position_rmse_m, 0, 3),
+                        figure(s.all_rotation_rmse_deg, 0, 2), s.silent_failures, s.reinitialisations,
+                        figure(s.median_ms, 0, 2), figure(s.p95_ms, 0, 2), escaped(s.settings));
   html += "</table>\n";
 }
 
@@ -118,9 +113,9 @@ void addFaults(std::string &html, const std::vector<FaultRow> &rows)
   html += "<h2>Faults</h2><table><tr><th>tracker, help<th>fault<th>noticed<th>silent failures<th>recovered<th>slowest "
           "[frames]</tr>\n";
   for (const FaultRow &row : rows)
-    add(html, "<tr><td>{}<td>{}<td>{} of {}<td>{}<td>{} of {}<td>{}</tr>\n", escaped(row.name), row.fault.text(),
-        row.noticed, row.fault_frames, row.silent_failures, row.recovered, row.runs,
-        row.recovered > 0 ? std::to_string(row.slowest) : "-");
+    html += fmt::format("<tr><td>{}<td>{}<td>{} of {}<td>{}<td>{} of {}<td>{}</tr>\n", escaped(row.name),
+                        row.fault.text(), row.noticed, row.fault_frames, row.silent_failures, row.recovered, row.runs,
+                        row.recovered > 0 ? std::to_string(row.slowest) : "-");
   html += "</table>\n";
 }
 
@@ -128,12 +123,13 @@ void addSweeps(std::string &html, const std::vector<SweepResult> &sweeps)
 {
   html += "<h2>Settings tried</h2>\n";
   for (const SweepResult &sweep : sweeps) {
-    add(html,
+    html += fmt::format(
         "<details><summary>{}, {}: best of {} is {}</summary><table><tr><th>settings<th>frames right<th>position RMSE, "
         "all frames [m]</tr>\n",
         toString(sweep.kind), toString(sweep.help), sweep.tried.size(), sweep.best.text());
     for (const auto &[settings, score] : sweep.tried)
-      add(html, "<tr><td>{}<td>{}<td>{:.3f}</tr>\n", settings.text(), score.tracked, score.all_position_rmse_m);
+      html +=
+          fmt::format("<tr><td>{}<td>{}<td>{:.3f}</tr>\n", settings.text(), score.tracked, score.all_position_rmse_m);
     html += "</table></details>\n";
   }
 }
@@ -147,7 +143,7 @@ std::string toHtml(const ComparisonReport &report)
       "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><style>body{font-family:sans-serif;margin:2em}"
       "td,th{padding:2px 8px;text-align:right}td:first-child,th:first-child{text-align:left}"
       "tr:nth-child(even){background:#f4f4f4}</style>\n";
-  add(html,
+  html += fmt::format(
       "<title>{0}</title><h1>{0}</h1><p>{1} frames, {2} trunks in the model; wrong is more than {3:g} m or {4:g} "
       "degrees. <code>{5}</code></p>\n",
       escaped(report.sequence), report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg,

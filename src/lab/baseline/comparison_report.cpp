@@ -12,53 +12,49 @@ namespace
 {
 using Json = nlohmann::ordered_json;
 
-template <typename... Arguments> void add(std::string &text, const char *format, const Arguments &...arguments)
-{
-  fmt::format_to(std::back_inserter(text), fmt::runtime(format), arguments...);
-}
-
 /// Frames until it was right again, of the slowest; NaN where it never was.
 double slowestOf(const FaultRow &row) { return row.recovered > 0 ? row.slowest : NAN; }
 
-void addScores(std::string &text, const std::vector<Score> &scores)
+void addScoreLines(std::string &text, const std::vector<Score> &scores)
 {
-  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "", "until", "", "RMSE", "", "RMSE",
-      "", "", "re-", "ms", "ms");
-  add(text, "{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "tracker, help", "loss", "right",
-      "held [m]", "[deg]", "all [m]", "[deg]", "silent", "started", "median", "p95");
+  text += fmt::format("{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "", "until", "", "RMSE",
+                      "", "RMSE", "", "", "re-", "ms", "ms");
+  text += fmt::format("{:<42} {:>6} {:>6} {:>8} {:>7} {:>8} {:>7} {:>6} {:>7} {:>6} {:>6}\n", "tracker, help", "loss",
+                      "right", "held [m]", "[deg]", "all [m]", "[deg]", "silent", "started", "median", "p95");
   for (const Score &s : scores)
-    add(text, "{:<42} {:>6} {:>6} {} {} {} {} {:>6} {:>7} {} {}\n", s.name, s.until_loss, s.tracked,
-        figure(s.position_rmse_m, 8, 3), figure(s.rotation_rmse_deg, 7, 2), figure(s.all_position_rmse_m, 8, 3),
-        figure(s.all_rotation_rmse_deg, 7, 2), s.silent_failures, s.reinitialisations, figure(s.median_ms, 6, 2),
-        figure(s.p95_ms, 6, 2));
+    text += fmt::format("{:<42} {:>6} {:>6} {} {} {} {} {:>6} {:>7} {} {}\n", s.name, s.until_loss, s.tracked,
+                        figure(s.position_rmse_m, 8, 3), figure(s.rotation_rmse_deg, 7, 2),
+                        figure(s.all_position_rmse_m, 8, 3), figure(s.all_rotation_rmse_deg, 7, 2), s.silent_failures,
+                        s.reinitialisations, figure(s.median_ms, 6, 2), figure(s.p95_ms, 6, 2));
 }
 
-void addBasin(std::string &text, const std::vector<BasinRow> &rows)
+void addBasinLines(std::string &text, const std::vector<BasinRow> &rows)
 {
   if (rows.empty())
     return;
-  add(text, "\nBasin: right answers [%] one frame after a yaw step [px]; silent failures [%] at the widest\n{:<42}",
-      "");
+  text += fmt::format(
+      "\nBasin: right answers [%] one frame after a yaw step [px]; silent failures [%] at the widest\n{:<42}", "");
   for (const double step : rows[0].steps_px)
-    add(text, " {:>5g}", step);
-  add(text, " {:>6} {:>6}\n", "silent", "pairs");
+    text += fmt::format(" {:>5g}", step);
+  text += fmt::format(" {:>6} {:>6}\n", "silent", "pairs");
   for (const BasinRow &row : rows) {
-    add(text, "{:<42}", row.name + (row.has_clutter ? ", forest" : ", plain"));
+    text += fmt::format("{:<42}", row.name + (row.has_clutter ? ", forest" : ", plain"));
     for (const double share : row.success)
-      add(text, " {}", figure(row.pairs > 0 ? 100 * share : NAN, 5, 0));
-    add(text, " {} {:>6}\n", figure(row.pairs > 0 ? 100 * row.silent.back() : NAN, 6, 0), row.pairs);
+      text += fmt::format(" {}", figure(row.pairs > 0 ? 100 * share : NAN, 5, 0));
+    text += fmt::format(" {} {:>6}\n", figure(row.pairs > 0 ? 100 * row.silent.back() : NAN, 6, 0), row.pairs);
   }
 }
 
-void addFaults(std::string &text, const std::vector<FaultRow> &rows)
+void addFaultLines(std::string &text, const std::vector<FaultRow> &rows)
 {
   if (rows.empty())
     return;
-  add(text, "\nFaults\n{:<42} {:<14} {:>9} {:>7} {:>11} {:>8}\n", "", "fault", "noticed", "silent", "recovered",
-      "slowest");
+  text += fmt::format("\nFaults\n{:<42} {:<14} {:>9} {:>7} {:>11} {:>8}\n", "", "fault", "noticed", "silent",
+                      "recovered", "slowest");
   for (const FaultRow &row : rows)
-    add(text, "{:<42} {:<14} {:>4} of {:<3} {:>5} {:>6} of {:<3} {:>7}\n", row.name, row.fault.text(), row.noticed,
-        row.fault_frames, row.silent_failures, row.recovered, row.runs, figure(slowestOf(row), 7, 0));
+    text += fmt::format("{:<42} {:<14} {:>4} of {:<3} {:>5} {:>6} of {:<3} {:>7}\n", row.name, row.fault.text(),
+                        row.noticed, row.fault_frames, row.silent_failures, row.recovered, row.runs,
+                        figure(slowestOf(row), 7, 0));
 }
 
 Json scoreJson(const Score &s, bool has_errors)
@@ -90,19 +86,21 @@ Json scoreJson(const Score &s, bool has_errors)
 std::string toTable(const ComparisonReport &report)
 {
   std::string text;
-  add(text, "{}: {} frames, {} trunks in the model; wrong is more than {:g} m or {:g} degrees\n\n", report.sequence,
-      report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg);
-  addScores(text, report.scores);
-  add(text, "\nSettings\n");
+  text +=
+      fmt::format("{}: {} frames, {} trunks in the model; wrong is more than {:g} m or {:g} degrees\n\n",
+                  report.sequence, report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg);
+  addScoreLines(text, report.scores);
+  text += fmt::format("\nSettings\n");
   for (const Score &score : report.scores)
-    add(text, "{:<42} {}\n", score.name, score.settings);
+    text += fmt::format("{:<42} {}\n", score.name, score.settings);
   if (!report.timing.empty()) {
-    add(text, "\nCost on the same trunks, at the true pose [ms a frame]\n");
+    text += fmt::format("\nCost on the same trunks, at the true pose [ms a frame]\n");
     for (const Score &s : report.timing)
-      add(text, "{:<42} median {}, p95 {}\n", toString(s.kind), figure(s.median_ms, 0, 2), figure(s.p95_ms, 0, 2));
+      text += fmt::format("{:<42} median {}, p95 {}\n", toString(s.kind), figure(s.median_ms, 0, 2),
+                          figure(s.p95_ms, 0, 2));
   }
-  addBasin(text, report.basin);
-  addFaults(text, report.faults);
+  addBasinLines(text, report.basin);
+  addFaultLines(text, report.faults);
   return text;
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+
+#include "geometry/constants.h"
 #include "geometry/so3.h"
 #include "lab/emulator/emulator.h"
 
@@ -12,7 +14,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kDegree = M_PI / 180;
 constexpr float kGravity_mg = 1000;
 
 struct StoredFrame

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/flight_path.h"
 
+#include "geometry/constants.h"
 #include "geometry/require_range.h"
 
 #include "geometry/so3.h"
@@ -17,7 +18,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kGravity = 9.81;
 constexpr double kTwoPi = 2 * M_PI;
 } // namespace
 

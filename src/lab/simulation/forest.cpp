@@ -5,6 +5,8 @@
 
 #include "lab/simulation/random.h"
 
+#include <bole/trunk_record.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -15,7 +17,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kBreastHeight = 1.3;
 constexpr double kFarRadius = 70;     ///< of the scenery [m]: beyond, haze and the size of a pixel hide a trunk
 constexpr double kFarDensity = 0.018; ///< at most, trunks a m^2: seen edge on it is already a wall
 constexpr double kSpacing = 0.8;      ///< between two trunks [m]

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/quadrotor.h"
 
+#include "geometry/constants.h"
 #include "geometry/require_range.h"
 
 #include <Eigen/Geometry>
@@ -13,7 +14,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kGravity = 9.81;
 constexpr double kStanding = 0.05;    ///< height of the body's origin when it stands [m]
 constexpr double kLandingSpeed = 0.4; ///< [m/s]
 constexpr double kHeightGain = 1.5;   ///< of the held height [1/s]

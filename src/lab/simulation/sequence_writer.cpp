@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/sequence_writer.h"
 
+#include <bole/trunk_record.h>
+
 #include <Eigen/Geometry>
 
 #include <cmath>
@@ -17,8 +19,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kBreastHeight = 1.3; ///< above the foot [m]
-
 const char *kPoseHeader = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x "
                           "[],q_RS_y [],q_RS_z []\n";
 

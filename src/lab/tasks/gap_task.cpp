@@ -16,7 +16,6 @@ constexpr double kAcrossGain = 0.8;   ///< [1/s]
 constexpr double kLinedUp = 0.2;      ///< across the axis, at the entry [m]
 constexpr double kInView = 1.2;       ///< nearer to the middle the trunks leave the image [m]
 constexpr int kViews = 8;             ///< of a candidate that counts as in the way
-constexpr double kNearRange = 2.5;    ///< points beyond this do not matter yet [m]
 
 Eigen::Vector2d leftOf(const Eigen::Vector2d &v) { return {-v.y(), v.x()}; }
 

@@ -34,6 +34,8 @@ struct Obstacle
 /// below -2, looked through, or where the drone is.
 std::vector<Obstacle> obstacles(const FrameReport &report, double range, int observations);
 
+constexpr double kNearRange = 2.5; ///< points beyond this do not matter to a task yet [m]
+
 /// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it,
 /// has bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are
 /// forgotten after some seconds.

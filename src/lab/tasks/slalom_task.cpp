@@ -28,7 +28,6 @@ constexpr double kContact = 100;     ///< cost of a contact, and as much again a
 constexpr double kLook = 0.6;        ///< share of the direction of flight that the heading takes
 constexpr double kSwingOn = 0.6;     ///< the swing goes on as if flying at [m/s], at the least
 constexpr double kLookAside = 0.6;   ///< amplitude of the sidestep before it leaves [m]
-constexpr double kNearRange = 2.5;   ///< points beyond this do not matter yet [m]
 constexpr double kRange = 9;         ///< trunks farther do not matter yet [m]
 
 double line(double x, const SlalomTaskOptions &options)

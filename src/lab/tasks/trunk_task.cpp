@@ -11,19 +11,20 @@ namespace bole
 {
 namespace
 {
-constexpr double kSweep_s = 9; ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
-constexpr double kPause_s = 0.25;     ///< without a command it hovered: what was sent before is over
-constexpr double kFirstDrift = 0.3;   ///< standard deviation of the velocity nobody ordered, at first [m/s]
-constexpr double kLargestDrift = 0.5; ///< that is fed forward [m/s]
-constexpr double kSameTrunk = 0.5;    ///< a trunk that took the target's place stands this near [m]
-constexpr double kRadiusWeight = 0.1; ///< of a new image in the radius as seen from where it is
-constexpr double kMisread = 0.12;     ///< a jump of log r/d that no motion explains: other edges than the trunk's
-constexpr int kBelieved = 15;         ///< frames in a row after which it is believed all the same
-constexpr double kRetreat = 0.3;      ///< backs off no faster: nothing looks behind [m/s]
-constexpr int kPatience = 10;         ///< frames that the way round is blocked before it goes round the other way
-constexpr double kClearRange = 3;     ///< of trunks to keep clear of, or that stand in the way round [m]
-constexpr double kSureTrunk = 0;      ///< log odds from which on a trunk is kept clear of
-constexpr double kLargestTurn = 0.8;  ///< [rad/s]
+constexpr double kSidestep_s =
+    9; ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
+constexpr double kPause_s = 0.25;        ///< without a command it hovered: what was sent before is over
+constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
+constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
+constexpr double kSameTrunk = 0.5;       ///< a trunk that took the target's place stands this near [m]
+constexpr double kRadiusWeight = 0.1;    ///< of a new image in the radius as seen from where it is
+constexpr double kMisreadJump = 0.12;    ///< a jump of log r/d that no motion explains: other edges than the trunk's
+constexpr int kBelieved = 15;            ///< frames in a row after which it is believed all the same
+constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks behind [m/s]
+constexpr int kPatience = 10;            ///< frames that the way round is blocked before it goes round the other way
+constexpr double kClearRange = 3;        ///< of trunks to keep clear of, or that stand in the way round [m]
+constexpr double kSureTrunk = 0;         ///< log odds from which on a trunk is kept clear of
+constexpr double kLargestTurnRate = 0.8; ///< [rad/s]
 } // namespace
 
 void TrunkTaskOptions::validate() const
@@ -52,7 +53,11 @@ void TrunkTaskOptions::validate() const
 }
 
 TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
-    : ServoTask(options.safety), m_bMc(bMc), m_options(options), m_sidestep(0.7, kSweep_s), m_response(options.response)
+    : ServoTask(options.safety),
+      m_bMc(bMc),
+      m_options(options),
+      m_sidestep(0.7, kSidestep_s),
+      m_response(options.response)
 {
   m_options.validate();
   m_servo.setServo(vpServo::EYEINHAND_L_cVe_eJe);
@@ -105,7 +110,7 @@ int TrunkTask::choose(const FrameReport &report, double elapsed_s) const
   }
   if (nearest)
     return nearest->id;
-  return surest && elapsed_s > 2 * kSweep_s ? surest->id : -1;
+  return surest && elapsed_s > 2 * kSidestep_s ? surest->id : -1;
 }
 
 /// The trunk that stands where the target stood: ids change when trunks merge.
@@ -128,7 +133,7 @@ TaskCommand TrunkTask::search(const FrameReport &report, double time_s)
     enter(TaskPhase::failed);
     return {true, Eigen::Vector4d::Zero(), "no trunk found"};
   }
-  if (elapsed > kSweep_s)
+  if (elapsed > kSidestep_s)
     m_target = choose(report, elapsed);
   if (m_target >= 0) {
     enter(TaskPhase::servoing);
@@ -157,7 +162,7 @@ RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk
   if (m_options.ratio <= 0)
     return seen;
   const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
-  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisread;
+  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisreadJump;
   m_misread = is_misread ? m_misread + 1 : 0;
   if (!m_has_feature || m_misread > kBelieved) // it does look like that from here
     m_log_radius = radius;
@@ -313,7 +318,8 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   against[1] = -besides(1);
   v += m_servo.getTaskJacobianPseudoInverse() * against;
   const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
-  Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0, std::clamp(v[1], -kLargestTurn, kLargestTurn));
+  Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0,
+                           std::clamp(v[1], -kLargestTurnRate, kLargestTurnRate));
   m_response.send(time_s, velocity);
   return velocity;
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/scenario.h"
+
+#include "geometry/constants.h"
 #include "geometry/require_range.h"
 #include "lab/simulation/random.h"
 
@@ -10,7 +12,6 @@ namespace bole
 namespace
 {
 constexpr double kFlightHeight = 1.2; ///< where widths are measured [m]
-constexpr double kDegree = M_PI / 180;
 using Path = std::vector<Eigen::Vector3d>;
 
 void add(Path &path, double x, double y) { path.emplace_back(x, y, kFlightHeight); }
