@@ -62,11 +62,13 @@ class Campaign:
                 fail(f"servo.{name} must name a task and seeds")
 
     def _lay_out(self, flights):
-        """The first seed takes the first value of every list, the next seed the next combination: full factorial."""
+        """Every combination of the lists comes equally often, in an order drawn once: fewer seeds than combinations are a fair
+        sample of them."""
         flights = dict(flights)
         seeds = seeds_of(flights.pop("seeds", 1), "flights.seeds")
         lists = {key: value if isinstance(value, list) else [value] for key, value in flights.items()}
         combinations = list(itertools.product(*lists.values())) or [()]
+        random.Random(1).shuffle(combinations)
         for index, seed in enumerate(seeds):
             values = dict(zip(lists, combinations[index % len(combinations)]))
             self.flights[f"{seed:06d}"] = {"seed": seed, **values}
@@ -339,6 +341,62 @@ def recall_by(trunks, runs, key, edges, label):
     return picture(draw)
 
 
+def reliability(trunks, runs):
+    """Share of the confirmed trunks that are some, by the probability that they were written with."""
+    def draw(axes):
+        for colour, run in zip(COLOURS, runs):
+            mine = [t for t in trunks if t["run"] == run and t["kind"] != "missed" and t.get("probability") not in (None, "")]
+            edges = [0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.001]
+            for low, high in zip(edges, edges[1:]):
+                some = [t for t in mine if low <= float(t["probability"]) < high]
+                if some:
+                    k = sum(t["kind"] == "matched" for t in some)
+                    a, b = wilson(k, len(some))
+                    x = sum(float(t["probability"]) for t in some) / len(some)
+                    axes.errorbar([x], [k / len(some)], [[k / len(some) - a], [b - k / len(some)]], color=colour, marker="o", capsize=3,
+                                  label=run if f"{run}" not in axes.get_legend_handles_labels()[1] else None)
+        if not axes.has_data():
+            return False
+        axes.plot([0.4, 1], [0.4, 1], color="0.6", linestyle="--")
+        axes.set(xlabel="probability that was written", ylabel="share that is right (95 %)", xlim=(0.4, 1.02), ylim=(0, 1.05))
+        axes.legend()
+        return True
+
+    return picture(draw)
+
+
+def errors_by(trunks, flights, runs, key, error, label):
+    """Absolute errors of matched trunks against a number of the trunk, or by a word of the flight."""
+    settings = {f["flight"]: f for f in flights}
+
+    def draw(axes):
+        has_any, ticks = False, []
+        for index, (colour, run) in enumerate(zip(COLOURS, runs)):
+            mine = [(t.get(key, settings.get(t["flight"], {}).get(key)), abs(float(t[error]))) for t in trunks
+                    if t["run"] == run and t["kind"] == "matched" and t.get(error) not in (None, "")]
+            mine = [(k, e) for k, e in mine if k not in (None, "")]
+            if not mine:
+                continue
+            has_any = True
+            if isinstance(mine[0][0], str):
+                ticks = sorted({k for k, _ in mine})
+                for i, name in enumerate(ticks):
+                    axes.boxplot([[e for k, e in mine if k == name]], positions=[i + 0.25 * index], widths=0.2, showfliers=False,
+                                 boxprops={"color": colour}, medianprops={"color": colour})
+            else:
+                axes.plot([float(k) for k, _ in mine], [e for _, e in mine], ".", color=colour, label=run)
+        if not has_any:
+            return False
+        if ticks:
+            axes.set_xticks(range(len(ticks)), ticks)
+        else:
+            axes.legend()
+        axes.set(xlabel=label, ylabel=error.replace("_m", " [m]").replace("_", " "))
+        return True
+
+    return picture(draw)
+
+
 def spread(flights, runs, name, label, honest=None):
     def draw(axes):
         data = [[float(f[name]) for f in flights if f["run"] == run and f.get(name) is not None] for run in runs]
@@ -390,6 +448,10 @@ def write_page(campaign, path):
     parts += ["<h2>Pictures</h2>",
               recall_by(trunks, runs, "min_range_m", [0, 1, 2, 3, 4, 5, 6, 7, 8], "nearest range [m]"),
               recall_by(trunks, runs, "bearing_change_deg", [3, 5, 8, 12, 20, 30, 45, 60, 90], "change of bearing [degrees]"),
+              reliability(trunks, runs),
+              errors_by(trunks, flights, runs, "radius_m", "radius_error_m", "radius [m]"),
+              errors_by(trunks, flights, runs, "light", "radius_error_m", "light"),
+              errors_by(trunks, flights, runs, "min_range_m", "position_error_m", "nearest range [m]"),
               spread(flights, runs, "nees_half", "NEES/2 of trunks by flight (1 is honest)", 1),
               spread(flights, runs, "position_median_m", "median position error by flight [m]"),
               spread(flights, runs, "radius_rmse_m", "radius RMSE by flight [m]"),

@@ -172,17 +172,23 @@ Json toJson(const TrunkMetrics &trunks)
                                {"bearing_change_deg", ifSeen(match.visibility, match.visibility.bearing_change)},
                                {"position_error_m", match.error[indexOf(Alignment::xy_yaw)]},
                                {"nees_half", match.nees_half},
-                               {"radius_error_m", match.radius_error}});
+                               {"radius_m", match.estimate.radius},
+                               {"radius_error_m", match.radius_error},
+                               {"probability", match.estimate.probability}});
   json["missed"] = Json::array();
   for (const Unmatched &miss : trunks.misses)
-    json["missed"].push_back(
-        {{"truth", miss.id}, {"nearest_map", idOrNull(miss.nearest_id)}, {"distance_m", miss.nearest_distance}});
+    json["missed"].push_back({{"truth", miss.id},
+                              {"min_range_m", ifSeen(miss.visibility, miss.visibility.min_range)},
+                              {"bearing_change_deg", ifSeen(miss.visibility, miss.visibility.bearing_change)},
+                              {"nearest_map", idOrNull(miss.nearest_id)},
+                              {"distance_m", miss.nearest_distance}});
   json["false_positives"] = Json::array();
   for (const Unmatched &extra : trunks.false_positives)
     json["false_positives"].push_back({{"map", extra.id},
                                        {"nearest_truth", idOrNull(extra.nearest_id)},
                                        {"distance_m", extra.nearest_distance},
-                                       {"duplicate", extra.is_duplicate}});
+                                       {"duplicate", extra.is_duplicate},
+                                       {"probability", extra.estimate.probability}});
   return json;
 }
 } // namespace
