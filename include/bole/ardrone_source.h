@@ -33,11 +33,13 @@ MountedCamera publishedArDroneCamera(int generation, int width, int height);
 class ArDroneSource : public FrameSource
 {
 public:
+  /// What an AR.Drone is read with.
   struct Options
   {
-    vpArDroneGrabber::Options grabber;
-    double give_up_s = 10;  ///< [s], (0.5, 86400): a battery is changed, a reboot takes less
-    int max_width_px = 640; ///< [px], 0 or >= 64: wider images are shrunk, see Rectifier
+    vpArDroneGrabber::Options grabber; ///< of the link and of the decoder
+    double give_up_s = 10;             ///< [s], (0.5, 86400): a battery is changed, a reboot takes less
+    int max_width_px = 640;            ///< [px], 0 or >= 64: wider images are shrunk, see Rectifier
+    /// \throws vpException where a value is out of range, with what is allowed
     void validate() const;
   };
 
@@ -45,19 +47,27 @@ public:
   /// first whole one where no navdata come); throws vpException when none comes, for a wrong
   /// address or camera file, and for a camera of another shape.
   explicit ArDroneSource(const std::string &address);
+  /// \param address ardrone://HOST[?key=value...] \param options see Options \param tap sees every packet, for
+  /// recordings \throws vpException on an address that cannot be read
   ArDroneSource(const std::string &address, const Options &options, LinkTap tap = {});
   ~ArDroneSource() override;
 
   bool next(Frame &frame) override;
   PinholeCamera camera() const override;
   Pose bMc() const override;
+  /// The address as it was given.
   std::string name() const override;
+  /// An AR.Drone tells its motion in its navdata.
   bool hasOdometry() const override { return true; }
+  /// Whether the navdata hold a gyro (AR.Drone 2).
   bool hasGyro() const override;
   bool isCompressed() const override { return true; }
 
+  /// Ends a wait for the next frame, from any thread.
   void stop() noexcept;
+  /// Packets and pictures so far.
   LinkCounters counters() const;
+  /// The grabber behind, for its status and its counters.
   vpArDroneGrabber &grabber();
   /// Camera as mounted, with its lens, for recordings of the images as they came.
   const MountedCamera &mountedCamera() const;

@@ -29,7 +29,11 @@ std::string toYaml(const Options &options);
 /// What one option is, for people.
 struct OptionDescription
 {
-  std::string key, unit, range, value, effect;
+  std::string key;    ///< as `bole options` prints them
+  std::string unit;   ///< as `bole options` prints them
+  std::string range;  ///< as `bole options` prints them
+  std::string value;  ///< as `bole options` prints them
+  std::string effect; ///< as `bole options` prints them
 };
 /// Every option with its value in \p options, in the order of the sections.
 std::vector<OptionDescription> describeOptions(const Options &options = {});

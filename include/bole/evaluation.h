@@ -28,33 +28,40 @@ enum class Alignment
   xy_yaw,      ///< least squares over the trajectory in x, y and yaw; z stays
   xy_yaw_scale ///< the same with the scale of the horizontal plane; z stays
 };
+/// As it is written in reports.
 const char *toString(Alignment alignment);
+/// Place in a ByAlignment.
 inline std::size_t indexOf(Alignment alignment) { return static_cast<std::size_t>(alignment); }
 
 /// One figure for each Alignment.
 using ByAlignment = std::array<double, 4>;
-constexpr ByAlignment kNoneMeasured = {kNotMeasured, kNotMeasured, kNotMeasured, kNotMeasured};
+constexpr ByAlignment kNoneMeasured = {kNotMeasured, kNotMeasured, kNotMeasured,
+                                       kNotMeasured}; ///< nothing was measured
 
+/// Errors of a trajectory after an alignment.
 struct TrajectoryErrors
 {
-  std::size_t poses = 0;
+  std::size_t poses = 0;              ///< compared with the truth
   double ate = kNotMeasured;          ///< absolute trajectory error: RMSE of the position in 3-D [m]
   double ate_xy = kNotMeasured;       ///< its horizontal part [m]
   double rotation_deg = kNotMeasured; ///< RMSE of the angle [degrees]
 };
 
+/// Errors of relative motion over an interval.
 struct RelativeErrors
 {
-  std::size_t intervals = 0;
+  std::size_t intervals = 0;          ///< compared with the truth
   double translation = kNotMeasured;  ///< RMSE over the interval [m]
   double rotation_deg = kNotMeasured; ///< [degrees]
 };
 
+/// What is said of one trajectory.
 struct TrajectoryReport
 {
   std::array<TrajectoryErrors, 4> absolute; ///< by Alignment
   double scale = kNotMeasured;              ///< by which Alignment::xy_yaw_scale multiplies the estimate
-  RelativeErrors over_frame, over_second;   ///< between consecutive frames, and over 1 s
+  RelativeErrors over_frame;                ///< between consecutive frames, and over 1 s
+  RelativeErrors over_second;               ///< between consecutive frames, and over 1 s
 };
 
 /// What a flight saw of a trunk of the truth.
@@ -69,10 +76,10 @@ struct TrunkVisibility
 /// A trunk of the map and the one of the truth it was matched with.
 struct TrunkMatch
 {
-  TrunkRecord estimate;
-  int truth_id = 0;
+  TrunkRecord estimate;               ///< as the map has it
+  int truth_id = 0;                   ///< its partner
   double truth_radius = kNotMeasured; ///< [m]
-  TrunkVisibility visibility;
+  TrunkVisibility visibility;         ///< of the partner, by the true trajectory
   ByAlignment error = kNoneMeasured;  ///< distance under each Alignment [m]
   double nees_half = kNotMeasured;    ///< e^T P^-1 e / 2, with the first pose as gauge
   double predicted_sigma = 0;         ///< sqrt(trace P) [m], to be compared with the RMSE of the distance
@@ -82,7 +89,7 @@ struct TrunkMatch
 /// A trunk of the map without partner, or one of the truth that was expected and not found.
 struct Unmatched
 {
-  int id = 0;
+  int id = 0;                             ///< in its own set
   int nearest_id = -1;                    ///< in the other set (for a miss: any status), -1 where that is empty
   double nearest_distance = kNotMeasured; ///< [m], after TrunkMetrics::matching
   bool is_duplicate = false;              ///< within the gate of a trunk of the truth that has a better partner
@@ -93,45 +100,54 @@ struct Unmatched
 /// Figures of a set of matches.
 struct TrunkErrors
 {
-  std::size_t expected = 0, found = 0; ///< trunks of the truth that count for recall
-  std::size_t matches = 0;
-  ByAlignment median = kNoneMeasured, rmse = kNoneMeasured;      ///< of the distance under each Alignment [m]
-  double nees_half = kNotMeasured;                               ///< mean; near 1 when covariances are honest
-  double predicted_sigma = kNotMeasured;                         ///< root mean square [m]
-  double radius_rmse = kNotMeasured, radius_bias = kNotMeasured; ///< [m]
-  double recall() const;                                         ///< found / expected
+  std::size_t expected = 0;              ///< trunks of the truth that count for recall
+  std::size_t found = 0;                 ///< trunks of the truth that count for recall
+  std::size_t matches = 0;               ///< trunks of the map with a partner
+  ByAlignment median = kNoneMeasured;    ///< of the distance under each Alignment [m]
+  ByAlignment rmse = kNoneMeasured;      ///< of the distance under each Alignment [m]
+  double nees_half = kNotMeasured;       ///< mean; near 1 when covariances are honest
+  double predicted_sigma = kNotMeasured; ///< root mean square [m]
+  double radius_rmse = kNotMeasured;     ///< of the matched trunks [m]
+  double radius_bias = kNotMeasured;     ///< of the matched trunks [m]
+  double recall() const;                 ///< found / expected
 };
 
+/// Errors of the trunks of one stratum.
 struct TrunkBin
 {
-  std::string name;
-  TrunkErrors errors;
+  std::string name;   ///< such as "2 to 4 m"
+  TrunkErrors errors; ///< of the trunks in it
 };
 
 /// How good a map of trunks is. Shares are 0 .. 1.
 struct TrunkMetrics
 {
   Alignment matching = Alignment::xy_yaw; ///< after which the trunks were matched
-  std::size_t confirmed = 0;
-  double precision = kNotMeasured; ///< matched / confirmed, against all trunks of the truth, near and far
-  double recall = kNotMeasured;    ///< expected and matched / expected (TrunkVisibility::is_expected)
-  double f1 = kNotMeasured;
-  double duplicates = kNotMeasured; ///< share of the confirmed trunks
-  TrunkErrors all;
-  std::vector<TrunkBin> by_range, by_parallax;
-  std::vector<TrunkMatch> matches;
-  std::vector<Unmatched> false_positives, misses;
+  std::size_t confirmed = 0;              ///< trunks of the map that were judged
+  double precision = kNotMeasured;        ///< matched / confirmed, against all trunks of the truth, near and far
+  double recall = kNotMeasured;           ///< expected and matched / expected (TrunkVisibility::is_expected)
+  double f1 = kNotMeasured;               ///< harmonic mean of precision and recall
+  double duplicates = kNotMeasured;       ///< share of the confirmed trunks
+  TrunkErrors all;                        ///< of all matched trunks
+  std::vector<TrunkBin> by_range;         ///< by nearest range, and by the change of bearing while in view
+  std::vector<TrunkBin> by_parallax;      ///< by nearest range, and by the change of bearing while in view
+  std::vector<TrunkMatch> matches;        ///< trunks of the map with their partners
+  std::vector<Unmatched> false_positives; ///< trunks of the map without partner
+  std::vector<Unmatched> misses;          ///< expected ones of the truth without partner
 };
 
+/// How a run is compared.
 struct EvaluationOptions
 {
   /// For live flights, whose stamps are the drone's: shifts the run's stamps so that its motion is that of the truth.
   bool align_time = false;
 };
 
+/// A run against the truth of its sequence, or against another run.
 struct Evaluation
 {
-  std::string run, sequence;
+  std::string run;                          ///< folders that were compared
+  std::string sequence;                     ///< folders that were compared
   bool is_against_run = false;              ///< `sequence` is another run
   std::optional<double> time_shift_s;       ///< added to the run's stamps, where that was asked for
   std::size_t frames = 0;                   ///< of the sequence

@@ -14,14 +14,14 @@ namespace bole
 /// A pose that is known: r = S (wMb (-) mean).
 struct PosePrior
 {
-  Pose mean;
+  Pose mean;                                  ///< wMb
   Matrix6d covariance = Matrix6d::Identity(); ///< of the tangent (rho, phi) at the mean
 };
 
 /// The pose of b in a, as odometry measures it: r = S ((wMa^-1 wMb) (-) aMb).
 struct Odometry
 {
-  Pose aMb;
+  Pose aMb;                                   ///< measured step from pose a to pose b, body frames
   Matrix6d covariance = Matrix6d::Identity(); ///< of the tangent (rho, phi) at aMb
 };
 
@@ -34,9 +34,9 @@ struct Odometry
 /// has no direction: those two rows are then zero.
 struct RelativePoseMeasurement
 {
-  Eigen::Matrix3d caRcb = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
-  Matrix5d covariance = Matrix5d::Identity(); ///< (phi [rad], directionBasis angles [rad])
+  Eigen::Matrix3d caRcb = Eigen::Matrix3d::Identity();  ///< rotation from the earlier to the later camera
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ(); ///< of the translation in the earlier camera, of length 1
+  Matrix5d covariance = Matrix5d::Identity();           ///< (phi [rad], directionBasis angles [rad])
 };
 constexpr double kMinBaseline = 1e-4; ///< [m]
 
@@ -51,8 +51,8 @@ struct Height
 /// twice is still well defined, and its covariance says how little is known of it.
 struct TrunkPrior
 {
-  Trunk mean;
-  Vector5d sigma = Vector5d::Ones();
+  Trunk mean;                        ///< about which the prior is centred
+  Vector5d sigma = Vector5d::Ones(); ///< of the five numbers of Trunk::minus [m, m, -, -, -]
 };
 
 /// Robust losses: how much a residual that is far too large may still pull.
@@ -62,6 +62,7 @@ enum class LossKind
   huber,     ///< s below width^2, then 2 width sqrt(s) - width^2
   cauchy     ///< width^2 log(1 + s / width^2): a gross outlier pulls less and less
 };
+/// As options write it.
 const char *toString(LossKind kind);
 /// Throws vpException(badValue) for an unknown name.
 LossKind lossKindFromString(const std::string &name);
@@ -72,9 +73,10 @@ LossKind lossKindFromString(const std::string &name);
 /// rises.
 struct Loss
 {
-  LossKind kind = LossKind::quadratic;
-  double width = 3; ///< in standard deviations, > 0
+  LossKind kind = LossKind::quadratic; ///< form of the loss
+  double width = 3;                    ///< in standard deviations, > 0
 
+  /// Loss of the squared normalised residual \p s.
   double rho(double s) const;
   double weight(double s) const; ///< rho'(s)
 };

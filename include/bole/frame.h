@@ -25,14 +25,15 @@ enum class FrameStatus
   resized, ///< not the size of the frames before: not used
   doubtful ///< decoded, and no picture of this place at this time: dark, noise, smeared, out of order, late
 };
+/// As reports write it.
 const char *toString(FrameStatus status);
 
 /// Angular rate in the body frame [rad/s], timestamp in [ns], and what an accelerometer beside the gyro measured.
 struct GyroSample
 {
-  std::int64_t stamp_ns = 0;
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
-  std::optional<Eigen::Vector3d> force = {}; ///< specific force in the body frame [m/s^2]: +9.81 upwards at rest
+  std::int64_t stamp_ns = 0;                      ///< time of the sample
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero(); ///< angular rate in the body [rad/s]
+  std::optional<Eigen::Vector3d> force = {};      ///< specific force in the body frame [m/s^2]: +9.81 upwards at rest
 };
 
 /// A sensor that contradicts the others.
@@ -44,14 +45,15 @@ struct SensorVerdict
   std::string text;   ///< for the user: "odometry: frozen since 5.0 s"
 };
 
+/// One picture with all that the sensors said about its time.
 struct Frame
 {
-  std::int64_t stamp_ns = 0;
-  std::size_t index = 0; ///< position in the source, counted with missing frames
-  FrameStatus status = FrameStatus::ok;
-  std::string message;              ///< why the status is not ok
-  vpImage<unsigned char> image;     ///< grey, rectified: the pinhole of FrameSource::camera() applies
-  std::optional<Pose> wMb_odometry; ///< pose filter at this frame, where there is one
+  std::int64_t stamp_ns = 0;            ///< time of the middle of the exposure
+  std::size_t index = 0;                ///< position in the source, counted with missing frames
+  FrameStatus status = FrameStatus::ok; ///< whether the picture may be used
+  std::string message;                  ///< why the status is not ok
+  vpImage<unsigned char> image;         ///< grey, rectified: the pinhole of FrameSource::camera() applies
+  std::optional<Pose> wMb_odometry;     ///< pose filter at this frame, where there is one
   /// Covariance of the motion since the frame before, in the tangent (rho, phi) of wMb_odometry,
   /// where the source knows it.
   std::optional<Matrix6d> odometry_covariance;
@@ -77,8 +79,11 @@ public:
   virtual Pose bMc() const = 0;
   /// Number of frames, 0 when not known (live, some videos).
   virtual std::size_t size() const { return 0; }
+  /// Of the input, for reports.
   virtual std::string name() const = 0;
+  /// Whether frames come with poses of a pose filter.
   virtual bool hasOdometry() const = 0;
+  /// Whether frames come with samples of a gyro.
   virtual bool hasGyro() const = 0;
   /// False where the focal length is a guess.
   virtual bool isCameraKnown() const { return true; }

@@ -15,53 +15,63 @@ namespace bole
 /// Edges name vertices by their place in `poses` and `trunks`; the ids are the names in a file.
 struct Graph
 {
+  /// A pose of the body.
   struct PoseVertex
   {
-    std::int64_t id = 0;
-    Pose wMb;
+    std::int64_t id = 0; ///< as in the file
+    Pose wMb;            ///< world from body
   };
+  /// A trunk.
   struct TrunkVertex
   {
-    std::int64_t id = 0;
-    Trunk trunk;
-    TrunkPrior prior;
+    std::int64_t id = 0; ///< as in the file
+    Trunk trunk;         ///< in the world
+    TrunkPrior prior;    ///< on its radius and lean
   };
+  /// A prior on one pose.
   struct PosePriorEdge
   {
-    std::size_t pose = 0;
-    PosePrior prior;
+    std::size_t pose = 0; ///< index into Graph::poses
+    PosePrior prior;      ///< absolute measurement
   };
+  /// A measured step between two poses.
   struct OdometryEdge
   {
-    std::size_t a = 0, b = 0;
-    Odometry odometry;
+    std::size_t a = 0; ///< indices into Graph::poses
+    std::size_t b = 0; ///< indices into Graph::poses
+    Odometry odometry; ///< step and covariance
   };
+  /// A relative rotation and direction of translation from point features.
   struct RelativePoseEdge
   {
-    std::size_t a = 0, b = 0;
-    RelativePoseMeasurement measurement;
+    std::size_t a = 0;                   ///< indices into Graph::poses
+    std::size_t b = 0;                   ///< indices into Graph::poses
+    RelativePoseMeasurement measurement; ///< with its covariance
   };
+  /// A measured height.
   struct HeightEdge
   {
-    std::size_t pose = 0;
-    Height height;
+    std::size_t pose = 0; ///< index into Graph::poses
+    Height height;        ///< over the world's z = 0
   };
+  /// One view of a trunk, as its summary factor.
   struct ObservationEdge
   {
-    std::size_t pose = 0, trunk = 0;
-    SummaryFactor summary;
+    std::size_t pose = 0;  ///< indices into Graph::poses and Graph::trunks
+    std::size_t trunk = 0; ///< indices into Graph::poses and Graph::trunks
+    SummaryFactor summary; ///< Eq. 9
   };
 
-  Pose bMc;            ///< camera in the body frame
-  Loss summary_loss;   ///< on observations
-  Loss direction_loss; ///< on relative poses from points
-  std::vector<PoseVertex> poses;
-  std::vector<TrunkVertex> trunks;
-  std::vector<PosePriorEdge> pose_priors;
-  std::vector<OdometryEdge> odometry;
-  std::vector<RelativePoseEdge> relative_poses;
-  std::vector<HeightEdge> heights;
-  std::vector<ObservationEdge> observations;
+  Pose bMc;                                     ///< camera in the body frame
+  Loss summary_loss;                            ///< on observations
+  Loss direction_loss;                          ///< on relative poses from points
+  std::vector<PoseVertex> poses;                ///< in the order of time
+  std::vector<TrunkVertex> trunks;              ///< in the order in which they were found
+  std::vector<PosePriorEdge> pose_priors;       ///< absolute measurements of poses
+  std::vector<OdometryEdge> odometry;           ///< steps of the pose filter
+  std::vector<RelativePoseEdge> relative_poses; ///< steps of the point features
+  std::vector<HeightEdge> heights;              ///< of poses
+  std::vector<ObservationEdge> observations;    ///< views of trunks
 };
 
 /// Sum of rho(|r|^2) / 2 over all factors and trunk priors at the values of the vertices. The

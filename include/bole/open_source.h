@@ -13,8 +13,8 @@ namespace bole
 /// A calibrated camera and where it sits in the body.
 struct MountedCamera
 {
-  CameraModel model;
-  Pose bMc;
+  CameraModel model; ///< of the camera
+  Pose bMc;          ///< place of the camera in the body
 };
 
 /// Pose in the body (x forward, y left, z up) of a camera at its origin that looks straight ahead.
@@ -56,6 +56,7 @@ struct SourceOptions
   /// given. Default 65: between a phone's video and an action camera's.
   double field_of_view_deg = 65;
 
+  /// \throws vpException where a value is out of range, with what is allowed
   void validate() const;
 };
 

@@ -9,16 +9,19 @@
 
 namespace bole
 {
+/// All options of the pipeline; `bole options` prints them with unit, range and default.
 struct Options
 {
+  /// What the camera does to the picture.
   struct Camera
   {
     double height = 0;       ///< over the ground [m]; 0: not known. Gives a video without odometry its scale
     bool focal_known = true; ///< false: the focal length is a guess
     double rate = 10;        ///< frames a second
     bool compressed = false; ///< the pictures went through a lossy codec
-  } camera;
+  } camera;                  ///< what the camera does to the picture
 
+  /// Parts of the pipeline that can be left out, for comparisons.
   struct Stages
   {
     bool points = true;          ///< relative poses from point features
@@ -26,8 +29,9 @@ struct Options
     bool window_detector = true; ///< new trunks from a window of frames
     bool line_detector = false;  ///< new trunks from one frame; always on where no range is known
     bool servoing = false;       ///< the camera is steered by what is tracked, and may rest or circle a trunk
-  } stages;
+  } stages;                      ///< what is left out
 
+  /// What trunks look like.
   struct Trunks
   {
     double radius = 0.15;      ///< median of the prior [m]
@@ -37,7 +41,7 @@ struct Options
     double lean = 0.035;       ///< standard deviation of the lean [tan]; 0.0001: upright
     double low = 0.25;         ///< lower end of the part that is tracked, over the ground [m]
     double high = 2.6;         ///< upper end [m]
-  } trunks;
+  } trunks;                    ///< what trunks look like
 
   struct Range ///< all [m]
   {
@@ -46,15 +50,17 @@ struct Options
     double detect_max = 10.5; ///< of a new trunk
     double near = 6;          ///< nearer than this is foreground for the saliency; 0: saliency is not asked of a trunk
     double through = 9;       ///< whether points are seen through a trunk is asked nearer than this; 0: never
-  } range;
+  } range;                    ///< how far is looked
 
+  /// How new trunks are found.
   struct Detection
   {
     int window = 18;              ///< frames looked at together
     double elevation_low = -0.17; ///< lower end of the part of a trunk that is looked for [tan]
     double elevation_high = 0.45; ///< upper end [tan]
-  } detection;
+  } detection;                    ///< how new trunks are found
 
+  /// How trunks are kept.
   struct Map
   {
     double confirm_probability = 0.6225; ///< that a candidate is a trunk, at which it is confirmed
@@ -62,7 +68,7 @@ struct Options
     double merge_distance = 0.3;         ///< trunks with less than this between their bark are one [m]
     double candidate_memory = 5;         ///< a candidate not seen for longer is no longer looked for [s]
     double lag = 0;                      ///< poses older than this are marginalised [s]; 0: all stay open
-  } map;
+  } map;                                 ///< how trunks are kept
 
   struct Odometry ///< noise of the pose filter, a step: between two frames
   {
@@ -72,20 +78,21 @@ struct Options
     double height = 0.02;        ///< of the height about the truth [m]
     double tilt = 0.005;         ///< of roll and pitch about the truth [rad]
     double turn = 0.006;         ///< of the rotation of a step, used where there is no gyro [rad]
-  } odometry;
+  } odometry;                    ///< of the pose filter
 
+  /// The gyro.
   struct Gyro
   {
     double noise = 8e-4; ///< white noise of the rate [rad/s/sqrt(Hz)]
     double bias = 0.008; ///< standard deviation of the bias at the start [rad/s]
-  } gyro;
+  } gyro;                ///< of the gyro
 
   struct Paper ///< the method as printed in the paper, for comparison
   {
     bool energy = false;   ///< Eq. 3: dark trunks, blurred parts, minimised from the prediction
     double alpha = 1000;   ///< its weight
     bool saliency = false; ///< Eq. 10 to 17
-  } paper;
+  } paper;                 ///< the paper's own choices
 
   void validate() const; ///< \throw vpException "key = value, must be ..."
 };

@@ -35,6 +35,7 @@ namespace bole
 {
 struct StageOptions;
 
+/// From frames to a map and a trajectory: the whole system behind one class.
 class Pipeline
 {
 public:
@@ -43,8 +44,9 @@ public:
   Pipeline(const PinholeCamera &camera, const Pose &bMc, const Options &options = {});
   Pipeline(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options); ///< for tests and the ablation
   ~Pipeline();
+  /// Moves the flight with all that is known.
   Pipeline(Pipeline &&) noexcept;
-  Pipeline &operator=(Pipeline &&) noexcept;
+  Pipeline &operator=(Pipeline &&) noexcept; ///< Moves the flight with all that is known.
 
   /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted.
   FrameReport process(const Frame &frame);

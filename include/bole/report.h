@@ -19,25 +19,26 @@ namespace bole
 /// A known trunk that was looked for in the frame.
 struct TrunkInView
 {
-  int id = 0;
+  int id = 0;                                  ///< in the map
   TrunkStatus status = TrunkStatus::candidate; ///< in the map
   bool is_tracked = false;                     ///< measured in this frame
   const char *outcome = "";                    ///< of the search for it: "tracked", "occluded", ...
   RelativeTrunk relative;                      ///< as measured, else as predicted
-  double tan_low = 0, tan_high = 0;            ///< part looked at: tangents of elevation
+  double tan_low = 0;                          ///< part looked at: tangents of elevation
+  double tan_high = 0;                         ///< part looked at: tangents of elevation
   double distance = 0;                         ///< from the camera to the axis [m]; 0 where no range is known
 };
 
 /// A trunk of the map, whether it is in view or not.
 struct KnownTrunk
 {
-  int id = 0;
+  int id = 0;                                  ///< in the map
   TrunkStatus status = TrunkStatus::candidate; ///< `lost`: confirmed, and now out of sight
-  Trunk trunk;
-  int observations = 0;           ///< frames in which it was measured
-  double log_odds = 0;            ///< to be a trunk and no chance pair of lines
-  double seen_through = 0;        ///< points seen behind it for each on its bark
-  double log_radius_variance = 0; ///< [1]
+  Trunk trunk;                                 ///< in the world
+  int observations = 0;                        ///< frames in which it was measured
+  double log_odds = 0;                         ///< to be a trunk and no chance pair of lines
+  double seen_through = 0;                     ///< points seen behind it for each on its bark
+  double log_radius_variance = 0;              ///< [1]
   /// Of its bearing from the camera [rad^2]: how well its place relative to the camera is known. It leaves out the
   /// drift of the world, which moves camera and trunk alike.
   double bearing_variance = 0;
@@ -58,24 +59,27 @@ struct SaliencyField
   vpImage<float> confidence;   ///< change of the log-odds by the images
   float unknown_below = 0;     ///< confidence under which a pixel is unknown
 
+  /// Whether a cell has an answer.
   bool isKnown(unsigned row, unsigned column) const { return confidence[row][column] >= unknown_below; }
 };
 
+/// All that is known right after a frame.
 struct FrameReport
 {
-  std::size_t index = 0; ///< frames processed before this one
-  std::int64_t stamp_ns = 0;
-  FrameStatus frame_status = FrameStatus::ok;
-  std::string reason;                              ///< why the status is not ok
-  Pose wMb, wMc;                                   ///< as known right after this frame
-  Matrix6d pose_covariance = Matrix6d::Identity(); ///< of (rho, phi) of wMb, scale error left out
-  bool is_translation_seen = false;                ///< by a pose filter or by points; else it was only expected
-  bool has_ranges = true;                          ///< false while the camera has only rotated
-  std::vector<TrunkInView> trunks;                 ///< known trunks looked for
-  std::vector<KnownTrunk> map;                     ///< all that a frame has to reckon with, in view or not
-  std::vector<TriangulatedRay> points;             ///< none where the frame was not ok
-  std::vector<SensorVerdict> verdicts;             ///< all of the flight so far
-  std::optional<SaliencyField> saliency;
+  std::size_t index = 0;                                  ///< frames processed before this one
+  std::int64_t stamp_ns = 0;                              ///< of the frame
+  FrameStatus frame_status = FrameStatus::ok;             ///< whether its picture was used
+  std::string reason;                                     ///< why the status is not ok
+  Pose wMb;                                               ///< as known right after this frame
+  Pose wMc;                                               ///< as known right after this frame
+  Matrix6d pose_covariance = Matrix6d::Identity();        ///< of (rho, phi) of wMb, scale error left out
+  bool is_translation_seen = false;                       ///< by a pose filter or by points; else it was only expected
+  bool has_ranges = true;                                 ///< false while the camera has only rotated
+  std::vector<TrunkInView> trunks;                        ///< known trunks looked for
+  std::vector<KnownTrunk> map;                            ///< all that a frame has to reckon with, in view or not
+  std::vector<TriangulatedRay> points;                    ///< none where the frame was not ok
+  std::vector<SensorVerdict> verdicts;                    ///< all of the flight so far
+  std::optional<SaliencyField> saliency;                  ///< where saliency is on
   std::vector<std::pair<const char *, double>> timing_ms; ///< a stage each, in flow order
 };
 

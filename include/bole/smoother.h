@@ -48,6 +48,7 @@
 
 namespace bole
 {
+/// How the smoother iterates and what it forgets.
 struct SmootherOptions
 {
   /// Camera in the body frame. Default: forward-looking (z of the camera along x of the body).
@@ -91,49 +92,61 @@ struct SmootherOptions
   /// their estimate. 0: all stay open. Otherwise >= 2.
   int fixed_lag = 0;
 
+  /// Camera that looks along the body's x axis, without a lever arm.
   static Pose forwardCamera();
   /// Throws vpException(badValue) "name = value, must be ...".
   void validate() const;
 };
 
+/// How an update went.
 enum class UpdateStatus
 {
   ok,              ///< settled: no variable is further than the thresholds from its linearisation
   iteration_limit, ///< still moving after max_iterations; the next update() goes on
   degenerate       ///< a direction of some variable had no information beyond rounding and was held
 };
+/// As reports write it.
 const char *toString(UpdateStatus status);
 
+/// What an update did.
 struct UpdateResult
 {
-  UpdateStatus status = UpdateStatus::ok;
-  int iterations = 0;
-  double cost = 0;              ///< of the linearised graph at its minimum
-  std::size_t relinearised = 0; ///< variables moved to a new point of linearisation
-  std::size_t eliminated = 0;   ///< variables eliminated again
-  std::size_t resolved = 0;     ///< variables whose estimate was computed again
+  UpdateStatus status = UpdateStatus::ok; ///< ok, or why not
+  int iterations = 0;                     ///< Gauss-Newton steps taken
+  double cost = 0;                        ///< of the linearised graph at its minimum
+  std::size_t relinearised = 0;           ///< variables moved to a new point of linearisation
+  std::size_t eliminated = 0;             ///< variables eliminated again
+  std::size_t resolved = 0;               ///< variables whose estimate was computed again
 };
 
+/// Poses and trunks from odometry, point features and summary factors (Eq. 2), solved incrementally.
 class Smoother
 {
 public:
+  /// An empty problem.
   explicit Smoother(const SmootherOptions &options = SmootherOptions());
   /// All of \p graph (validated; its bMc and losses replace those of \p options). Pose i and trunk
   /// j are graph.poses[i] and graph.trunks[j]. Not settled yet: call update() or optimize().
   Smoother(const Graph &graph, const SmootherOptions &options);
   ~Smoother();
+  /// Moves the problem.
   Smoother(Smoother &&) noexcept;
-  Smoother &operator=(Smoother &&) noexcept;
+  Smoother &operator=(Smoother &&) noexcept; ///< Moves the problem.
 
+  /// As given to the constructor.
   const SmootherOptions &options() const;
 
   // Growing the graph. Ids count from 0 and stay valid for ever.
 
+  /// The pose that all others hang on. \return 0
   std::size_t addFirstPose(const Pose &wMb, const Matrix6d &covariance);
   /// Next pose, \p aMb in the frame of the pose before, with the odometry factor between them.
   std::size_t addPose(const Pose &aMb, const Matrix6d &covariance);
+  /// A pose \p aMb after the last one [m, rad], with its covariance in the step's own frame. \return its index
   std::size_t addPose(const Pose &aMb, const Matrix6d &covariance, const Pose &wMb_guess);
+  /// A trunk without prior. \return its index
   std::size_t addTrunk(const Trunk &guess);
+  /// A trunk with a prior on its radius and lean. \return its index
   std::size_t addTrunk(const Trunk &guess, const TrunkPrior &prior);
   /// Indefinite or non-finite summaries are not added. The energy's constant part is not kept.
   SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
@@ -141,7 +154,9 @@ public:
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
   /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one is marginalised.
   void addOdometry(std::size_t a, std::size_t b, const Odometry &odometry);
+  /// A measured height of the body over the world's z = 0 [m].
   void addHeight(std::size_t pose, double z, double sigma);
+  /// An absolute measurement of a pose.
   void addPosePrior(std::size_t pose, const PosePrior &prior);
 
   /// Forgets a trunk and all that was seen of it.
@@ -160,12 +175,16 @@ public:
 
   // Estimates, as of the last update().
 
+  /// Estimate of a pose, world from body.
   Pose pose(std::size_t pose) const;
+  /// Estimate of a trunk, in the world.
   Trunk trunk(std::size_t trunk) const;
   bool hasTrunk(std::size_t trunk) const; ///< false once removed or merged away
+  /// Poses added so far, closed ones included.
   std::size_t poseCount() const;
   std::size_t trunkCount() const;       ///< ids handed out, removed ones included
   std::size_t observationCount() const; ///< summary factors in the graph
+  /// Views of a trunk.
   std::size_t observationCount(std::size_t trunk) const;
   /// Exact cost of the open part of the graph at the estimates, as cost(graph()). O(graph).
   double cost() const;
@@ -174,8 +193,11 @@ public:
   // taken in is not known. For a trunk closed by the fixed lag: its last one; for a pose: that of
   // one at most 15 poses before it, when that was closed.
 
+  /// Marginal covariance in the units of Trunk::minus [m, m, -, -, -].
   Matrix5d trunkCovariance(std::size_t trunk) const;
+  /// Marginal covariance of a pose, in its own frame, in the order of Pose::plus [m, rad].
   Matrix6d poseCovariance(std::size_t pose) const;
+  /// The same of the last pose, cheaper.
   Matrix6d currentPoseCovariance() const;
   /// The relative trunk that the newest pose should see.
   RelativeTrunk predictedRelative(std::size_t trunk) const;

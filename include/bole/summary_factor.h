@@ -19,11 +19,12 @@ namespace bole
 /// Energy is a negative log-likelihood (calibrated: F is an information matrix in the tangent of theta^r).
 struct SummaryFactor
 {
-  RelativeTrunk optimum; ///< hat theta^r, the centre of the approximation
-  double energy = 0;     ///< e
-  Vector4d f = Vector4d::Zero();
+  RelativeTrunk optimum;             ///< hat theta^r, the centre of the approximation
+  double energy = 0;                 ///< e
+  Vector4d f = Vector4d::Zero();     ///< gradient of the energy at its minimum
   Matrix4d F = Matrix4d::Identity(); ///< symmetric, positive semi-definite
 
+  /// Value of the quadratic at another relative trunk (Eq. 9).
   double energyAt(const RelativeTrunk &relative) const;
 };
 
@@ -36,5 +37,6 @@ enum class SummaryStatus
               ///< Section 7)
   not_finite  ///< NaN or infinity, or an optimum that is no rotation or has r >= d
 };
+/// As reports write it.
 const char *toString(SummaryStatus status);
 } // namespace bole

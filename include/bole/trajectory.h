@@ -10,10 +10,11 @@
 
 namespace bole
 {
+/// A pose and its time.
 struct StampedPose
 {
-  std::int64_t stamp_ns = 0;
-  Pose wMb;
+  std::int64_t stamp_ns = 0; ///< of the frame
+  Pose wMb;                  ///< world from body
 };
 
 /// Poses with strictly rising stamps.

@@ -19,12 +19,12 @@
 
 namespace bole
 {
-using Vector4d = Eigen::Matrix<double, 4, 1>;
-using Vector5d = Eigen::Matrix<double, 5, 1>;
-using Matrix4d = Eigen::Matrix<double, 4, 4>;
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
-using Matrix46d = Eigen::Matrix<double, 4, 6>;
-using Matrix45d = Eigen::Matrix<double, 4, 5>;
+using Vector4d = Eigen::Matrix<double, 4, 1>;  ///< a step of a relative trunk: rotation [rad], log r/d
+using Vector5d = Eigen::Matrix<double, 5, 1>;  ///< a step of a trunk: place [m, m], log radius, lean (2)
+using Matrix4d = Eigen::Matrix<double, 4, 4>;  ///< covariance of a relative trunk
+using Matrix5d = Eigen::Matrix<double, 5, 5>;  ///< covariance of a trunk
+using Matrix46d = Eigen::Matrix<double, 4, 6>; ///< relative trunk by pose
+using Matrix45d = Eigen::Matrix<double, 4, 5>; ///< relative trunk by trunk
 
 /// A trunk in the world frame: the cylinder of radius exp(log_radius) [m] round the axis that passes
 /// through (x, y, 0) with the direction (lean.x, lean.y, 1).
@@ -36,13 +36,17 @@ struct Trunk
   double log_radius = std::log(0.15);             ///< log of the radius in metres: the radius stays positive
   Eigen::Vector2d lean = Eigen::Vector2d::Zero(); ///< tan of the lean towards x and y of the world
 
+  /// [m]
   double radius() const { return std::exp(log_radius); }
   /// Point of the axis at the height \p z [m] of the world.
   Eigen::Vector3d axisAt(double z) const { return {xy.x() + lean.x() * z, xy.y() + lean.y() * z, z}; }
+  /// The trunk moved by \p xi.
   Trunk plus(const Vector5d &xi) const;
+  /// The step that leads from \p other to this.
   Vector5d minus(const Trunk &other) const;
 };
 
+/// Side of a trunk in the image.
 enum class Border
 {
   left,
@@ -59,11 +63,14 @@ enum class Border
 /// limbs of ViSP's vpCylinder projection; the Jacobians of relativeTrunk() agree with central differences.
 struct RelativeTrunk
 {
-  Eigen::Matrix3d cRt = Eigen::Matrix3d::Identity();
-  double log_ratio = std::log(0.05); ///< log(r/d), below 0 outside the trunk
+  Eigen::Matrix3d cRt = Eigen::Matrix3d::Identity(); ///< from the trunk frame to the camera
+  double log_ratio = std::log(0.05);                 ///< log(r/d), below 0 outside the trunk
 
+  /// Radius over distance, r/d.
   double ratio() const { return std::exp(log_ratio); }
+  /// The relative trunk moved by \p xi.
   RelativeTrunk plus(const Vector4d &xi) const;
+  /// The step that leads from \p x to this.
   Vector4d minus(const RelativeTrunk &x) const;
 
   /// Direction in the camera frame of the point of a border whose tangent of elevation above the
@@ -71,13 +78,13 @@ struct RelativeTrunk
   Eigen::Vector3d borderDirection(Border border, double tan_elevation) const;
   /// Unit normal in the camera frame of the silhouette plane; the trunk lies on its negative side.
   Eigen::Vector3d borderNormal(Border border) const;
+  /// No number is NaN or infinite, and the camera stands outside the trunk.
   bool isFinite() const { return cRt.allFinite() && std::isfinite(log_ratio) && log_ratio < 0; }
 };
 
 /// The relative trunk of \p trunk seen by the camera at wMb * bMc (Eq. 5-8). log_ratio >= 0 (not
-/// isFinite()) when the camera centre is inside the trunk.
-/// \param J_pose 4x6 Jacobian by the tangent (rho, phi) of wMb, or nullptr.
-/// \param J_trunk 4x5 Jacobian by the tangent of the trunk, or nullptr.
+/// isFinite()) when the camera centre is inside the trunk. \p J_pose: 4x6 Jacobian by the tangent (rho, phi) of wMb, or
+/// nullptr; \p J_trunk: 4x5 Jacobian by the tangent of the trunk, or nullptr.
 RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose = nullptr,
                             Matrix45d *J_trunk = nullptr);
 

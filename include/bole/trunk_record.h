@@ -22,6 +22,7 @@ enum class TrunkStatus
   merged     ///< a duplicate, now part of another trunk
 };
 
+/// As trunks.csv writes it.
 inline const char *toString(TrunkStatus status)
 {
   switch (status) {
@@ -50,6 +51,7 @@ enum class TrunkFate
   unranged   ///< found before the camera had moved, at a range that was a guess
 };
 
+/// As hypotheses.csv writes it.
 inline const char *toString(TrunkFate fate)
 {
   switch (fate) {
@@ -81,9 +83,9 @@ inline const char *toString(TrunkFate fate)
 /// A trunk that was confirmed and went out of sight stays confirmed.
 struct TrunkRecord
 {
-  using Covariance = Eigen::Matrix<double, 5, 5>;
+  using Covariance = Eigen::Matrix<double, 5, 5>; ///< of x, y, radius [m], lean x, lean y
 
-  int id = 0;
+  int id = 0;                                     ///< in the map; never given twice
   Eigen::Vector2d xy = Eigen::Vector2d::Zero();   ///< [m]
   double radius = 0;                              ///< [m]
   Eigen::Vector2d lean = Eigen::Vector2d::Zero(); ///< tan of the lean towards x and y
@@ -91,9 +93,10 @@ struct TrunkRecord
   double probability = 0;                         ///< that it is a trunk and not a chance pair of lines, 0 to 1
   Covariance covariance = Covariance::Identity(); ///< of x, y, radius, lean x, lean y
   int observations = 0;                           ///< views: frames with a summary factor
-  double first_seen_s = 0, last_seen_s = 0;
-  TrunkStatus status = TrunkStatus::candidate;
-  TrunkFate fate = TrunkFate::none; ///< of what is not confirmed
+  double first_seen_s = 0;                        ///< [s], from the first frame
+  double last_seen_s = 0;                         ///< [s], from the first frame
+  TrunkStatus status = TrunkStatus::candidate;    ///< in its life cycle
+  TrunkFate fate = TrunkFate::none;               ///< of what is not confirmed
 
   Eigen::Matrix2d covarianceXy() const { return covariance.topLeftCorner<2, 2>(); }         ///< [m^2]
   double positionSigma() const { return std::sqrt(std::max(0.0, covarianceXy().trace())); } ///< [m]

@@ -34,8 +34,11 @@ struct BodyState
 /// What came of the video.
 struct VideoCounters
 {
-  std::size_t frames = 0; ///< given out, whatever their status
-  std::size_t ok = 0, corrupt = 0, stale = 0, resized = 0;
+  std::size_t frames = 0;        ///< given out, whatever their status
+  std::size_t ok = 0;            ///< pictures by what became of them
+  std::size_t corrupt = 0;       ///< pictures by what became of them
+  std::size_t stale = 0;         ///< pictures by what became of them
+  std::size_t resized = 0;       ///< pictures by what became of them
   std::size_t refused = 0;       ///< datagrams that cannot be a picture, or come faster than any drone sends
   std::size_t skipped = 0;       ///< never decoded, since a newer key frame was there
   std::size_t resyncs = 0;       ///< times that the stream had to be searched for a header
@@ -45,16 +48,16 @@ struct VideoCounters
 /// What came over the link so far.
 struct LinkCounters
 {
-  VideoCounters video;
-  std::size_t delivered = 0;       ///< frames given out
-  std::size_t frozen = 0;          ///< of them, stale
-  std::size_t dropped = 0;         ///< decoded, but a newer frame came before anyone asked
-  std::size_t connections = 0;     ///< of the video, the first one too
-  std::size_t clock_jumps = 0;     ///< of the video's clock: reboots
-  std::size_t navdata_packets = 0; ///< used
-  std::size_t navdata_refused = 0; ///< wrong checksum, cut
-  std::size_t navdata_late = 0;    ///< out of sequence
-  std::size_t navdata_restarts = 0;
+  VideoCounters video;              ///< of the pictures
+  std::size_t delivered = 0;        ///< frames given out
+  std::size_t frozen = 0;           ///< of them, stale
+  std::size_t dropped = 0;          ///< decoded, but a newer frame came before anyone asked
+  std::size_t connections = 0;      ///< of the video, the first one too
+  std::size_t clock_jumps = 0;      ///< of the video's clock: reboots
+  std::size_t navdata_packets = 0;  ///< used
+  std::size_t navdata_refused = 0;  ///< wrong checksum, cut
+  std::size_t navdata_late = 0;     ///< out of sequence
+  std::size_t navdata_restarts = 0; ///< how often the numbering began anew
 };
 
 /// What a received piece belongs to.
@@ -76,6 +79,7 @@ struct LinkOptions
   double retry_s = 0.1;     ///< [s], (0.01, 5): pause between attempts
   double frozen_m = 0.1;    ///< [m], (0, 10): a motion that no scene among trees can hide
   double frozen_rad = 0.02; ///< [rad], (0, 3): 4 px at 320 columns
+  /// \throws vpException where a value is out of range, with what is allowed
   void validate() const;
 };
 } // namespace bole
@@ -105,11 +109,13 @@ struct LinkOptions
 class vpArDroneGrabber : public vpFrameGrabber
 {
 public:
+  /// Of the link and the picture.
   struct Options
   {
     double open_timeout_s = 5;    ///< [s], (0.1, 600): a key frame comes every half second
     double frame_timeout_s = 0.4; ///< [s], (0.02, 60): acquire() gives up then, the status is `missing`
-    bole::LinkOptions link;
+    bole::LinkOptions link;       ///< addresses, ports and times
+    /// \throws vpException where a value is out of range, with what is allowed
     void validate() const;
   };
 
@@ -124,16 +130,24 @@ public:
   ///
   /// Errors: vpException "address: key = value, must be ...".
   explicit vpArDroneGrabber(const std::string &address = "ardrone://192.168.1.1");
+  /// \param address ardrone://HOST[?key=value...] \param options see Options \param tap sees every packet, for
+  /// recordings
   vpArDroneGrabber(const std::string &address, const Options &options, bole::LinkTap tap = {});
   ~vpArDroneGrabber() override;
 
+  /// Connects and waits for the first picture, in grey. \throws vpException when the drone does not answer
   void open(vpImage<unsigned char> &I) override;
+  /// The same, in colour.
   void open(vpImage<vpRGBa> &I) override;
+  /// Waits for the next picture, in grey. \throws vpException at the end of the flight
   void acquire(vpImage<unsigned char> &I) override;
+  /// The same, in colour.
   void acquire(vpImage<vpRGBa> &I) override;
+  /// Ends the connection.
   void close() override;
 
   // Of the image acquired last:
+  /// Of the last picture: ok, stale, corrupt, ...
   bole::FrameStatus getStatus() const;
   const std::string &getMessage() const; ///< why the status is not ok
   double getTimestamp() const;           ///< drone's clock [s]
@@ -142,6 +156,7 @@ public:
   /// are missing.
   const std::optional<bole::BodyState> &getBody() const;
 
+  /// Packets and pictures so far.
   bole::LinkCounters getCounters() const;
   /// Connects without waiting for an image: for programs that need navdata or commands only.
   void connect();

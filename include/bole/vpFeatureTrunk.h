@@ -45,8 +45,9 @@ class vpFeatureTrunk : public vpBasicFeature
 public:
   vpFeatureTrunk();
 
+  /// An empty feature: ViSP calls it from the constructor.
   void init() override;
-  /// From a tracked trunk. \param radius [m] known or believed.
+  /// From a tracked trunk; radius [m], known or believed.
   void buildFrom(const bole::RelativeTrunk &relative, double radius);
   /// From a trunk of the map and the camera's pose. Throws vpException where the camera is inside
   /// the trunk.
@@ -58,25 +59,39 @@ public:
   /// As numbers, e.g. for a desired feature.
   void buildFrom(double bearing, double inclination, double tip, double log_ratio, double radius);
 
+  /// Of the axis [rad], to the right of the optical axis.
   double bearing() const { return s[0]; }
+  /// Of the axis against the vertical in the image plane [rad].
   double inclination() const { return s[1]; }
+  /// Of the axis towards the camera [rad].
   double tip() const { return s[2]; }
+  /// Logarithm of radius over distance.
   double logRatio() const { return s[3]; }
   double distance() const; ///< from the camera's centre to the axis [m], with the radius given
+  /// The four numbers as a relative trunk.
   bole::RelativeTrunk relativeTrunk() const;
 
+  /// For vpServo::addFeature.
   static unsigned int selectBearing() { return FEATURE_LINE[0]; }
+  /// For vpServo::addFeature.
   static unsigned int selectInclination() { return FEATURE_LINE[1]; }
+  /// For vpServo::addFeature.
   static unsigned int selectTip() { return FEATURE_LINE[2]; }
+  /// For vpServo::addFeature.
   static unsigned int selectLogRatio() { return FEATURE_LINE[3]; }
 
+  /// Interaction matrix of the selected numbers by the camera's velocity [m/s, rad/s].
   vpMatrix interaction(unsigned int select = FEATURE_ALL) override;
   /// s - s*, angles brought to (-pi, pi].
   vpColVector error(const vpBasicFeature &s_star, unsigned int select = FEATURE_ALL) override;
+  /// Prints the selected numbers in degrees and metres.
   void print(unsigned int select = FEATURE_ALL) const override;
+  /// A copy, as vpServo keeps it.
   vpFeatureTrunk *duplicate() const override;
+  /// Draws both borders.
   void display(const vpCameraParameters &cam, const vpImage<unsigned char> &I, const vpColor &color = vpColor::green,
                unsigned int thickness = 1) const override;
+  /// Draws both borders.
   void display(const vpCameraParameters &cam, const vpImage<vpRGBa> &I, const vpColor &color = vpColor::green,
                unsigned int thickness = 1) const override;
 

@@ -28,9 +28,11 @@
 
 #include <memory>
 #include <visp3/mbt/vpMbTracker.h>
+/// Camera poses from known trunks, as a ViSP model-based tracker.
 class vpMbTrunkTracker : public vpMbTracker
 {
 public:
+  /// What is known about the last pose.
   enum class Status
   {
     not_initialised,
@@ -41,7 +43,9 @@ public:
     lost,            ///< trunks should be in view, and their borders are not where they must be
     bad_image        ///< black, noise, frozen, smeared or of another size: getMessage()
   };
+  /// As reports write it.
   static const char *toString(Status status);
+  /// Thresholds and noise; set them from XML by loadConfigFile().
   struct Options
   {
     double border_sigma_px = 1.5; ///< of a border's place: bow and root flare of real trunks (0.1 .. 20)
@@ -63,39 +67,57 @@ public:
   };
 
   vpMbTrunkTracker();
+  /// A tracker without model.
   explicit vpMbTrunkTracker(const Options &options);
   ~vpMbTrunkTracker() override;
 
   /// Where odometry or a gyro expects the camera at the next track(); what it knows for good (height by sonar, roll and
   /// pitch by gravity) may have a small variance. \throw vpException unless \p covariance is 6x6 and positive definite.
   void setMotionPrior(const vpHomogeneousMatrix &cMo, const vpMatrix &covariance);
+  /// Of the last frame.
   Status getStatus() const;
   const std::string &getMessage() const; ///< the status in words
   vpMatrix getUnobserved() const;        ///< 6 x k: directions of the twist, orthonormal in m and rad * lever_m
   vpMatrix getPoseCovariance() const;    ///< of the last pose; also without setCovarianceComputation()
+  /// As set.
   const Options &getOptions() const;
+  /// \throws vpException where a value is out of range, with what is allowed
   void setOptions(const Options &options);
   /// Adds a trunk around the segment p1 p2 (world coordinates of the points, in the object frame).
   void addTrunk(const vpPoint &p1, const vpPoint &p2, double radius);
 
+  /// Reads the cylinders of a .cao file [m]. \throws vpException with file and line
   void loadModel(const std::string &modelFile, bool verbose = false,
                  const vpHomogeneousMatrix &T = vpHomogeneousMatrix()) override;
+  /// Reads Options from XML. \throws vpException with file and line
   void loadConfigFile(const std::string &configFile, bool verbose = true) override;
+  /// Called by ViSP after the first pose is set.
   void init(const vpImage<unsigned char> &I) override;
+  /// Forgets model and pose.
   void resetTracker() override;
+  /// Loads another model and starts at \p cMo.
   void reInitModel(const vpImage<unsigned char> &I, const std::string &cad_name, const vpHomogeneousMatrix &cMo);
+  /// Starts at \p cdMo.
   void setPose(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cdMo) override;
+  /// Starts at \p cdMo.
   void setPose(const vpImage<vpRGBa> &I_color, const vpHomogeneousMatrix &cdMo) override;
+  /// Finds the pose in the next image.
   void track(const vpImage<unsigned char> &I) override;
+  /// Finds the pose in the next image.
   void track(const vpImage<vpRGBa> &I) override;
+  /// \throws vpTrackingException when the last pose is not to be trusted
   void testTracking() override;
   vpColVector getError() const override;         ///< residuals at z = 1, a piece of a border each
   vpColVector getRobustWeights() const override; ///< of these residuals
+  /// Of the last pose, 6 x 6, in ViSP's order [m, rad].
   vpMatrix getCovarianceMatrix() const override;
+  /// Mean distance of the borders from the model [px].
   double computeCurrentProjectionError(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cMo,
                                        const vpCameraParameters &cam) override;
+  /// Draws the model's borders.
   void display(const vpImage<unsigned char> &I, const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam,
                const vpColor &col, unsigned int thickness = 1, bool displayFullModel = false) override;
+  /// Draws the model's borders.
   void display(const vpImage<vpRGBa> &I, const vpHomogeneousMatrix &cMo, const vpCameraParameters &cam,
                const vpColor &col, unsigned int thickness = 1, bool displayFullModel = false) override;
   /// Lines (0, i1, j1, i2, j2) of the borders, as vpMbEdgeTracker gives them.
@@ -106,11 +128,17 @@ public:
   std::vector<std::vector<double>> getFeaturesForDisplay();
 
 protected:
+  /// Circles are no trunks: ignored.
   void initCircle(const vpPoint &, const vpPoint &, const vpPoint &, double, int, const std::string &) override;
+  /// One trunk from the model file.
   void initCylinder(const vpPoint &p1, const vpPoint &p2, double radius, int, const std::string &) override;
+  /// Faces are no trunks: ignored.
   void initFaceFromCorners(vpMbtPolygon &) override;
+  /// Faces are no trunks: ignored.
   void initFaceFromLines(vpMbtPolygon &) override;
+  /// Not used: the pose is found by its own solver.
   void computeVVSInit() override;
+  /// Not used: the pose is found by its own solver.
   void computeVVSInteractionMatrixAndResidu() override;
 
 private:

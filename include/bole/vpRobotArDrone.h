@@ -33,11 +33,13 @@
 class vpRobotArDrone : public vpRobot
 {
 public:
+  /// Whether commands may make it fly.
   enum class Permission
   {
     none,
     fly
   };
+  /// Limits of what is sent.
   struct Options
   {
     double hover_after_s = 0.5; ///< [s], (0.05, 2): five frames of a slow tracker
@@ -48,29 +50,38 @@ public:
     double largest_turn = 1.74; ///< [rad/s], (0, 7): the drone's setting control:control_yaw
     vpHomogeneousMatrix bMc;    ///< camera in the body; default: looks ahead at the body's origin
     Options();
+    /// \throws vpException where a value is out of range, with what is allowed
     void validate() const;
   };
 
   /// \param grabber open or connected; must outlive the robot.
   explicit vpRobotArDrone(vpArDroneGrabber &grabber);
+  /// \param grabber open, outlives the robot \param options limits
   vpRobotArDrone(vpArDroneGrabber &grabber, const Options &options);
   ~vpRobotArDrone() override;
 
+  /// Begins to send commands. Nothing is sent before.
   void open(Permission permission);
+  /// Lands and stops sending.
   void close();
+  /// Between open() and close().
   bool isOpen() const;
 
+  /// \throws vpRobotException without permission
   void takeOff();
+  /// At any time.
   void land();
+  /// Stops where it is.
   void hover();
   /// Stops the motors at once, in the air too; again to leave that state on the ground.
   void emergency();
   /// Tells the standing drone that it stands level.
   void trim();
-  /// \param v six numbers, [m/s] and [rad/s]. CAMERA_FRAME: of the camera; REFERENCE_FRAME: of the
+  /// Six numbers, [m/s] and [rad/s]. CAMERA_FRAME: of the camera; REFERENCE_FRAME: of the
   /// body. Others throw vpRobotException.
   void setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v) override;
 
+  /// What the watchdog does when no command comes.
   enum class Watchdog
   {
     idle,
@@ -81,6 +92,7 @@ public:
   Watchdog watchdog() const; ///< what the loop does now
 
   // The rest of vpRobot.
+  /// Nothing to be done: open() starts it.
   void init() override {}
   void get_eJe(vpMatrix &jacobian) override; ///< 6x4: columns vx, vy, vz, wz
   void get_fJe(vpMatrix &jacobian) override; ///< throws: a flying body has no fixed frame

@@ -41,6 +41,7 @@
 #include <visp3/core/vpImage.h>
 #include <visp3/core/vpRGBa.h>
 
+/// Maps trunks from images in ViSP's habits: track(), getPose(), getTrunks(), display().
 class vpTrunkMapper
 {
 public:
@@ -50,12 +51,14 @@ public:
   /// \p bMc: the camera in the body.
   vpTrunkMapper(const vpCameraParameters &cam, const vpHomogeneousMatrix &bMc);
   ~vpTrunkMapper();
+  /// Moves the flight with all that is known.
   vpTrunkMapper(vpTrunkMapper &&) noexcept;
-  vpTrunkMapper &operator=(vpTrunkMapper &&) noexcept;
+  vpTrunkMapper &operator=(vpTrunkMapper &&) noexcept; ///< Moves the flight with all that is known.
 
   /// \name Before the first image
   ///@{
-  /// Options as YAML (config/default.yaml). \throw vpException "file:line: key = value, must be ...".
+
+  /// Options as YAML, or a preset by its name. \throw vpException "file:line: key = value, must be ...".
   void loadConfigFile(const std::string &configFile);
   /// Of the camera over the ground [m], where no odometry tells the scale.
   void setCameraHeight(double height);
@@ -65,8 +68,12 @@ public:
 
   /// \name A frame each
   ///@{
+
+  /// The next image, 1/camera.rate s after the last.
   void track(const vpImage<unsigned char> &I);
+  /// The next image, 1/camera.rate s after the last.
   void track(const vpImage<vpRGBa> &I);
+  /// The next image at its time [s].
   void track(const vpImage<unsigned char> &I, double stamp_s);
   /// \p wMb: the pose by odometry. All frames have one or none has.
   void track(const vpImage<unsigned char> &I, double stamp_s, const vpHomogeneousMatrix &wMb);
@@ -82,6 +89,7 @@ public:
   /// \name What is known
   ///@{
   void getPose(vpHomogeneousMatrix &wMb) const; ///< of the body at the last frame
+  /// The same as a value.
   vpHomogeneousMatrix getPose() const;
   /// The world in the camera at the last frame: what vpMbTrunkTracker::initFromPose() takes for a model of this map.
   void getCameraPose(vpHomogeneousMatrix &cMw) const;
@@ -92,6 +100,7 @@ public:
   /// Draws the borders of the trunks of the last frame, confirmed ones \p thickness wide and candidates thin.
   /// vpColor::none gives each trunk a colour of its own.
   void display(const vpImage<unsigned char> &I, const vpColor &color = vpColor::none, unsigned int thickness = 2) const;
+  /// Draws the trunks in view, the confirmed ones by their borders.
   void display(const vpImage<vpRGBa> &I, const vpColor &color = vpColor::none, unsigned int thickness = 2) const;
 
   /// The confirmed trunks as a `.cao` model of cylinders, which vpMbTrunkTracker and ViSP's own trackers load.

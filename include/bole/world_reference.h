@@ -14,6 +14,7 @@ enum class ScaleSource
   height,   ///< a known height over the ground
   prior     ///< the radius a trunk usually has: distances are right only as far as that is
 };
+/// As summary.json writes it.
 const char *toString(ScaleSource source);
 
 /// Where up comes from.
@@ -23,14 +24,16 @@ enum class GravitySource
   trunks,   ///< the common vanishing point of the trunks
   assumed   ///< the first image is taken to be upright
 };
+/// As summary.json writes it.
 const char *toString(GravitySource source);
 
+/// Where the metre and the vertical of a map come from.
 struct WorldReference
 {
-  ScaleSource scale = ScaleSource::odometry;
+  ScaleSource scale = ScaleSource::odometry; ///< source of the metre
   double scale_sigma = 0; ///< relative standard deviation of all lengths together, 0 where the source does not say
-  GravitySource gravity = GravitySource::odometry;
-  double gravity_sigma = 0; ///< of up [rad], 0 where the source does not say
+  GravitySource gravity = GravitySource::odometry; ///< source of the vertical
+  double gravity_sigma = 0;                        ///< of up [rad], 0 where the source does not say
   /// False: the camera only turned, so that trunks have a bearing and a width; their ranges are those of the prior on
   /// the radius.
   bool has_ranges = true;
