@@ -419,6 +419,31 @@ def number(value):
     return f"{value:.3f}" if abs(value) < 10 else f"{value:.0f}"
 
 
+def cost(campaign):
+    """What this campaign took, and what 100,000 flights of its kind would: one row each, from the jobs' logs."""
+    import glob
+    import re
+
+    spent = {"simulated": [], "flown": []}
+    for path in glob.glob("logs/*.txt"):
+        with open(path, encoding="utf-8", errors="replace") as text:
+            times = [float(t) for t in re.findall(r"^# status -?\d+, cpu_s ([0-9.]+)$", text.read(), re.M)]
+        if times:
+            spent["simulated" if os.path.basename(path).startswith("simulate-") else "flown"].append(sum(times))
+    sizes = [os.path.getsize(p) for p in campaign.results() if os.path.exists(p)]
+    flights = max(1, len(campaign.flights) + len(campaign.logs))
+    if not spent["flown"] or not sizes:
+        return []
+    hours = sum(map(sum, spent.values())) / 3600
+    bytes_ = sum(sizes)
+    rows = []
+    for n, name in ((flights, "this campaign"), (100000, "100,000 flights")):
+        scale = n / flights
+        rows.append({"": name, "core hours": f"{hours * scale:.2f}" if n == flights else f"{hours * scale:.0f}",
+                     "results [MB]": f"{bytes_ * scale / 1e6:.0f}", "on 1,000 cores [h]": f"{hours * scale / 1000:.2f}"})
+    return rows
+
+
 def as_table(rows, columns):
     head = "".join(f"<th>{html.escape(c)}</th>" for c in columns)
     body = ""
@@ -459,6 +484,9 @@ def write_page(campaign, path):
     parts += ["<h2>By stratum</h2>", as_table([r for r in summary if r["stratum"] != "all" and r["measure"] in
                                                ("recall", "precision", "position_median_m", "radius_rmse_m", "nees_half", "succeeded")],
                                               ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])]
+    bill = cost(campaign)
+    if bill:
+        parts += ["<h2>Cost</h2>", as_table(bill, list(bill[0]))]
     if failures:
         parts += ["<h2>Failed</h2>", as_table(failures, ["run", "flight", "status", "log"])]
     style = ("body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:72em;padding:0 1em}table{border-collapse:collapse;font-size:13px}"

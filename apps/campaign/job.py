@@ -15,10 +15,16 @@ import time
 
 
 def run(command, log):
+    began = os.times()
     with open(log, "a", encoding="utf-8") as out:
         out.write("$ " + " ".join(command) + "\n")
         out.flush()
-        return subprocess.run(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, check=False).returncode
+        status = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, check=False).returncode
+    used = os.times()
+    cpu_s = used.children_user + used.children_system - began.children_user - began.children_system
+    with open(log, "a", encoding="utf-8") as out:
+        out.write(f"\n# status {status}, cpu_s {cpu_s:.2f}\n")
+    return status
 
 
 def write_atomically(path, value):
@@ -71,7 +77,7 @@ def main():
     arguments = parser.parse_args()
     os.makedirs(os.path.dirname(arguments.log) or ".", exist_ok=True)
     open(arguments.log, "w", encoding="utf-8").close()
-    began = time.process_time(), time.time(), os.times()
+    began = time.time()
     if arguments.folder:
         shutil.rmtree(arguments.folder, ignore_errors=True)  # of a job that was killed
         status = run(arguments.command, arguments.log)
@@ -80,8 +86,8 @@ def main():
         return 0 if status >= 0 else 128 - status
     result = servo(arguments, arguments.command) if arguments.servo else track(arguments, arguments.command)
     used = os.times()
-    result.update(log=arguments.log, command=arguments.command, wall_s=round(time.time() - began[1], 2),
-                  cpu_s=round(used.children_user + used.children_system - began[2].children_user - began[2].children_system, 2))
+    result.update(log=arguments.log, command=arguments.command, wall_s=round(time.time() - began, 2),
+                  cpu_s=round(used.children_user + used.children_system, 2))
     write_atomically(arguments.json, result)
     return 0
 
