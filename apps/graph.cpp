@@ -2,7 +2,7 @@
 // `bole graph`: what the smoother of a run was given and what it made of it.
 #include "commands.h"
 
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include <algorithm>
 #include <fmt/core.h>

@@ -2,7 +2,7 @@
 // `bole solve`: the optimum of a saved graph.
 #include "commands.h"
 
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 #include <bole/smoother.h>
 
 #include <chrono>

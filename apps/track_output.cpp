@@ -5,7 +5,7 @@
 #include "geometry/so3.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 #include <bole/overlay.h>
 
 #include <algorithm>

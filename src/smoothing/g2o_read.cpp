@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "smoothing/factors.h"
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

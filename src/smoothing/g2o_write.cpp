@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

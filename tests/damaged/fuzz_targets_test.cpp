@@ -9,7 +9,7 @@
 #include "ardrone/recording.h"
 #include "ardrone/uvlc.h"
 #include "lab/emulator/h264_encoder.h"
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include "support/flight.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any bytes as a graph: refused with a line, or read, written and read again, and solved.
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 #include <bole/smoother.h>
 
 #include <cstdlib>

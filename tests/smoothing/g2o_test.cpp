@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/flight.h"
 
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include <gmock/gmock.h>
 #include <sstream>

@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Runs the tutorials as they are printed: each page's `sh` blocks in one shell, in a folder that has data/ as the sources
+have; a `cpp` block before them is built against the build tree as ./tutorial. Blocks without a language are not run.
+
+usage: tutorials.py BUILD_FOLDER SOURCE_FOLDER [PAGE...]"""
+import glob
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+CMAKE = """cmake_minimum_required(VERSION 3.24)
+project(tutorial CXX)
+find_package(bole REQUIRED)
+add_executable(tutorial tutorial.cpp)
+target_link_libraries(tutorial PRIVATE bole::bole)
+"""
+
+
+def run(command, folder, environment):
+    done = subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+                          timeout=500)
+    return done.returncode, done.stdout
+
+
+def compile_program(text, folder, build, environment):
+    program = os.path.join(folder, "program")
+    os.makedirs(program)
+    for name, content in (("CMakeLists.txt", CMAKE), ("tutorial.cpp", text)):
+        with open(os.path.join(program, name), "w", encoding="utf-8") as out:
+            out.write(content)
+    for command in (["cmake", "-S", ".", "-B", "build", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", f"-Dbole_DIR={build}"],
+                    ["cmake", "--build", "build"]):
+        status, output = run(command, program, environment)
+        if status != 0:
+            return status, output
+    os.symlink("program/build/tutorial", os.path.join(folder, "tutorial"))
+    return 0, ""
+
+
+def main():
+    build, source = (os.path.abspath(p) for p in sys.argv[1:3])
+    pages = sys.argv[3:] or sorted(glob.glob(os.path.join(source, "src/doc/tutorial-*.md")))
+    environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"])
+    failed = 0
+    for page in pages:
+        with open(page, encoding="utf-8") as text:
+            blocks = re.findall(r"^```(sh|cpp)\n(.*?)^```$", text.read(), re.S | re.M)
+        with tempfile.TemporaryDirectory(prefix="bole-tutorial-") as folder:
+            os.symlink(os.path.join(source, "data"), os.path.join(folder, "data"))
+            shell, status, output = "set -eu\n", 0, ""
+            for language, text in blocks:
+                if language == "cpp":
+                    status, output = compile_program(text, folder, build, environment)
+                else:
+                    shell += text
+            if status == 0:
+                status, output = run(["bash", "-c", shell], folder, environment)
+            print(f"{os.path.basename(page)}: {'passed' if status == 0 else 'FAILED'}, {len(blocks)} blocks", flush=True)
+            if status != 0:
+                failed += 1
+                print(output)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
