@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Runs the tutorials as they are printed: each page's `sh` blocks in one shell, in a folder that has data/ as the sources
+"""Runs the tutorials as they are printed, and compares the page of options with what the command prints.
+Each page's `sh` blocks run in one shell, in a folder that has data/ as the sources
 have; a `cpp` block before them is built against the build tree as ./tutorial. Blocks without a language are not run.
 
 usage: tutorials.py BUILD_FOLDER SOURCE_FOLDER [PAGE...]"""
@@ -45,6 +46,10 @@ def main():
     pages = sys.argv[3:] or sorted(glob.glob(os.path.join(source, "src/doc/tutorial-*.md")))
     environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"])
     failed = 0
+    with open(os.path.join(source, "src/doc/options.md"), encoding="utf-8") as text:
+        if run(["bole", "options", "--markdown"], source, environment)[1] not in text.read():
+            print("options.md: FAILED, it is not what `bole options --markdown` prints")
+            failed += 1
     for page in pages:
         with open(page, encoding="utf-8") as text:
             blocks = re.findall(r"^```(sh|cpp)\n(.*?)^```$", text.read(), re.S | re.M)
