@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Runs the tutorials as they are printed, and compares the page of options with what the command prints.
 Each page's `sh` blocks run in one shell, in a folder that has data/ as the sources
-have; a `cpp` block before them is built against the build tree as ./tutorial. Blocks without a language are not run.
+have; a `cpp` block before them is built against the build tree as ./tutorial. `py` blocks run in one
+Python (skipped without the module). Blocks without a language are not run.
 
 usage: tutorials.py BUILD_FOLDER SOURCE_FOLDER [PAGE...]"""
 import glob
@@ -44,7 +45,7 @@ def compile_program(text, folder, build, environment):
 def main():
     build, source = (os.path.abspath(p) for p in sys.argv[1:3])
     pages = sys.argv[3:] or sorted(glob.glob(os.path.join(source, "src/doc/tutorial-*.md")))
-    environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"])
+    environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"], PYTHONPATH=build + "/python")
     failed = 0
     with open(os.path.join(source, "src/doc/options.md"), encoding="utf-8") as text:
         if run(["bole", "options", "--markdown"], source, environment)[1] not in text.read():
@@ -52,15 +53,22 @@ def main():
             failed += 1
     for page in pages:
         with open(page, encoding="utf-8") as text:
-            blocks = re.findall(r"^```(sh|cpp)\n(.*?)^```$", text.read(), re.S | re.M)
+            blocks = re.findall(r"^```(sh|cpp|py)\n(.*?)^```$", text.read(), re.S | re.M)
         with tempfile.TemporaryDirectory(prefix="bole-tutorial-") as folder:
             os.symlink(os.path.join(source, "data"), os.path.join(folder, "data"))
-            shell, status, output = "set -eu\n", 0, ""
+            shell, python, status, output = "set -eu\n", "", 0, ""
             for language, text in blocks:
                 if language == "cpp":
                     status, output = compile_program(text, folder, build, environment)
+                elif language == "py":
+                    python += text
                 else:
                     shell += text
+            if python and not os.path.isdir(os.path.join(build, "python")):
+                print(f"{os.path.basename(page)}: skipped, pybind11-dev is not installed")
+                continue
+            if python and status == 0:
+                status, output = run(["/usr/bin/python3", "-c", python], folder, environment)
             if status == 0:
                 status, output = run(["bash", "-c", shell], folder, environment)
             print(f"{os.path.basename(page)}: {'passed' if status == 0 else 'FAILED'}, {len(blocks)} blocks", flush=True)
