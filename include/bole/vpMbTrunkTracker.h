@@ -26,6 +26,7 @@
 /// }
 /// \endcode
 
+#include <bole/visp.h>
 #include <memory>
 #include <visp3/mbt/vpMbTracker.h>
 class vpMbTrunkTracker : public vpMbTracker
