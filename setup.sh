@@ -67,7 +67,7 @@ test)
   cmake --preset check
   cmake --build --preset check
   say "running the tests"
-  ctest --test-dir build/check -j2 --output-on-failure --no-tests=error
+  ctest --test-dir build/check -j "${CTEST_PARALLEL_LEVEL:-$(nproc)}" --output-on-failure --no-tests=error
   ;;
 install)
   prefix="${2:-/usr/local}"

@@ -3,6 +3,7 @@
 #include "suggestion.h"
 
 #include <algorithm>
+#include <bole/visp.h>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>

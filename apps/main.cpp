@@ -6,6 +6,7 @@
 #include "output/versions.h"
 
 #include <algorithm>
+#include <bole/visp.h>
 #include <cstdio>
 #include <string>
 #include <visp3/core/vpException.h>

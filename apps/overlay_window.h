@@ -3,6 +3,7 @@
 /// \file
 /// A picture in a ViSP window, where one was asked for.
 
+#include <bole/visp.h>
 #include <memory>
 #include <string>
 #include <visp3/core/vpDisplay.h>

@@ -5,21 +5,24 @@
 #   tests/platforms.sh SUITE package       builds the .deb files there and copies them to FOLDER/SUITE-packages
 #   tests/platforms.sh SUITE installed     a system that never saw the sources: installs those, maps the packaged flight
 # FOLDER is $BOLE_PLATFORMS (default /var/tmp/bole-platforms). It keeps the minimal system as a tar file; the systems
-# themselves are unpacked anew each time and removed afterwards. How this machine's apt reaches its mirror is passed on.
+# themselves are unpacked anew each time and removed afterwards. How this machine's apt reaches its mirror is passed on,
+# and so is what the environment tells CMake, CTest and Ninja (CMAKE_BUILD_PARALLEL_LEVEL=1 on a busy machine). The last
+# line tells the processor time beside the time on the clock, for machines that do other work, too.
 set -euo pipefail
 suite="${1:?SUITE}" what="${2:-demo}"
 sources="$(cd "$(dirname "$0")/.." && pwd)"
 folder="${BOLE_PLATFORMS:-/var/tmp/bole-platforms}"
 mirror="${BOLE_MIRROR:-http://deb.debian.org/debian}"
 minimal="$folder/$suite.tar" system="$folder/$suite-$what"
+mapfile -t passed_on < <(env | grep -E '^(CMAKE|CTEST|NINJA)_' || true)
 
 make_minimal_system() {
   [ -s "$minimal" ] && return
   command -v mmdebstrap >/dev/null || apt-get install -y -qq --no-install-recommends mmdebstrap
   mkdir -p "$folder"
   mmdebstrap --variant=apt --include=ca-certificates --aptopt='Acquire::Check-Valid-Until "false"' "$suite" \
-    "$minimal.new" "$mirror"
-  mv "$minimal.new" "$minimal"
+    "$folder/new.tar" "$mirror"
+  mv "$folder/new.tar" "$minimal"
 }
 
 unpack_system() {
@@ -37,7 +40,8 @@ inside() {
   # shellcheck disable=SC2016
   unshare --mount --pid --fork sh -c '
     mount -t proc proc "$1/proc" && mount --rbind /dev "$1/dev" && shift_root="$1" && shift
-    exec chroot "$shift_root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 "$@"' sh "$system" "$@"
+    exec chroot "$shift_root" env -i HOME=/root PATH=/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 "$@"' \
+    sh "$system" "${passed_on[@]}" "$@"
 }
 
 # shellcheck disable=SC2016
@@ -46,9 +50,16 @@ versions() {
     libavcodec-dev libfmt-dev libeigen3-dev g++ cmake 2>/dev/null || true'
 }
 
+# Of all commands so far, in seconds; `times` counts those of the shell that calls it, not of a $(...).
+processor_time() {
+  times >"$folder/times"
+  processor=$(awk 'END { split($1 $2, t, /[ms]/); print int(60 * (t[1] + t[3]) + t[2] + t[4]) }' "$folder/times")
+}
+
 make_minimal_system
 unpack_system
-start=$SECONDS
+processor_time
+start=$SECONDS processor_start=$processor
 case "$what" in
 demo | test)
   git clone -q "$sources" "$system/root/bole"
@@ -76,7 +87,9 @@ installed)
   ;;
 esac
 seconds=$((SECONDS - start))
+processor_time
 versions
-echo "$suite $what: passed in $((seconds / 60)) min $((seconds % 60)) s on $(nproc) processors, $(date -u +%Y-%m-%d)," \
-  "load $(cut -d' ' -f1 /proc/loadavg), commit $(git -C "$sources" rev-parse --short=10 HEAD)"
+echo "$suite $what: passed in $((seconds / 60)) min $((seconds % 60)) s, $((processor - processor_start)) s of processor time, on $(nproc)" \
+  "processors, $(date -u +%Y-%m-%d), load $(cut -d' ' -f1 /proc/loadavg), commit" \
+  "$(git -C "$sources" rev-parse --short=10 HEAD)"
 rm -rf "$system"

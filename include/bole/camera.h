@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <bole/visp.h>
 #include <visp3/core/vpCameraParameters.h>
 
 namespace bole

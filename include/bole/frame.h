@@ -6,6 +6,7 @@
 #include <bole/camera.h>
 #include <bole/pose.h>
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <memory>
 #include <optional>

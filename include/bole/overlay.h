@@ -7,6 +7,7 @@
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
+#include <bole/visp.h>
 #include <string>
 #include <vector>
 #include <visp3/core/vpImage.h>

@@ -5,6 +5,7 @@
 
 #include <bole/frame.h>
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <functional>
 #include <memory>

@@ -5,6 +5,7 @@
 
 #include <bole/trunk.h>
 
+#include <bole/visp.h>
 #include <visp3/core/vpRGBa.h>
 #include <visp3/visual_features/vpBasicFeature.h>
 #include <visp3/visual_features/vpFeatureLine.h>

@@ -26,6 +26,7 @@
 /// }
 /// \endcode
 
+#include <bole/visp.h>
 #include <memory>
 #include <visp3/mbt/vpMbTracker.h>
 /// Camera poses from known trunks, as a ViSP model-based tracker.

@@ -5,6 +5,7 @@
 
 #include <bole/vpArDroneGrabber.h>
 
+#include <bole/visp.h>
 #include <memory>
 #include <visp3/robot/vpRobot.h>
 

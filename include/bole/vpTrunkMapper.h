@@ -32,6 +32,7 @@
 #include <bole/trunk_record.h>
 #include <bole/world_reference.h>
 
+#include <bole/visp.h>
 #include <memory>
 #include <string>
 #include <vector>

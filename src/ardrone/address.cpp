@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/address.h"
 
+#include <bole/visp.h>
 #include <charconv>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>

@@ -2,6 +2,7 @@
 #include "ardrone/drone_clock.h"
 
 #include <algorithm>
+#include <bole/visp.h>
 #include <cstdlib>
 #include <visp3/core/vpException.h>
 

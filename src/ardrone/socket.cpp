@@ -2,6 +2,7 @@
 #include "ardrone/socket.h"
 
 #include <arpa/inet.h>
+#include <bole/visp.h>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>

@@ -38,6 +38,7 @@
 #include "ardrone/h264.h"
 
 #include <array>
+#include <bole/visp.h>
 #include <cstddef>
 #include <cstdint>
 #include <optional>

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <bole/visp.h>
 #include <visp3/core/vpHomogeneousMatrix.h>
 #include <visp3/robot/vpRobot.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/require_range.h"
 
+#include <bole/visp.h>
 #include <visp3/core/vpException.h>
 
 namespace bole

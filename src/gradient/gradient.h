@@ -9,6 +9,7 @@
 /// negative and positive parts (sigma 3 px, Eq. 3) is made only when asked for, since it over-estimates r/d by
 /// 10-20 % and holds only for dark trunks on a bright background.
 
+#include <bole/visp.h>
 #include <visp3/core/vpImage.h>
 
 namespace bole

@@ -3,6 +3,7 @@
 /// \file
 /// One door to libavcodec: every picture of the project is decoded and encoded through it.
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <functional>
 #include <memory>

@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include <bole/visp.h>
 #include <memory>
 #include <optional>
 #include <string>

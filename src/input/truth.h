@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <bole/visp.h>
 #include <string>
 #include <vector>
 #include <visp3/core/vpImage.h>

@@ -3,6 +3,7 @@
 /// \file
 /// Grey pictures with their times out of a video file (libavformat, libavcodec).
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <deque>
 #include <memory>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/yaml_file.h"
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <filesystem>
 #include <fmt/format.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/atomic_file.h"
 
+#include <bole/visp.h>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>

@@ -3,6 +3,7 @@
 /// \file
 /// Colour pictures to an mp4 file that browsers play.
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <memory>
 #include <string>

@@ -5,6 +5,7 @@
 #include "pipeline/option_table.h"
 
 #include <algorithm>
+#include <bole/visp.h>
 #include <fmt/format.h>
 #include <numeric>
 #include <set>

@@ -2,6 +2,7 @@
 #include "ardrone/address.h"
 #include "ardrone/at_command.h"
 
+#include <bole/visp.h>
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>
 

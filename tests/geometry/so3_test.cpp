@@ -5,6 +5,7 @@
 #include <Eigen/SVD>
 #include <gtest/gtest.h>
 
+#include <bole/visp.h>
 #include <vector>
 #include <visp3/core/vpExponentialMap.h>
 #include <visp3/core/vpRotationMatrix.h>

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include <bole/visp.h>
 #include <chrono>
 #include <csignal>
 #include <filesystem>

@@ -6,6 +6,7 @@
 #include "ardrone/navdata.h"
 #include "lab/emulator/h264_encoder.h"
 
+#include <bole/visp.h>
 #include <memory>
 #include <vector>
 

@@ -5,6 +5,7 @@
 
 #include "input/codec.h"
 
+#include <bole/visp.h>
 #include <cstdint>
 #include <vector>
 

@@ -3,6 +3,7 @@
 /// \file
 /// Faults of a camera and its link, put into images on purpose: the one injector of the laboratory.
 
+#include <bole/visp.h>
 #include <string>
 #include <visp3/core/vpImage.h>
 

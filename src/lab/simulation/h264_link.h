@@ -3,6 +3,7 @@
 /// \file
 /// What a drone's video link does to a picture: H.264 at a low bit rate.
 
+#include <bole/visp.h>
 #include <memory>
 #include <visp3/core/vpImage.h>
 
