@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_link.h"
+#include "geometry/require_range.h"
 
 #include "ardrone/receivers.h"
 #include "ardrone/video_stamps.h"
@@ -7,7 +8,6 @@
 #include <condition_variable>
 #include <fmt/format.h>
 #include <mutex>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -190,14 +190,10 @@ struct DroneLink::State
 
 void LinkOptions::validate() const
 {
-  if (!(silence_s > 0.1 && silence_s < 30))
-    throw vpException(vpException::badValue, "silence_s = %g, must be in (0.1, 30) s", silence_s);
-  if (!(retry_s > 0.01 && retry_s < 5))
-    throw vpException(vpException::badValue, "retry_s = %g, must be in (0.01, 5) s", retry_s);
-  if (!(frozen_m > 0 && frozen_m < 10))
-    throw vpException(vpException::badValue, "frozen_m = %g, must be in (0, 10) m", frozen_m);
-  if (!(frozen_rad > 0 && frozen_rad < 3))
-    throw vpException(vpException::badValue, "frozen_rad = %g, must be in (0, 3) rad", frozen_rad);
+  requireRange("silence_s", silence_s, 0.1, 30);
+  requireRange("retry_s", retry_s, 0.01, 5);
+  requireRange("frozen_m", frozen_m, 1e-9, 10);
+  requireRange("frozen_rad", frozen_rad, 1e-9, 3);
 }
 
 DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options{}) {}

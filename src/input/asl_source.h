@@ -3,9 +3,7 @@
 /// \file
 /// Recorded flights in EuRoC / ASL folders.
 
-#include "input/trajectory.h"
-#include <bole/frame.h>
-#include <bole/open_source.h>
+#include "input/recorded_source.h"
 
 namespace bole
 {
@@ -23,19 +21,14 @@ namespace bole
 /// Errors: vpException with file:line for a missing or empty folder, rows that are not what they
 /// must be, stamps that go back, a camera file with a fault, or images of another size than the
 /// camera's.
-class AslSource : public FrameSource
+class AslSource : public RecordedSource
 {
 public:
   explicit AslSource(const std::string &folder, const SourceOptions &options = {});
   ~AslSource() override;
 
   bool next(Frame &frame) override;
-  PinholeCamera camera() const override;
-  Pose bMc() const override;
   std::size_t size() const override;
-  std::string name() const override;
-  bool hasOdometry() const override;
-  bool hasGyro() const override;
 
   /// Stamps of all frames [ns]; the whole odometry and the whole truth, each may be empty.
   std::vector<std::int64_t> stamps() const;

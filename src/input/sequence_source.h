@@ -3,8 +3,7 @@
 /// \file
 /// Numbered images as a video.
 
-#include <bole/frame.h>
-#include <bole/open_source.h>
+#include "input/recorded_source.h"
 
 namespace bole
 {
@@ -21,21 +20,14 @@ namespace bole
 ///
 /// Errors: vpException when there is no such image, none can be read, or the camera is of another
 /// size.
-class SequenceSource : public FrameSource
+class SequenceSource : public RecordedSource
 {
 public:
   explicit SequenceSource(const std::string &pattern, const SourceOptions &options = {});
   ~SequenceSource() override;
 
   bool next(Frame &frame) override;
-  PinholeCamera camera() const override;
-  Pose bMc() const override;
   std::size_t size() const override;
-  std::string name() const override;
-  bool hasOdometry() const override;
-  bool hasGyro() const override;
-  bool isCameraKnown() const override;
-  std::string note() const override;
 
   /// The pattern of a folder of numbered images, or empty.
   static std::string patternOf(const std::string &folder);

@@ -7,7 +7,6 @@
 
 #include <string>
 #include <vector>
-#include <visp3/core/vpImage.h>
 
 namespace bole
 {
@@ -27,8 +26,4 @@ struct TruthTrunk
 /// the folder \p sequence; empty when the sequence has no `trees.csv`. Errors: vpException with
 /// file:line for a row that is not what it must be or an id that comes twice.
 std::vector<TruthTrunk> readTruthTrunks(const std::string &sequence);
-
-/// Distance along the optical axis [m] from a 16-bit PNG of millimetres; infinity where it says
-/// 65535. Throws vpException when the file is not such a PNG.
-vpImage<float> readDepth(const std::string &path);
 } // namespace bole

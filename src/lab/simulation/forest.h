@@ -23,8 +23,6 @@ enum class Bark
   bright,
   mixed
 };
-const char *toString(Light light);
-const char *toString(Bark bark);
 
 /// Lengths in metres.
 struct ForestOptions

@@ -3,8 +3,8 @@
 /// \file
 /// Writes a flight as an ASL folder (the layout of EuRoC), with the truth beside it.
 
-#include "lab/simulation/flight_sensors.h"
 #include "lab/simulation/forest_renderer.h"
+#include <bole/frame.h>
 
 #include <cstdint>
 #include <fstream>
@@ -28,7 +28,7 @@ public:
                  bool overwrite = false);
 
   void writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth, const Pose &wMb_odometry);
-  void writeImu(std::int64_t stamp_ns, const ImuSample &sample);
+  void writeImu(const GyroSample &sample);
   void writeForest(const Forest &forest);
   /// Any other small text file, e.g. the scene: name relative to the folder.
   void writeText(const std::string &name, const std::string &text);
