@@ -10,10 +10,9 @@
 
 namespace bole
 {
-/// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground,
-/// where forest inventories measure: in the rendered forests the axes that were fitted to the depth
-/// maps pass (x, y) at 1.3 m to about 6 mm, with this radius to 7 mm, and are up to 0.08 m away from it at
-/// the foot.
+/// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground, where forest
+/// inventories measure: in the rendered forests the axes that were fitted to the depth maps pass (x, y) at 1.3 m to
+/// about 6 mm, with this radius to 7 mm, and are up to 0.08 m away from it at the foot.
 struct TruthTrunk
 {
   int id = 0;

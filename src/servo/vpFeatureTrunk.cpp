@@ -44,8 +44,7 @@ void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameter
   }
 }
 
-/// Unit normal of the plane through the camera's centre and an image line x cos(theta) + y
-/// sin(theta) = rho.
+/// Unit normal of the plane through the camera's centre and an image line x cos(theta) + y sin(theta) = rho.
 Vector3d planeOf(const vpFeatureLine &line)
 {
   return Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho()).normalized();
@@ -130,8 +129,7 @@ bole::RelativeTrunk vpFeatureTrunk::relativeTrunk() const
   return relative;
 }
 
-/// With a' = -w x a for the axis and m' = -n (n.v) / d - w x m for the line of sight, see the
-/// header.
+/// With a' = -w x a for the axis and m' = -n (n.v) / d - w x m for the line of sight, see the header.
 vpMatrix vpFeatureTrunk::interaction(unsigned int select)
 {
   if (!flags[0])

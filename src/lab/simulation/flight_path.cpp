@@ -98,8 +98,7 @@ Eigen::Vector3d FlightPath::acceleration(double t) const
 
 Pose FlightPath::bodyPose(double t) const
 {
-  // Thrust is along z of the body, so z points along acceleration minus gravity; x towards the
-  // heading.
+  // Thrust is along z of the body, so z points along acceleration minus gravity; x towards the heading.
   const Eigen::Vector3d up = (acceleration(t) + Eigen::Vector3d(0, 0, kGravity)).normalized();
   const double yaw = heading(t);
   const Eigen::Vector3d left = up.cross(Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0)).normalized();

@@ -64,8 +64,7 @@ bool isFree(const Eigen::Vector2d &p, const std::vector<SimulatedTrunk> &trunks,
   });
 }
 
-/// Darts thrown at the rectangle \p low, \p high until \p count trunks stand, or there is no more
-/// room.
+/// Darts thrown at the rectangle \p low, \p high until \p count trunks stand, or there is no more room.
 template <class Accept>
 void throwTrunks(Forest &forest, std::vector<SimulatedTrunk> &trunks, std::uint64_t stream, int first_id, double count,
                  const Eigen::Vector2d &low, const Eigen::Vector2d &high, const Accept &accept)

@@ -10,8 +10,7 @@ namespace bole
 {
 namespace
 {
-/// Periodic value noise with \p cells_u x \p cells_v random values over the texture, added to \p
-/// texels.
+/// Periodic value noise with \p cells_u x \p cells_v random values over the texture, added to \p texels.
 void addNoise(std::vector<float> &texels, int columns, int rows, int cells_u, int cells_v, float amplitude,
               Random &random)
 {

@@ -16,10 +16,9 @@ namespace bole
 /// after an interruption, it is beside it as `<folder>.partial`.
 ///
 /// Layout: mav0/cam0/{sensor.yaml,data.csv,data/<stamp>.png}, mav0/imu0/data.csv,
-/// mav0/odom0/data.csv, mav0/state_groundtruth_estimate0/data.csv, trees.csv, trees_far.csv; with
-/// truth images depth/<stamp>.png (16-bit, millimetres along the optical axis, rounded to 20 mm
-/// below 10 m and 100 mm beyond, 65535 = sky or beyond 65 m) and trunk_id/<stamp>.png (16-bit, id
-/// of the trunk, 65535 = none).
+/// mav0/odom0/data.csv, mav0/state_groundtruth_estimate0/data.csv, trees.csv, trees_far.csv; with truth images
+/// depth/<stamp>.png (16-bit, millimetres along the optical axis, rounded to 20 mm below 10 m and 100 mm beyond, 65535
+/// = sky or beyond 65 m) and trunk_id/<stamp>.png (16-bit, id of the trunk, 65535 = none).
 class SequenceWriter
 {
 public:

@@ -33,9 +33,8 @@ struct SceneOptions
   void validate() const;
 };
 
-/// Reads a scene: YAML with the sections forest, flight, camera, sensors, video and trunks, every
-/// key optional. Unknown keys and values out of range throw vpException "file:line: key = value,
-/// must be ...".
+/// Reads a scene: YAML with the sections forest, flight, camera, sensors, video and trunks, every key optional. Unknown
+/// keys and values out of range throw vpException "file:line: key = value, must be ...".
 SceneOptions readScene(const std::string &path);
 /// The text that readScene() would read back.
 std::string sceneText(const SceneOptions &scene);
@@ -71,9 +70,8 @@ struct RecordOptions
   bool overwrite = false;
 };
 
-/// Flies \p scene and writes it as an ASL folder (sequence_writer.h), with the scene beside it as
-/// scene.yaml. \p progress is called after each frame with the number of frames done. Law (a test): same scene, same
-/// bytes.
+/// Flies \p scene and writes it as an ASL folder (sequence_writer.h), with the scene beside it as scene.yaml. \p
+/// progress is called after each frame with the number of frames done. Law (a test): same scene, same bytes.
 void recordFlight(const SceneOptions &scene, const RecordOptions &options,
                   const std::function<void(int)> &progress = {});
 
