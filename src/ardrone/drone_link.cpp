@@ -95,11 +95,11 @@ struct DroneLink::State
   void checkStamp(LiveFrame &frame, bool is_measured) const
   {
     constexpr double kLargestRatio = 1.4; // of the two clocks of one drone; bursts and stalls stay below
-    const auto video = video_rate.rate(), motion = navdata_rate.rate();
-    if (video && motion && *motion > 0 && (*video > kLargestRatio * *motion || *video * kLargestRatio < *motion)) {
+    const auto seen = video_rate.rate(), motion = navdata_rate.rate();
+    if (seen && motion && *motion > 0 && (*seen > kLargestRatio * *motion || *seen * kLargestRatio < *motion)) {
       frame.status = FrameStatus::doubtful;
       frame.message =
-          fmt::format("the video's clock runs {:.2g} times as fast as that of the navdata", *video / *motion);
+          fmt::format("the video's clock runs {:.2g} times as fast as that of the navdata", *seen / *motion);
     }
     else if (!is_measured) {
       frame.status = FrameStatus::doubtful;
@@ -110,15 +110,15 @@ struct DroneLink::State
   /// \return the state bits of a good packet.
   std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
   {
-    Navdata navdata;
-    const NavdataError error = parseNavdata(data, size, navdata);
+    Navdata packet;
+    const NavdataError error = parseNavdata(data, size, packet);
     const std::lock_guard<std::mutex> lock(mutex);
     if (error != NavdataError::none) {
       ++counters.navdata_refused;
       return std::nullopt;
     }
-    if (last_sequence && navdata.sequence <= *last_sequence) {
-      const bool restart = navdata.sequence == 1 || arrival_ns - last_navdata_ns > kSilence_ns;
+    if (last_sequence && packet.sequence <= *last_sequence) {
+      const bool restart = packet.sequence == 1 || arrival_ns - last_navdata_ns > kSilence_ns;
       if (!restart) {
         ++counters.navdata_late;
         return std::nullopt;
@@ -128,19 +128,19 @@ struct DroneLink::State
       navdata_clock.reset();
       odometry.restart();
     }
-    last_sequence = navdata.sequence;
+    last_sequence = packet.sequence;
     last_navdata_ns = arrival_ns;
     ++counters.navdata_packets;
-    if (navdata.demo) {
+    if (packet.demo) {
       // Demo packets have no time: then the arrival must do.
       const std::int64_t stamp_ns =
-          navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000 : arrival_ns;
+          packet.time ? navdata_time.unwrap(navdataTimeMicroseconds(*packet.time)) * 1000 : arrival_ns;
       navdata_rate.add(stamp_ns, arrival_ns);
       if (!navdata_clock.add(stamp_ns, arrival_ns))
         odometry.restart();
-      odometry.add(stamp_ns, navdata);
+      odometry.add(stamp_ns, packet);
     }
-    return navdata.state;
+    return packet.state;
   }
 
   // -- together, with the mutex held
