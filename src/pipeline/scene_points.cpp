@@ -16,10 +16,10 @@ constexpr double kRaySigma = 0.004; ///< of the angle between two rays [rad]: of
 constexpr double kMissed = 2;       ///< largest distance of the rays from one another, in sigmas
 constexpr double kMiddle_px = 2;    ///< largest error in the frame half-way
 
-constexpr double kInside = 0.7;     ///< part of the half width of a trunk that is surely inside it
-constexpr double kBorder_px = 4;    ///< least distance from its borders, where corners slide along the bark
-constexpr double kNotInside = 0.3;  ///< least distance of the camera from the bark [m]
-constexpr double kKnown = 0.25;     ///< largest sigma of the inverse distance of a point, of the trunk's
+constexpr double kInside = 0.7;    ///< part of the half width of a trunk that is surely inside it
+constexpr double kBorder_px = 4;   ///< least distance from its borders, where corners slide along the bark
+constexpr double kNotInside = 0.3; ///< least distance of the camera from the bark [m]
+constexpr double kKnown = 0.25; ///< largest sigma of a point's inverse distance over the inverse distance of the trunk
 constexpr double kRangeSigma = 0.1; ///< of the range of the trunk, relative
 constexpr double kBehind = 2.5;     ///< sigmas behind the bark, or before it
 

@@ -56,9 +56,9 @@ struct FlowOptions
                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
   double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
-  int turned_frames = 0; ///< borders whose sign turned over are believed when found where they are expected in so
-                         ///< many frames in a row: seen from its other side, what was brighter than the background
-                         ///< is darker; 0 (never) to 1000
+  int turned_frames = 0; ///< borders whose contrast changed its sign are accepted after so many frames in a row at
+                         ///< the predicted place: from its other side a bright trunk may be darker than the
+                         ///< background; 0 (never) to 1000
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };

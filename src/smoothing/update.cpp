@@ -254,15 +254,15 @@ int Smoother::State::reachBack(const Variable &variable) const
   return std::max(reach, newest - oldest);
 }
 
-/// Linearises anew what moved too far, and what is eliminated again anyway. Points must fit
-/// together: where a relinearised variable meets one whose estimate has left its point, by however
-/// common a shift, the lever arms between them are wrong, the next one down moves too far in its
-/// turn, and so on down the whole flight. So the new points are the estimates shifted as one by
-/// what the points beyond the seam are shifted: positions fit together on both sides, and a common
-/// shift is exactly linear in all that is measured.
+/// Relinearises the variables that moved too far, and those that are eliminated again in any case. Linearisation points
+/// must be consistent: a factor between a relinearised variable and one whose estimate has left its own point, even by
+/// a shift common to both, has wrong lever arms; its other variable then moves too far as well, and so on along the
+/// whole flight. So the new points are the estimates, all shifted by the offset between estimate and point of the first
+/// variable that is not relinearised. Positions are then consistent on both sides, and a common shift is exactly linear
+/// in all measurements.
 ///
-/// Moving old points, or a trunk that was seen long ago, eliminates all since again: the farther back, the seldomer.
-/// What must wait is found once more by a later pass.
+/// An old variable, or a trunk that was seen long ago, needs all later ones to be eliminated again. So the older it is,
+/// the less often it is relinearised; a later pass finds those that have to wait.
 void Smoother::State::moveLinearisation(UpdateResult &result)
 {
   const int age = movableAge();

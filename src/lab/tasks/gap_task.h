@@ -4,10 +4,9 @@
 /// Flying between two trunks.
 ///
 /// Idea: sidestep until the map holds two confirmed trunks with a gap between them and nothing in the way, line up on
-/// the gap's axis before it, then fly along the axis. All places are those of the map, taken anew each frame, so a
-/// trunk that moves in the map moves the axis, and what was not known when the gap was chosen is kept clear of, and
-/// so is whatever stands upright near by the points of the scene, in the map or not. When the trunks leave the image on
-/// both sides the map and the points carry the last metre.
+/// the gap's axis before it, then fly along the axis. All positions are read from the map in each frame, so the axis
+/// follows the estimates, and trunks that are found later are avoided too, as are upright columns of triangulated
+/// points. When the trunks leave the image on both sides the last metre is flown by map and points alone.
 
 #include "lab/tasks/obstacles.h"
 #include "lab/tasks/servo_task.h"

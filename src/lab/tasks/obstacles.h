@@ -12,10 +12,10 @@
 
 namespace bole
 {
-/// A trunk at the height of the drone, with how well its place *relative to the drone* is known: across the line of
-/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is seen well),
-/// either way by as much as a border may have been read inside the bark.
-/// The covariance in the world would count the drone's own drift, which moves drone and trunk alike.
+/// A trunk at the height of the drone, with the covariance of its position *relative to the drone*: across the line of
+/// sight from the predicted bearing, along it from the radius (range = radius over ratio, and the ratio is measured
+/// well), plus, in both directions, the error of a border that was detected inside the bark.
+/// The covariance in the world would include the drift of the drone, which moves drone and trunk alike.
 struct Obstacle
 {
   int id = 0;
@@ -29,16 +29,16 @@ struct Obstacle
   double clearance(const Eigen::Vector2d &p, double sigmas) const;
 };
 
-/// Live trunks of the map within \p range [m] of the drone: the confirmed, and candidates with at least
-/// \p observations views (something is there, though it may not be a trunk) that are not most surely nothing: log odds
-/// below -2, looked through, or where the drone is.
+/// Trunks of the map within \p range [m] of the drone that it must avoid: the confirmed ones, and hypotheses with at
+/// least \p observations views, since an obstacle may be there that is no trunk. Left out are those whose log-odds are
+/// below -2, those with triangulated points behind them, and those where the drone itself is.
 std::vector<Obstacle> obstacles(const FrameReport &report, double range, int observations);
 
 constexpr double kNearRange = 2.5; ///< points beyond this do not matter to a task yet [m]
 
-/// What stands upright near by the points of the scene: a trunk that is not in the map, or not where the map has it,
-/// has bark all the same. Points are gathered in columns, that count when seen often enough and high enough, and are
-/// forgotten after some seconds.
+/// Upright obstacles from triangulated points. They cover trunks that the map lacks or has in a wrong place. Points are
+/// gathered in vertical columns; a column counts once it has enough points over enough height, and is forgotten after
+/// some seconds.
 class NearPoints
 {
 public:
@@ -58,15 +58,14 @@ private:
   std::map<std::pair<int, int>, Column> m_columns;
 };
 
-/// Where the camera has seen that nothing stands: what it sees a point through is free. What it has not seen through
-/// may hold anything: dark bark has no corners and may have but one border in the image, and beside the image nothing
-/// is seen.
+/// Free space: a grid of the cells that rays to triangulated points pass through. All other cells may be occupied: dark
+/// bark has no corners and may show only one border, and outside the image nothing is observed.
 class SeenSpace
 {
 public:
   /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
   void see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s);
-  /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
+  /// Whether \p p (world, [m]) was observed to be free in the last seconds, to a cell of 0.2 m.
   bool isSeen(const Eigen::Vector2d &p) const;
 
 private:
@@ -78,14 +77,14 @@ private:
   };
   Cell &cellAt(const Eigen::Vector2d &p);
 
-  static constexpr std::int32_t kSide = 64; ///< of a map that goes round: what is left behind makes room
+  static constexpr std::int32_t kSide = 64; ///< cells; the grid is a torus, so cells behind the drone are reused
   std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
   double m_time_s = 0;
 };
 
-/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed
-/// that dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no
-/// trunk must not drive the drone into one.
+/// \p velocity [m/s, world] at \p p with its component towards each confirmed trunk of at least \p evidence limited in
+/// proportion to the distance between a body of \p body_radius [m] and the bark. It never adds a velocity away from a
+/// trunk: a false one must not push the drone into a real one.
 Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
                           double body_radius, double evidence);
 } // namespace bole

@@ -14,21 +14,22 @@ namespace bole
 {
 namespace
 {
-constexpr double kStep_s = 0.1;      ///< of the flight in thought
+constexpr double kStep_s = 0.1;      ///< of the simulated trajectories
 constexpr double kOffsetStep = 0.25; ///< [m]
 constexpr double kOffsetGain = 1.0;  ///< sideways velocity over offset [1/s]
 constexpr double kOffLine = 0.12;    ///< cost a metre off the line
-constexpr double kChange = 0.08;     ///< cost a metre of a change of mind
-constexpr double kUnseen = 8;        ///< cost a second of a hull in what was not seen through
-constexpr double kUnseenTo = 1.8;    ///< as far ahead as it must have been [m]
-constexpr double kRound = 0.12;      ///< and round the hull [m]
+constexpr double kChange = 0.08;     ///< cost a metre between this offset and the one of the frame before
+constexpr double kUnseen = 8;        ///< cost a second inside space that was not observed to be free
+constexpr double kUnseenTo = 1.8;    ///< distance ahead up to which it must be observed [m]
+constexpr double kRound = 0.12;      ///< distance from the hull at which it is asked [m]
 constexpr double kSlow = 1.5;        ///< cost of standing still against full speed
-constexpr double kNear = 12;         ///< cost a square metre inside the margin and a second
-constexpr double kContact = 100;     ///< cost of a contact, and as much again a metre deep and a second early
-constexpr double kLook = 0.6;        ///< share of the direction of flight that the heading takes
-constexpr double kSwingOn = 0.6;     ///< the swing goes on as if flying at [m/s], at the least
-constexpr double kLookAside = 0.6;   ///< amplitude of the sidestep before it leaves [m]
-constexpr double kRange = 9;         ///< trunks farther do not matter yet [m]
+constexpr double kNear = 12;         ///< cost a second of a square metre of the margin that is violated
+constexpr double kContact =
+    100; ///< cost of a contact, plus this for each metre of depth and each second that it is earlier
+constexpr double kLook = 0.6;      ///< share of the direction of flight that the heading takes
+constexpr double kSwingOn = 0.6;   ///< the sine goes on at no less than this speed [m/s]
+constexpr double kLookAside = 0.6; ///< amplitude of the sidestep before it leaves [m]
+constexpr double kRange = 9;       ///< trunks farther do not matter yet [m]
 
 double line(double x, const SlalomTaskOptions &options)
 {

@@ -3,14 +3,14 @@
 /// \file
 /// Through a stand of trees along a straight line, round whatever the map says is in the way.
 ///
-/// Idea: each frame the ways to a set of sideways offsets, at a few speeds, are flown in thought over the next seconds
-/// with the drone's lag, and the cheapest is flown for real until the next frame. A way costs what it comes too near to
-/// a trunk, its covariance included, how far it leads from the line, and how slow it is. The drone sidesteps once
-/// before it leaves, and the line itself swings from side to side: flying straight at a trunk gives no parallax, and
-/// what has none is not in the map. It swings on where the drone is held up, since what is no trunk shows itself as
-/// such from another side. What stands upright near by the points of the scene counts beside the map, whatever it is: a
-/// trunk may be missing in the map, or stand elsewhere. And what the camera has not seen through is dear: a trunk
-/// without corners is in neither. The camera looks half-way into the direction of flight.
+/// Idea: model-predictive control over a few candidates. Each frame the trajectories to a set of lateral offsets, at a
+/// few speeds, are simulated over the next seconds with the drone's lag, and the cheapest is followed until the next
+/// frame. The cost grows with the proximity to trunks (their covariance included), with the distance from the line, and
+/// with slowness. The drone sidesteps once before it starts, and the line itself is a sine: flight straight towards a
+/// trunk gives no parallax, and a trunk without parallax is not in the map. The sine goes on where the drone is
+/// stopped, since a false trunk is recognised from another side. Upright columns of triangulated points are avoided as
+/// well: a trunk may be missing in the map or misplaced. Space that was not observed to be free has a high cost, since
+/// a trunk without corners is in neither. The heading is between the line and the direction of flight.
 
 #include "lab/tasks/obstacles.h"
 #include "lab/tasks/servo_task.h"

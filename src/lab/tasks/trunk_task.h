@@ -8,17 +8,17 @@
 /// log r/d by flying ahead, one axis each, since their lags differ. What is left is sideways: `hold` leaves it at rest,
 /// `circle` gives it a speed, and what that does to the two is fed forward.
 ///
-/// A distance in metres is the map's radius over r/d, and the radius comes from parallax, of which a drone that rests
-/// has none: it drifts by several per cent in half a minute, since it takes what is wrong in how the trunk looks from
-/// one side for a distance. So `hold` by distance sways sideways, features held. The way is a slant: the drone's height
-/// has no error of scale as its steps have, and the points tell the direction of flight, so that the metre of the
-/// height becomes the map's. The distance is the map's: pose and map rest on all images, while the borders that one
-/// image shows wander with light and background.
+/// A distance in metres is the map's radius over r/d, and the radius comes from parallax. A drone at rest has none and
+/// drifts by several per cent in half a minute, because systematic errors of the borders from one viewpoint act as an
+/// error of distance. So `hold` by distance oscillates sideways with the features held. It climbs and descends
+/// meanwhile: the height has no scale error, unlike the horizontal odometry, and the points measure the direction of
+/// flight, which transfers the scale of the height to the map. The distance is the map's: pose and map rest on all
+/// images, while the borders of a single image vary with light and background.
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand
-/// when the command acts (DroneResponse), and what is ordered is the velocity that a lagging drone needs for an
-/// exponential decrease. What the drone does not obey (it drifts outwards on a circle, and flies slower than it is
-/// told) shows as a drift of the features (FeatureFilter) and is fed forward: no lag is left on the way round.
+/// when the command acts (DroneResponse), and the command is the velocity that a lagging drone needs for an exponential
+/// decrease. Unmodelled motion (drift outwards on a circle, less speed than commanded) appears as a drift of the
+/// features (FeatureFilter) and is fed forward, which leaves no lag on the circle.
 ///
 /// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed
 /// for a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
