@@ -2,28 +2,31 @@
 #include "lab/simulation/simulated_flight.h"
 
 #include "geometry/require_range.h"
-
-#include "lab/simulation/h264_link.h"
 #include "lab/simulation/sequence_writer.h"
 
 #include <cmath>
-#include <fmt/format.h>
-#include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
+constexpr std::int64_t kImuPeriodNs = 5000000;
 
-void recordImu(const FlightPath &path, const SensorOptions &options, double duration, SequenceWriter &writer)
+FlightPath pathOf(const SceneOptions &scene, int frames)
 {
-  constexpr std::int64_t kPeriodNs = 5000000;
-  SimulatedImu imu(options);
-  for (std::int64_t stamp = 0; stamp <= std::llround(duration * 1e9); stamp += kPeriodNs) {
-    const double t = 1e-9 * static_cast<double>(stamp);
-    writer.writeImu(stamp, imu.measure(path.bodyPose(t).R, path.bodyRate(t), path.acceleration(t)));
-  }
+  scene.validate();
+  requireRange("frames", frames, 1, 100000);
+  FlightOptions flight = scene.flight;
+  flight.duration = (frames - 1) / scene.rate_hz;
+  return FlightPath(flight);
+}
+
+Forest forestOf(const SceneOptions &scene, const FlightPath &path)
+{
+  std::vector<SimulatedTrunk> wanted = scene.trunks;
+  const std::vector<SimulatedTrunk> gates = path.gates();
+  wanted.insert(wanted.end(), gates.begin(), gates.end());
+  return Forest::plant(scene.forest, path.waypoints(), wanted);
 }
 } // namespace
 
@@ -43,44 +46,55 @@ void SceneOptions::validate() const
   requireRange("h264_kbps", h264_kbps, 0, 20000);
 }
 
+SceneFrames::SceneFrames(const SceneOptions &scene, int frames)
+    : m_scene(scene),
+      m_path(pathOf(scene, frames)),
+      m_forest(forestOf(scene, m_path)),
+      m_renderer(m_forest, scene.renderer),
+      m_filter(scene.sensors),
+      m_imu(scene.sensors)
+{
+  const PinholeCamera &camera = scene.renderer.camera.pinhole;
+  if (scene.h264_kbps > 0)
+    m_link.emplace(camera.width, camera.height, scene.rate_hz, scene.h264_kbps);
+}
+
+void SceneFrames::next(Frame &frame, RenderedFrame &rendered, bool truth_images)
+{
+  frame = Frame();
+  frame.index = m_index;
+  frame.stamp_ns = std::llround(static_cast<double>(m_index++) * 1e9 / m_scene.rate_hz);
+  const double t = 1e-9 * static_cast<double>(frame.stamp_ns), half = 0.5e-3 * m_scene.exposure_ms;
+  const Pose bMc = forwardCamera();
+  m_renderer.render(m_path.bodyPose(t - half) * bMc, m_path.bodyPose(t + half) * bMc, rendered, truth_images);
+  if (m_link)
+    m_link->pass(rendered.image);
+  frame.image = rendered.image;
+  frame.wMb_truth = m_path.bodyPose(t);
+  frame.wMb_odometry = m_filter.report(*frame.wMb_truth);
+  for (; m_imu_stamp_ns <= frame.stamp_ns; m_imu_stamp_ns += kImuPeriodNs) {
+    const double s = 1e-9 * static_cast<double>(m_imu_stamp_ns);
+    const ImuSample sample = m_imu.measure(m_path.bodyPose(s).R, m_path.bodyRate(s), m_path.acceleration(s));
+    frame.gyro.push_back({m_imu_stamp_ns, sample.gyro, sample.accelerometer});
+  }
+}
+
 void recordFlight(const SceneOptions &scene, const RecordOptions &options, const std::function<void(int)> &progress)
 {
   scene.validate();
-  requireRange("frames", options.frames, 1, 100000);
-  const Pose bMc = forwardCamera();
-  SequenceWriter writer(options.folder, scene.renderer.camera, bMc, scene.rate_hz, options.overwrite);
-  FlightOptions flight = scene.flight;
-  flight.duration = (options.frames - 1) / scene.rate_hz;
-  const FlightPath path(flight);
-  std::vector<SimulatedTrunk> wanted = scene.trunks;
-  const std::vector<SimulatedTrunk> gates = path.gates();
-  wanted.insert(wanted.end(), gates.begin(), gates.end());
-  const Forest forest = Forest::plant(scene.forest, path.waypoints(), wanted);
-  writer.writeForest(forest);
+  SequenceWriter writer(options.folder, scene.renderer.camera, forwardCamera(), scene.rate_hz, options.overwrite);
+  SceneFrames frames(scene, options.frames);
+  writer.writeForest(frames.forest());
   writer.writeText("scene.yaml", sceneText(scene));
-  recordImu(path, scene.sensors, flight.duration, writer);
-
-  ForestRenderer renderer(forest, scene.renderer);
-  PoseFilter filter(scene.sensors);
-  std::optional<H264Link> link;
-  if (scene.h264_kbps > 0) {
-    link.emplace(scene.renderer.camera.pinhole.width, scene.renderer.camera.pinhole.height, scene.rate_hz,
-                 scene.h264_kbps);
-  }
-  RenderedFrame frame;
-  const double half = 0.5e-3 * scene.exposure_ms;
+  Frame frame;
+  RenderedFrame rendered;
   for (int k = 0; k < options.frames; ++k) {
-    const std::int64_t stamp = std::llround(k * 1e9 / scene.rate_hz);
-    const double t = 1e-9 * static_cast<double>(stamp);
-    renderer.render(path.bodyPose(t - half) * bMc, path.bodyPose(t + half) * bMc, frame, options.truth_images);
-    if (link) {
-      link->pass(frame.image);
-    }
-    const Pose truth = path.bodyPose(t);
-    writer.writeFrame(stamp, frame, truth, filter.report(truth));
-    if (progress) {
+    frames.next(frame, rendered, options.truth_images);
+    for (const GyroSample &sample : frame.gyro)
+      writer.writeImu(sample);
+    writer.writeFrame(frame.stamp_ns, rendered, *frame.wMb_truth, *frame.wMb_odometry);
+    if (progress)
       progress(k + 1);
-    }
   }
   writer.finish();
 }

@@ -6,9 +6,11 @@
 #include "lab/simulation/flight_path.h"
 #include "lab/simulation/flight_sensors.h"
 #include "lab/simulation/forest_renderer.h"
+#include "lab/simulation/h264_link.h"
 #include <bole/open_source.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,12 +33,34 @@ struct SceneOptions
   void validate() const;
 };
 
-/// Reads a scene: YAML with the sections forest, flight, camera, sensors, video and trunks, every
-/// key optional. Unknown keys and values out of range throw vpException "file:line: key = value,
-/// must be ...".
+/// Reads a scene: YAML with the sections forest, flight, camera, sensors, video and trunks, every key optional. Unknown
+/// keys and values out of range throw vpException "file:line: key = value, must be ...".
 SceneOptions readScene(const std::string &path);
 /// The text that readScene() would read back.
 std::string sceneText(const SceneOptions &scene);
+
+/// The frames of a scene, one after the other: what recordFlight() writes and a trial tracks. Gyro and accelerometer at
+/// 200 Hz.
+class SceneFrames
+{
+public:
+  /// \p frames: how long the path is. \throw vpException naming the option that is out of its range.
+  SceneFrames(const SceneOptions &scene, int frames);
+  const Forest &forest() const { return m_forest; }
+  /// The next frame with its truth. \p rendered keeps its buffers; with \p truth_images it holds depth and ids too.
+  void next(Frame &frame, RenderedFrame &rendered, bool truth_images = false);
+
+private:
+  SceneOptions m_scene;
+  FlightPath m_path;
+  Forest m_forest;
+  ForestRenderer m_renderer;
+  PoseFilter m_filter;
+  SimulatedImu m_imu;
+  std::optional<H264Link> m_link;
+  std::size_t m_index = 0;
+  std::int64_t m_imu_stamp_ns = 0;
+};
 
 struct RecordOptions
 {
@@ -46,9 +70,8 @@ struct RecordOptions
   bool overwrite = false;
 };
 
-/// Flies \p scene and writes it as an ASL folder (sequence_writer.h), with the scene beside it as
-/// scene.yaml. Gyro and accelerometer at 200 Hz. \p progress is called after each frame with the
-/// number of frames done. Law (a test): same scene, same bytes.
+/// Flies \p scene and writes it as an ASL folder (sequence_writer.h), with the scene beside it as scene.yaml. \p
+/// progress is called after each frame with the number of frames done. Law (a test): same scene, same bytes.
 void recordFlight(const SceneOptions &scene, const RecordOptions &options,
                   const std::function<void(int)> &progress = {});
 

@@ -2,68 +2,19 @@
 #include "lab/trials/accuracy_trial.h"
 #include "evaluation/visibility.h"
 #include "geometry/median.h"
-#include "lab/simulation/h264_link.h"
+#include "geometry/require_range.h"
 
 #include <chrono>
 #include <cmath>
-#include <memory>
-#include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-constexpr std::int64_t kImuPeriodNs = 5000000;
-
 struct Recorded
 {
   Trajectory truth, odometry;
   std::vector<double> frame_ms;
-};
-
-/// The frames of a scene, one after the other.
-class SceneFrames
-{
-public:
-  SceneFrames(const SceneOptions &scene, const FlightPath &path, const Forest &forest)
-      : m_scene(scene), m_path(path), m_renderer(forest, scene.renderer), m_filter(scene.sensors), m_imu(scene.sensors)
-  {
-    const PinholeCamera &camera = scene.renderer.camera.pinhole;
-    if (scene.h264_kbps > 0)
-      m_link.emplace(camera.width, camera.height, scene.rate_hz, scene.h264_kbps);
-  }
-
-  void next(Frame &frame)
-  {
-    frame.index = m_index;
-    frame.stamp_ns = std::llround(static_cast<double>(m_index++) * 1e9 / m_scene.rate_hz);
-    const double t = 1e-9 * static_cast<double>(frame.stamp_ns), half = 0.5e-3 * m_scene.exposure_ms;
-    const Pose bMc = forwardCamera();
-    RenderedFrame rendered;
-    m_renderer.render(m_path.bodyPose(t - half) * bMc, m_path.bodyPose(t + half) * bMc, rendered);
-    if (m_link)
-      m_link->pass(rendered.image);
-    frame.image = rendered.image;
-    frame.wMb_truth = m_path.bodyPose(t);
-    frame.wMb_odometry = m_filter.report(*frame.wMb_truth);
-    for (; m_imu_stamp <= frame.stamp_ns; m_imu_stamp += kImuPeriodNs) {
-      const double s = 1e-9 * static_cast<double>(m_imu_stamp);
-      const ImuSample sample = m_imu.measure(m_path.bodyPose(s).R, m_path.bodyRate(s), m_path.acceleration(s));
-      if (m_imu_stamp > 0)
-        frame.gyro.push_back({m_imu_stamp, sample.gyro});
-    }
-  }
-
-private:
-  const SceneOptions &m_scene;
-  const FlightPath &m_path;
-  ForestRenderer m_renderer;
-  PoseFilter m_filter;
-  SimulatedImu m_imu;
-  std::optional<H264Link> m_link;
-  std::size_t m_index = 0;
-  std::int64_t m_imu_stamp = 0;
 };
 
 TrajectoryErrors errorsUnder(const Trajectory &estimate, const Trajectory &truth, Alignment alignment)
@@ -75,9 +26,7 @@ TrajectoryErrors errorsUnder(const Trajectory &estimate, const Trajectory &truth
 void compare(AccuracyTrialResult &result, const Pipeline &pipeline, const Recorded &recorded, const Forest &forest,
              const PinholeCamera &camera)
 {
-  Trajectory smoothed;
-  for (const auto &pose : pipeline.smoothedTrajectory())
-    smoothed.push_back({pose.stamp_ns, pose.wMb});
+  const Trajectory smoothed = pipeline.smoothedTrajectory();
   result.trajectory = errorsUnder(smoothed, recorded.truth, Alignment::xy_yaw);
   result.trajectory_scaled = errorsUnder(smoothed, recorded.truth, Alignment::xy_yaw_scale);
   result.odometry = errorsUnder(recorded.odometry, recorded.truth, Alignment::xy_yaw);
@@ -106,23 +55,15 @@ std::vector<TruthTrunk> truthOf(const Forest &forest)
 AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, const Options &options,
                                      const std::function<bool()> &is_cancelled)
 {
-  scene.validate();
-  if (frames < 2)
-    throw vpException(vpException::badValue, "frames = %d, must be at least 2", frames);
-  FlightOptions flight = scene.flight;
-  flight.duration = (frames - 1) / scene.rate_hz;
-  const FlightPath path(flight);
-  std::vector<SimulatedTrunk> wanted = scene.trunks;
-  const std::vector<SimulatedTrunk> gates = path.gates();
-  wanted.insert(wanted.end(), gates.begin(), gates.end());
-  const Forest forest = Forest::plant(scene.forest, path.waypoints(), wanted);
-  SceneFrames source(scene, path, forest);
+  requireRange("frames", frames, 2, 100000);
+  SceneFrames source(scene, frames);
   const PinholeCamera camera = scene.renderer.camera.pinhole;
   Pipeline pipeline(camera, forwardCamera(), options);
   Recorded recorded;
+  Frame frame;
+  RenderedFrame rendered;
   for (int k = 0; k < frames && !(is_cancelled && is_cancelled()); ++k) {
-    Frame frame;
-    source.next(frame);
+    source.next(frame, rendered);
     recorded.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
     recorded.odometry.push_back({frame.stamp_ns, *frame.wMb_odometry});
     frame.wMb_truth.reset();
@@ -135,7 +76,7 @@ AccuracyTrialResult runAccuracyTrial(const SceneOptions &scene, int frames, cons
   if (recorded.truth.size() < 2)
     return result;
   pipeline.finish();
-  compare(result, pipeline, recorded, forest, camera);
+  compare(result, pipeline, recorded, source.forest(), camera);
   return result;
 }
 } // namespace bole
