@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole graph` and `bole solve` as their users run them: on a real run, and on files gone bad.
-#include "support/shell.h"
+#include "run_bole.h"
 
 #include <gmock/gmock.h>
 
@@ -15,10 +15,8 @@
 namespace
 {
 namespace fs = std::filesystem;
-using bole::test::Outcome;
+using namespace bole::test;
 using testing::HasSubstr;
-
-Outcome run(const std::string &arguments) { return bole::test::runShell(BOLE_EXECUTABLE " " + arguments); }
 
 std::vector<std::string> linesOf(const std::string &path)
 {
@@ -47,7 +45,7 @@ struct GraphCommand : testing::Test
   {
     folder = testing::TempDir() + "bole_graph_run_" + std::to_string(getpid());
     fs::remove_all(folder);
-    ASSERT_EQ(run("track " BOLE_SOURCE_DIR "/data/park-forward -o " + folder + " --no-video --frames 40").status, 0);
+    ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --frames 40").status, 0);
     file = folder + "/exported.g2o";
     const Outcome exported = run("graph " + folder + " --export " + file);
     ASSERT_EQ(exported.status, 0) << exported.text;

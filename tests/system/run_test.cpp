@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What is left of a run that does not go to its end, or is not worth much.
-#include "support/shell.h"
+#include "run_bole.h"
 
 #include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
 
 #include <chrono>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
 #include <random>
-#include <string>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
@@ -19,29 +15,8 @@
 namespace
 {
 namespace fs = std::filesystem;
-using bole::test::Outcome;
+using namespace bole::test;
 using testing::HasSubstr;
-const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
-
-Outcome run(const std::string &arguments, const std::string &before = "")
-{
-  return bole::test::runShell(before + BOLE_EXECUTABLE + " " + arguments);
-}
-
-std::string freshFolder(const std::string &name)
-{
-  const std::string folder = testing::TempDir() + "bole_run_" + name;
-  fs::remove_all(folder);
-  return folder;
-}
-
-nlohmann::json jsonOf(const std::string &path) { return nlohmann::json::parse(std::ifstream(path)); }
-
-std::string textOf(const std::string &path)
-{
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 std::size_t linesIn(const std::string &path)
 {

@@ -1,34 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The command as its users run it: a whole flight, and their mistakes.
-#include "support/shell.h"
+#include "run_bole.h"
 
 #include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <string>
+#include <cstdlib>
 
 namespace
 {
 namespace fs = std::filesystem;
-using bole::test::Outcome;
+using namespace bole::test;
 using testing::HasSubstr;
-const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
-
-Outcome run(const std::string &arguments, const std::string &launcher = "")
-{
-  return bole::test::runShell(launcher + BOLE_EXECUTABLE + " " + arguments);
-}
-
-std::string freshFolder(const std::string &name)
-{
-  const std::string folder = testing::TempDir() + "bole_" + name;
-  fs::remove_all(folder);
-  return folder;
-}
 
 void copyFlight(const std::string &to)
 {
@@ -36,42 +19,21 @@ void copyFlight(const std::string &to)
   fs::copy(kFlight, to, fs::copy_options::recursive);
 }
 
-TEST(Track, MapsTheDemonstrationFlight)
-{
-  const std::string folder = freshFolder("demo");
-  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video").status, 0);
-  for (const char *file :
-       {"trajectory.tum", "trajectory_online.tum", "trunks.csv", "map.svg", "timing.csv", "summary.json", "graph.g2o"})
-    EXPECT_TRUE(fs::exists(folder + "/" + file)) << file;
-  ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
-  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
-  const std::string text = evaluation.dump();
-  EXPECT_THAT(text, HasSubstr("precision"));
-  std::ifstream trunks(folder + "/trunks.csv");
-  int confirmed = 0;
-  for (std::string line; std::getline(trunks, line);)
-    confirmed += line.find("confirmed") != std::string::npos;
-  EXPECT_GE(confirmed, 3);
-  EXPECT_EQ(run("solve " + folder + "/graph.g2o").status, 0);
-}
-
 TEST(Track, MapsAPlainVideoAndSaysWhereItsMetreComesFrom)
 {
   const std::string folder = freshFolder("plain");
   ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --odometry none --frames 60").status, 0);
-  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  const auto summary = jsonOf(folder + "/summary.json");
   EXPECT_EQ(summary.at("scale"), "prior");
   EXPECT_GT(summary.at("scale_sigma"), 0.05);
   EXPECT_EQ(summary.at("gravity"), "trunks");
   EXPECT_EQ(summary.at("ranges"), true);
-  std::ifstream map(folder + "/map.svg");
-  const std::string svg((std::istreambuf_iterator<char>(map)), std::istreambuf_iterator<char>());
-  EXPECT_THAT(svg, HasSubstr("scale: prior on the radius"));
+  EXPECT_THAT(textOf(folder + "/map.svg"), HasSubstr("scale: prior on the radius"));
   const Outcome table = run("evaluate " + folder + " " + kFlight);
   ASSERT_EQ(table.status, 0);
   EXPECT_THAT(table.text, HasSubstr("scale: prior on the radius"));
   EXPECT_THAT(table.text, HasSubstr("x, y, yaw and scale"));
-  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
+  const auto evaluation = jsonOf(folder + "/evaluation.json");
   const auto &path = evaluation.at("trajectory").at("smoothed");
   EXPECT_LT(path.at("ate").at("xy_yaw_scale").at("rmse_m"), 0.02 * 6); // 60 frames fly more than 6 m
   EXPECT_NEAR(std::log(path.at("scale").get<double>()), 0, 0.8);       // the prior knows it to a factor of 1.6
@@ -83,10 +45,10 @@ TEST(Track, AKnownHeightOfTheCameraIsTheMetreOfAPlainVideo)
   ASSERT_EQ(
       run("track " + kFlight + " -o " + folder + " --no-video --odometry none --camera-height 1.5 --frames 60").status,
       0);
-  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  const auto summary = jsonOf(folder + "/summary.json");
   EXPECT_EQ(summary.at("scale"), "height");
   ASSERT_EQ(run("evaluate " + folder + " " + kFlight).status, 0);
-  const auto evaluation = nlohmann::json::parse(std::ifstream(folder + "/evaluation.json"));
+  const auto evaluation = jsonOf(folder + "/evaluation.json");
   EXPECT_NEAR(evaluation.at("trajectory").at("smoothed").at("scale").get<double>(), 1, 0.25);
 }
 
@@ -137,7 +99,7 @@ TEST(Track, PassesOverATruncatedImage)
   copyFlight(flight);
   fs::resize_file(flight + "/mav0/cam0/data/0000500000000.png", 900);
   ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video --frames 12").status, 0);
-  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"));
+  const auto summary = jsonOf(folder + "/summary.json");
   EXPECT_THAT(summary.at("frames").dump(), HasSubstr("corrupt"));
 }
 
