@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/frame_builder.h"
-
 #include "input/asl_source.h"
 #include "input/csv_reader.h"
 #include "input/sensor_yaml.h"
@@ -137,10 +135,8 @@ void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model, c
 
 struct AslSource::State
 {
-  std::string name;
   std::vector<Row> rows;
   std::size_t at = 0;
-  std::unique_ptr<FrameBuilder> builder;
 };
 
 AslSource::AslSource(const std::string &folder, const SourceOptions &options) : m_state(std::make_unique<State>())
@@ -149,7 +145,7 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options) : 
   if (!accepts(folder))
     throw vpException(vpException::ioError, fmt::format("{}: no ASL folder (cam0/data.csv is missing)", folder));
   const fs::path root = sensorRoot(folder);
-  m_state->name = folder;
+  m_name = folder;
   m_state->rows = readImageRows(root / "cam0");
   const std::string camera_path =
       options.camera_path.empty() ? (root / "cam0" / "sensor.yaml").string() : options.camera_path;
@@ -164,7 +160,7 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options) : 
   recording.truth = readPoses(root / "state_groundtruth_estimate0");
   recording.gyro = readGyro(root / "imu0");
   requireOverlap(recording.gyro, m_state->rows, (root / "imu0" / "data.csv").string());
-  m_state->builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
+  m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
 AslSource::~AslSource() = default;
@@ -174,17 +170,12 @@ bool AslSource::next(Frame &frame)
   if (m_state->at >= m_state->rows.size())
     return false;
   const Row &row = m_state->rows[m_state->at++];
-  FrameBuilder &builder = *m_state->builder;
-  builder.build(row.stamp_ns, readImageFile(row.image_path, builder.inputWidth(), builder.inputHeight()), frame);
+  m_builder->build(row.stamp_ns, readImageFile(row.image_path, m_builder->inputWidth(), m_builder->inputHeight()),
+                   frame);
   return true;
 }
 
-PinholeCamera AslSource::camera() const { return m_state->builder->camera(); }
-Pose AslSource::bMc() const { return m_state->builder->bMc(); }
 std::size_t AslSource::size() const { return m_state->rows.size(); }
-std::string AslSource::name() const { return m_state->name; }
-bool AslSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
-bool AslSource::hasGyro() const { return !m_state->builder->recording().gyro.empty(); }
 
 std::vector<std::int64_t> AslSource::stamps() const
 {
@@ -194,8 +185,8 @@ std::vector<std::int64_t> AslSource::stamps() const
   return stamps;
 }
 
-const Trajectory &AslSource::odometry() const { return m_state->builder->recording().odometry; }
-const Trajectory &AslSource::truth() const { return m_state->builder->recording().truth; }
+const Trajectory &AslSource::odometry() const { return m_builder->recording().odometry; }
+const Trajectory &AslSource::truth() const { return m_builder->recording().truth; }
 
 bool AslSource::accepts(const std::string &path)
 {

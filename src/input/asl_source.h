@@ -3,39 +3,29 @@
 /// \file
 /// Recorded flights in EuRoC / ASL folders.
 
-#include "input/trajectory.h"
-#include <bole/frame.h>
-#include <bole/open_source.h>
+#include "input/recorded_source.h"
 
 namespace bole
 {
-/// Reads `mav0/cam0` and, where they are there, `imu0` (gyro), `odom0` (the pose filter on board)
-/// and `state_groundtruth_estimate0` (truth). The folder may be given as the sequence or as its
-/// `mav0`.
+/// Reads `mav0/cam0` and, where they are there, `imu0` (gyro), `odom0` (the pose filter on board) and
+/// `state_groundtruth_estimate0` (truth). The folder may be given as the sequence or as its `mav0`.
 ///
-/// Every row of cam0/data.csv becomes one frame: an image that is absent is `missing`, one that
-/// cannot be decoded `corrupt`, one of another size `resized`, one with the pixels of the frame
-/// before `stale`. The pose filter's pose is that at the stamp of the frame (interpolate()), absent
-/// outside its range; gyro samples are those of (previous frame, this frame]. A `sensor.yaml`
-/// beside imu0, odom0 or the truth may give its `T_BS`; angular rates and poses are carried to the
-/// body by it.
+/// Every row of cam0/data.csv becomes one frame: an image that is absent is `missing`, one that cannot be decoded
+/// `corrupt`, one of another size `resized`, one with the pixels of the frame before `stale`. The pose filter's pose is
+/// that at the stamp of the frame (interpolate()), absent outside its range; gyro samples are those of (previous frame,
+/// this frame]. A `sensor.yaml` beside imu0, odom0 or the truth may give its `T_BS`; angular rates and poses are
+/// carried to the body by it.
 ///
-/// Errors: vpException with file:line for a missing or empty folder, rows that are not what they
-/// must be, stamps that go back, a camera file with a fault, or images of another size than the
-/// camera's.
-class AslSource : public FrameSource
+/// Errors: vpException with file:line for a missing or empty folder, rows that are not what they must be, stamps that
+/// go back, a camera file with a fault, or images of another size than the camera's.
+class AslSource : public RecordedSource
 {
 public:
   explicit AslSource(const std::string &folder, const SourceOptions &options = {});
   ~AslSource() override;
 
   bool next(Frame &frame) override;
-  PinholeCamera camera() const override;
-  Pose bMc() const override;
   std::size_t size() const override;
-  std::string name() const override;
-  bool hasOdometry() const override;
-  bool hasGyro() const override;
 
   /// Stamps of all frames [ns]; the whole odometry and the whole truth, each may be empty.
   std::vector<std::int64_t> stamps() const;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/frame_builder.h"
-
 #include "input/sequence_source.h"
 
 #include <algorithm>
@@ -89,12 +87,9 @@ bool isImage(const fs::path &path)
 
 struct SequenceSource::State
 {
-  std::string pattern;
-  std::string note;
   Numbers numbers;
   long at = 0;
   double rate_hz = 25;
-  std::unique_ptr<FrameBuilder> builder;
 
   std::int64_t stampOf(long number) const
   {
@@ -107,19 +102,19 @@ SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &
 {
   options.validate();
   State &state = *m_state;
-  state.pattern = fs::is_directory(pattern) ? patternOf(pattern) : pattern;
-  if (state.pattern.empty())
+  m_name = fs::is_directory(pattern) ? patternOf(pattern) : pattern;
+  if (m_name.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no numbered images in it", pattern));
-  state.numbers = numbersOf(state.pattern);
+  state.numbers = numbersOf(m_name);
   state.at = state.numbers.first;
   state.rate_hz = options.frame_rate_hz;
-  const ImageFile first = firstReadable(state.pattern, state.numbers);
-  const MountedCamera camera = cameraFor(options, static_cast<int>(first.image.getWidth()),
-                                         static_cast<int>(first.image.getHeight()), state.note);
+  const ImageFile first = firstReadable(m_name, state.numbers);
+  const MountedCamera camera =
+      cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), m_note);
   Recording recording;
   recording.odometry = readOdometry(options);
-  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path, state.pattern);
-  state.builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
+  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path, m_name);
+  m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
 SequenceSource::~SequenceSource() = default;
@@ -130,23 +125,15 @@ bool SequenceSource::next(Frame &frame)
   if (state.at > state.numbers.last)
     return false;
   const long number = state.at++;
-  FrameBuilder &builder = *state.builder;
-  builder.build(state.stampOf(number),
-                readImageFile(imagePath(state.pattern, number), builder.inputWidth(), builder.inputHeight()), frame);
+  m_builder->build(state.stampOf(number),
+                   readImageFile(imagePath(m_name, number), m_builder->inputWidth(), m_builder->inputHeight()), frame);
   return true;
 }
 
-PinholeCamera SequenceSource::camera() const { return m_state->builder->camera(); }
-Pose SequenceSource::bMc() const { return m_state->builder->bMc(); }
 std::size_t SequenceSource::size() const
 {
   return static_cast<std::size_t>(m_state->numbers.last - m_state->numbers.first + 1);
 }
-std::string SequenceSource::name() const { return m_state->pattern; }
-bool SequenceSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
-bool SequenceSource::hasGyro() const { return false; }
-bool SequenceSource::isCameraKnown() const { return m_state->note.empty(); } // the note tells of a guess
-std::string SequenceSource::note() const { return m_state->note; }
 
 std::string SequenceSource::patternOf(const std::string &folder)
 {

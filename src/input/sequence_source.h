@@ -3,39 +3,28 @@
 /// \file
 /// Numbered images as a video.
 
-#include <bole/frame.h>
-#include <bole/open_source.h>
+#include "input/recorded_source.h"
 
 namespace bole
 {
-/// Reads `folder/image%04d.png`, named as vpVideoReader does, or a folder whose images differ in
-/// one number.
+/// Reads `folder/image%04d.png`, named as vpVideoReader does, or a folder whose images differ in one number.
 ///
 /// Every number between the first and the last image is a frame: one that is not there is
 /// `missing`, one that cannot be decoded `corrupt`, one of another size `resized`, one with the
 /// pixels of the frame before `stale`. Stamps are (number - first) / SourceOptions::frame_rate_hz.
 ///
-/// vpVideoReader itself is not used for the pixels: it leaves out images it cannot read without a
-/// word, so that every later frame would get the time of an earlier one. Its parser of names
-/// (vpIoTools::getIndex) is.
+/// vpVideoReader itself is not used for the pixels: it leaves out images it cannot read without a word, so that every
+/// later frame would get the time of an earlier one. Its parser of names (vpIoTools::getIndex) is.
 ///
-/// Errors: vpException when there is no such image, none can be read, or the camera is of another
-/// size.
-class SequenceSource : public FrameSource
+/// Errors: vpException when there is no such image, none can be read, or the camera is of another size.
+class SequenceSource : public RecordedSource
 {
 public:
   explicit SequenceSource(const std::string &pattern, const SourceOptions &options = {});
   ~SequenceSource() override;
 
   bool next(Frame &frame) override;
-  PinholeCamera camera() const override;
-  Pose bMc() const override;
   std::size_t size() const override;
-  std::string name() const override;
-  bool hasOdometry() const override;
-  bool hasGyro() const override;
-  bool isCameraKnown() const override;
-  std::string note() const override;
 
   /// The pattern of a folder of numbered images, or empty.
   static std::string patternOf(const std::string &folder);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/frame_builder.h"
-#include "input/video_file.h"
-
 #include "input/video_source.h"
+#include "input/video_file.h"
 
 #include <deque>
 #include <fmt/format.h>
@@ -13,16 +11,7 @@ namespace bole
 {
 struct VideoSource::State
 {
-  State(const std::string &path, const SourceOptions &options) : name(path), file(path)
-  {
-    readAhead();
-    const Picture &first = ahead.back();
-    camera =
-        cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), note);
-  }
-
-  /// Reads up to the first whole picture, whose size is that of the video.
-  void readAhead()
+  explicit State(const std::string &path) : file(path)
   {
     Picture picture;
     while (file.next(picture)) {
@@ -31,7 +20,7 @@ struct VideoSource::State
         return;
     }
     throw vpException(vpException::ioError,
-                      fmt::format("{}: none of its {} pictures can be decoded", name, ahead.size()));
+                      fmt::format("{}: none of its {} pictures can be decoded", path, ahead.size()));
   }
 
   bool take(Picture &picture)
@@ -43,25 +32,25 @@ struct VideoSource::State
     return true;
   }
 
-  std::string name;
-  std::string note;
   VideoFile file;
-  std::deque<Picture> ahead;
-  MountedCamera camera;
-  std::unique_ptr<FrameBuilder> builder;
+  std::deque<Picture> ahead; ///< up to the first whole one, whose size is that of the video
 };
 
 VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
 {
   options.validate();
-  m_state = std::make_unique<State>(path, options);
+  m_name = path;
+  m_state = std::make_unique<State>(path);
+  const vpImage<unsigned char> &first = m_state->ahead.back().image;
+  const MountedCamera camera =
+      cameraFor(options, static_cast<int>(first.getWidth()), static_cast<int>(first.getHeight()), m_note);
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
   const std::int64_t duration_ns = m_state->file.duration_ns();
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
-  m_state->builder = std::make_unique<FrameBuilder>(m_state->camera, options, std::move(recording));
+  m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
 VideoSource::~VideoSource() = default;
@@ -75,16 +64,9 @@ bool VideoSource::next(Frame &frame)
   file.status = picture.is_missing ? FrameStatus::missing : picture.is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
   file.message = std::move(picture.message);
   file.image = std::move(picture.image);
-  m_state->builder->build(picture.stamp_ns, std::move(file), frame);
+  m_builder->build(picture.stamp_ns, std::move(file), frame);
   return true;
 }
 
-PinholeCamera VideoSource::camera() const { return m_state->builder->camera(); }
-Pose VideoSource::bMc() const { return m_state->builder->bMc(); }
 std::size_t VideoSource::size() const { return m_state->file.frames(); }
-std::string VideoSource::name() const { return m_state->name; }
-bool VideoSource::hasOdometry() const { return !m_state->builder->recording().odometry.empty(); }
-bool VideoSource::hasGyro() const { return false; }
-bool VideoSource::isCameraKnown() const { return m_state->note.empty(); } // the note tells of a guess
-std::string VideoSource::note() const { return m_state->note; }
 } // namespace bole

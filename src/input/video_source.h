@@ -3,8 +3,7 @@
 /// \file
 /// Video files.
 
-#include <bole/frame.h>
-#include <bole/open_source.h>
+#include "input/recorded_source.h"
 
 namespace bole
 {
@@ -18,22 +17,15 @@ namespace bole
 ///
 /// Errors: vpException naming the file when it is no video, the camera is of another size, or the
 /// odometry is over before the video begins or begins after it is over.
-class VideoSource : public FrameSource
+class VideoSource : public RecordedSource
 {
 public:
   explicit VideoSource(const std::string &path, const SourceOptions &options = {});
   ~VideoSource() override;
 
   bool next(Frame &frame) override;
-  PinholeCamera camera() const override;
-  Pose bMc() const override;
   std::size_t size() const override;
-  std::string name() const override;
-  bool hasOdometry() const override;
-  bool hasGyro() const override;
-  bool isCameraKnown() const override;
   bool isCompressed() const override { return true; }
-  std::string note() const override;
 
 private:
   struct State;
