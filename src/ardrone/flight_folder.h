@@ -10,10 +10,9 @@
 
 namespace bole
 {
-/// Writes `mav0/cam0` (images as the lens gave them, sensor.yaml with the lens), `imu0` (gyro) and
-/// `odom0` frame by frame. An image is complete under its name before its row is written, and a row
-/// is one write(): a killed process leaves a folder that AslSource reads. Broken frames are written
-/// as rows without an image: `missing` again.
+/// Writes `mav0/cam0` (images as the lens gave them, sensor.yaml with the lens), `imu0` (gyro) and `odom0` frame by
+/// frame. An image is complete under its name before its row is written, and a row is one write(): a killed process
+/// leaves a folder that AslSource reads. Broken frames are written as rows without an image: `missing` again.
 ///
 /// Errors: vpException when the folder has a flight already or the disk refuses.
 class FlightFolder

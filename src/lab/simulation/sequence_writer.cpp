@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/sequence_writer.h"
+#include "input/asl_text.h"
 
 #include <bole/trunk_record.h>
-
-#include <Eigen/Geometry>
 
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <visp3/core/vpException.h>
@@ -19,51 +17,16 @@ namespace bole
 {
 namespace
 {
-const char *kPoseHeader = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x "
-                          "[],q_RS_y [],q_RS_z []\n";
-
-std::string poseLine(std::int64_t stamp_ns, const Pose &pose)
-{
-  Eigen::Quaterniond q(pose.R);
-  if (q.w() < 0) {
-    q.coeffs() = -q.coeffs();
-  }
-  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp_ns, pose.t.x(), pose.t.y(),
-                     pose.t.z(), q.w(), q.x(), q.y(), q.z());
-}
-
-std::string sensorYaml(const CameraModel &camera, const Pose &bMc, double rate_hz)
-{
-  std::string matrix;
-  const Eigen::Matrix<double, 3, 4> T = (Eigen::Matrix<double, 3, 4>() << bMc.R, bMc.t).finished();
-  for (int k = 0; k < 12; ++k) {
-    matrix += fmt::format("{}, ", T(k / 4, k % 4) + 0.0);
-  }
-  const char *model = camera.distortion == Distortion::equidistant ? "equidistant"
-                      : camera.distortion == Distortion::fov       ? "fov"
-                                                                   : "radial-tangential";
-  const auto &c = camera.coefficients;
-  const int count = camera.distortion == Distortion::fov ? 1 : 4; // as readCamera() wants them
-  const PinholeCamera &p = camera.pinhole;
-  return fmt::format("sensor_type: camera\ncomment: simulated front camera\nT_BS:\n  cols: 4\n  rows: 4\n"
-                     "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
-                     "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
-                     matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, model,
-                     fmt::join(c.begin(), c.begin() + count, ", "));
-}
-
 void writePng(const std::string &path, const cv::Mat &image)
 {
-  if (!cv::imwrite(path, image)) {
+  if (!cv::imwrite(path, image))
     throw vpException(vpException::ioError, fmt::format("{}: cannot write", path));
-  }
 }
 
 std::uint16_t rounded(std::uint16_t depth_mm)
 {
-  if (depth_mm == 65535) {
+  if (depth_mm == 65535)
     return depth_mm;
-  }
   const int step = depth_mm < 10000 ? 20 : 100;
   return static_cast<std::uint16_t>(std::min(65500, (depth_mm + step / 2) / step * step));
 }
@@ -73,35 +36,30 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
                                bool overwrite)
     : m_folder(folder), m_partial(folder + ".partial"), m_overwrite(overwrite)
 {
-  if (folder.empty()) {
+  if (folder.empty())
     throw vpException(vpException::badValue, "output = '', must be the name of a folder");
-  }
   while (m_folder.size() > 1 && m_folder.back() == '/') {
     m_folder.pop_back();
     m_partial = m_folder + ".partial";
   }
-  if (fs::exists(m_folder) && !overwrite) {
+  if (fs::exists(m_folder) && !overwrite)
     throw vpException(vpException::ioError, fmt::format("{}: exists already; --overwrite replaces it", m_folder));
-  }
   std::error_code error;
   fs::remove_all(m_partial, error);
   for (const char *name : {"mav0/cam0/data", "mav0/imu0", "mav0/odom0", "mav0/state_groundtruth_estimate0"}) {
     fs::create_directories(path(name), error);
-    if (error) {
+    if (error)
       throw vpException(vpException::ioError, fmt::format("{}: {}", path(name), error.message()));
-    }
   }
-  writeText("mav0/cam0/sensor.yaml", sensorYaml(camera, bMc, rate_hz));
+  writeText("mav0/cam0/sensor.yaml", asl::sensorYaml({camera, bMc}, "simulated front camera", rate_hz));
   m_images.open(path("mav0/cam0/data.csv"));
-  m_images << "#timestamp [ns],filename\n";
+  m_images << asl::kImagesHead;
   m_imu.open(path("mav0/imu0/data.csv"));
-  m_imu << "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x "
-           "[m s^-2],"
-           "a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  m_imu << asl::kImuHead;
   m_odometry.open(path("mav0/odom0/data.csv"));
-  m_odometry << kPoseHeader;
+  m_odometry << asl::kPosesHead;
   m_truth.open(path("mav0/state_groundtruth_estimate0/data.csv"));
-  m_truth << kPoseHeader;
+  m_truth << asl::kPosesHead;
 }
 
 void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth,
@@ -109,14 +67,13 @@ void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &fram
 {
   const std::string name = fmt::format("{:013d}.png", stamp_ns);
   m_images << stamp_ns << ',' << name << '\n';
-  m_truth << poseLine(stamp_ns, wMb_truth);
-  m_odometry << poseLine(stamp_ns, wMb_odometry);
+  m_truth << asl::poseLine(stamp_ns, wMb_truth);
+  m_odometry << asl::poseLine(stamp_ns, wMb_odometry);
   vpImage<unsigned char> image = frame.image;
   writePng(path("mav0/cam0/data/" + name),
            cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U, image.bitmap));
-  if (frame.depth.getSize() == 0) {
+  if (frame.depth.getSize() == 0)
     return;
-  }
   fs::create_directories(path("depth"));
   fs::create_directories(path("trunk_id"));
   const int height = static_cast<int>(frame.depth.getHeight()), width = static_cast<int>(frame.depth.getWidth());
@@ -131,11 +88,9 @@ void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &fram
   writePng(path("trunk_id/" + name), trunk_id);
 }
 
-void SequenceWriter::writeImu(std::int64_t stamp_ns, const ImuSample &sample)
+void SequenceWriter::writeImu(const GyroSample &sample)
 {
-  const Eigen::Vector3d &w = sample.gyro, &a = sample.accelerometer;
-  m_imu << fmt::format("{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", stamp_ns, w.x(), w.y(), w.z(), a.x(), a.y(),
-                       a.z());
+  m_imu << asl::imuLine(sample.stamp_ns, sample.rate, sample.force.value_or(Eigen::Vector3d::Zero()));
 }
 
 void SequenceWriter::writeForest(const Forest &forest)
@@ -158,22 +113,19 @@ void SequenceWriter::writeText(const std::string &name, const std::string &text)
 {
   std::ofstream file(path(name));
   file << text;
-  if (!file.flush()) {
+  if (!file.flush())
     throw vpException(vpException::ioError, fmt::format("{}: cannot write", path(name)));
-  }
 }
 
 void SequenceWriter::finish()
 {
   for (std::ofstream *file : {&m_images, &m_imu, &m_odometry, &m_truth}) {
     file->close();
-    if (file->fail()) {
+    if (file->fail())
       throw vpException(vpException::ioError, fmt::format("{}: cannot write", m_partial));
-    }
   }
-  if (m_overwrite) {
+  if (m_overwrite)
     fs::remove_all(m_folder);
-  }
   fs::rename(m_partial, m_folder);
 }
 } // namespace bole

@@ -3,8 +3,8 @@
 /// \file
 /// Writes a flight as an ASL folder (the layout of EuRoC), with the truth beside it.
 
-#include "lab/simulation/flight_sensors.h"
 #include "lab/simulation/forest_renderer.h"
+#include <bole/frame.h>
 
 #include <cstdint>
 #include <fstream>
@@ -16,10 +16,9 @@ namespace bole
 /// after an interruption, it is beside it as `<folder>.partial`.
 ///
 /// Layout: mav0/cam0/{sensor.yaml,data.csv,data/<stamp>.png}, mav0/imu0/data.csv,
-/// mav0/odom0/data.csv, mav0/state_groundtruth_estimate0/data.csv, trees.csv, trees_far.csv; with
-/// truth images depth/<stamp>.png (16-bit, millimetres along the optical axis, rounded to 20 mm
-/// below 10 m and 100 mm beyond, 65535 = sky or beyond 65 m) and trunk_id/<stamp>.png (16-bit, id
-/// of the trunk, 65535 = none).
+/// mav0/odom0/data.csv, mav0/state_groundtruth_estimate0/data.csv, trees.csv, trees_far.csv; with truth images
+/// depth/<stamp>.png (16-bit, millimetres along the optical axis, rounded to 20 mm below 10 m and 100 mm beyond, 65535
+/// = sky or beyond 65 m) and trunk_id/<stamp>.png (16-bit, id of the trunk, 65535 = none).
 class SequenceWriter
 {
 public:
@@ -28,7 +27,7 @@ public:
                  bool overwrite = false);
 
   void writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth, const Pose &wMb_odometry);
-  void writeImu(std::int64_t stamp_ns, const ImuSample &sample);
+  void writeImu(const GyroSample &sample);
   void writeForest(const Forest &forest);
   /// Any other small text file, e.g. the scene: name relative to the folder.
   void writeText(const std::string &name, const std::string &text);
