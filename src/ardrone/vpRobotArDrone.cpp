@@ -200,11 +200,7 @@ vpRobotArDrone::Watchdog vpRobotArDrone::watchdog() const
   return m_state->watchdog;
 }
 
-void vpRobotArDrone::get_eJe(vpMatrix &jacobian)
-{
-  jacobian.resize(6, 4, true);
-  jacobian[0][0] = jacobian[1][1] = jacobian[2][2] = jacobian[5][3] = 1;
-}
+void vpRobotArDrone::get_eJe(vpMatrix &jacobian) { jacobian = bole::quadrotorJacobian(); }
 
 void vpRobotArDrone::get_fJe(vpMatrix &)
 {
@@ -216,13 +212,7 @@ void vpRobotArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector 
   const auto body = m_state->grabber.getLink().body();
   if (!body)
     throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
-  const vpHomogeneousMatrix wMb = body->wMb.toVisp();
-  const vpThetaUVector turn(wMb.getRotationMatrix());
-  q.resize(6, false);
-  for (unsigned i = 0; i < 3; ++i) {
-    q[i] = wMb[i][3];
-    q[i + 3] = turn[i];
-  }
+  q = bole::motionBetween({}, body->wMb);
 }
 
 void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVector &q)
@@ -231,12 +221,8 @@ void vpRobotArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVec
   if (!body)
     throw vpRobotException(vpRobotException::communicationError, "no navdata for a second");
   const std::lock_guard<std::mutex> lock(m_state->mutex);
-  const bole::Vector6d moved =
-      m_state->last_position ? body->wMb.minus(*m_state->last_position) : bole::Vector6d::Zero().eval();
+  q = bole::motionBetween(m_state->last_position.value_or(body->wMb), body->wMb);
   m_state->last_position = body->wMb;
-  q.resize(6, false);
-  for (unsigned i = 0; i < 6; ++i)
-    q[i] = moved[i];
 }
 
 void vpRobotArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)

@@ -24,4 +24,20 @@ Eigen::Vector4d bodyVelocity(vpRobot::vpControlFrameType frame, const vpColVecto
     body = vpVelocityTwistMatrix(bMc) * body;
   return {body[0], body[1], body[2], body[5]};
 }
+
+vpMatrix quadrotorJacobian()
+{
+  vpMatrix jacobian(6, 4);
+  jacobian[0][0] = jacobian[1][1] = jacobian[2][2] = jacobian[5][3] = 1;
+  return jacobian;
+}
+
+vpColVector motionBetween(const Pose &from, const Pose &to)
+{
+  const Vector6d moved = to.minus(from);
+  vpColVector q(6);
+  for (unsigned i = 0; i < 6; ++i)
+    q[i] = moved[i];
+  return q;
+}
 } // namespace bole

@@ -3,7 +3,7 @@
 /// \file
 /// A velocity as ViSP's robots take it, brought to the four numbers that a quadrotor obeys.
 
-#include <Eigen/Core>
+#include <bole/pose.h>
 
 #include <visp3/core/vpHomogeneousMatrix.h>
 #include <visp3/robot/vpRobot.h>
@@ -18,4 +18,9 @@ namespace bole
 /// \throw vpRobotException on another length than 6, another frame, or numbers that are not finite.
 Eigen::Vector4d bodyVelocity(vpRobot::vpControlFrameType frame, const vpColVector &velocity,
                              const vpHomogeneousMatrix &bMc, double translation_max, double rotation_max);
+
+/// vpRobot::get_eJe() of a quadrotor, 6x4: its columns are vx, vy, vz and wz.
+vpMatrix quadrotorJacobian();
+/// From \p from to \p to as vpRobot tells it: translation and theta u in the frame of \p from.
+vpColVector motionBetween(const Pose &from, const Pose &to);
 } // namespace bole

@@ -4,7 +4,6 @@
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
 #include "lab/simulation/h264_link.h"
-#include <bole/open_source.h>
 
 #include <algorithm>
 #include <cmath>
@@ -128,18 +127,13 @@ struct vpSimulatorArDrone::State
   }
 };
 
-vpSimulatorArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) { renderer.samples_per_pixel = 3; }
+vpSimulatorArDrone::Options::Options() { renderer.samples_per_pixel = 3; }
 
 void vpSimulatorArDrone::Options::setSeed(std::uint64_t seed) { body.seed = sensors.seed = renderer.noise_seed = seed; }
 
 void vpSimulatorArDrone::Options::validate() const
 {
-  bole::requireRange("hover_after_s", hover_after_s, 0.05, 2);
-  bole::requireRange("land_after_s", land_after_s, hover_after_s, 60);
-  bole::requireRange("gain", gain, 1e-3, 2);
-  bole::requireRange("largest_share", largest_share, 1e-3, 1);
-  bole::requireRange("largest_climb", largest_climb, 1e-3, 5);
-  bole::requireRange("largest_turn", largest_turn, 1e-3, 7);
+  vpRobotArDrone::Options::validate();
   bole::requireRange("rate_hz", rate_hz, 1, 60);
   bole::requireRange("exposure_s", exposure_s, 0, 0.1);
   bole::requireRange("video_delay_s", video_delay_s, 0, 1);
@@ -209,11 +203,7 @@ void vpSimulatorArDrone::setVelocity(const vpRobot::vpControlFrameType frame, co
 
 vpSimulatorArDrone::Watchdog vpSimulatorArDrone::watchdog() const { return m_state->watchdog; }
 
-void vpSimulatorArDrone::get_eJe(vpMatrix &jacobian)
-{
-  jacobian.resize(6, 4, true);
-  jacobian[0][0] = jacobian[1][1] = jacobian[2][2] = jacobian[5][3] = 1;
-}
+void vpSimulatorArDrone::get_eJe(vpMatrix &jacobian) { jacobian = bole::quadrotorJacobian(); }
 
 void vpSimulatorArDrone::get_fJe(vpMatrix &)
 {
@@ -222,23 +212,14 @@ void vpSimulatorArDrone::get_fJe(vpMatrix &)
 
 void vpSimulatorArDrone::getPosition(const vpRobot::vpControlFrameType, vpColVector &q)
 {
-  const vpHomogeneousMatrix wMb = m_state->position().toVisp();
-  const vpThetaUVector turn(wMb.getRotationMatrix());
-  q.resize(6, false);
-  for (unsigned i = 0; i < 3; ++i) {
-    q[i] = wMb[i][3];
-    q[i + 3] = turn[i];
-  }
+  q = bole::motionBetween({}, m_state->position());
 }
 
 void vpSimulatorArDrone::getDisplacement(const vpRobot::vpControlFrameType, vpColVector &q)
 {
   const bole::Pose now = m_state->position();
-  const bole::Vector6d moved = m_state->displaced ? now.minus(*m_state->displaced) : bole::Vector6d::Zero().eval();
+  q = bole::motionBetween(m_state->displaced.value_or(now), now);
   m_state->displaced = now;
-  q.resize(6, false);
-  for (unsigned i = 0; i < 6; ++i)
-    q[i] = moved[i];
 }
 
 void vpSimulatorArDrone::setPosition(const vpRobot::vpControlFrameType, const vpColVector &)

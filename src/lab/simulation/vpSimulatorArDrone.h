@@ -7,9 +7,9 @@
 #include "lab/simulation/forest_renderer.h"
 #include "lab/simulation/quadrotor.h"
 #include <bole/frame.h>
+#include <bole/vpRobotArDrone.h>
 
 #include <memory>
-#include <visp3/robot/vpRobot.h>
 
 /// Takes the calls of vpRobotArDrone and moves a simulated drone; its camera, gyro and pose filter are a
 /// bole::FrameSource. A loop written against one flies the other.
@@ -32,20 +32,10 @@
 class vpSimulatorArDrone : public vpRobot, public bole::FrameSource
 {
 public:
-  enum class Permission
+  using Permission = vpRobotArDrone::Permission;
+  using Watchdog = vpRobotArDrone::Watchdog;
+  struct Options : vpRobotArDrone::Options
   {
-    none,
-    fly
-  };
-  struct Options
-  {
-    double hover_after_s = 0.5;                      ///< as vpRobotArDrone::Options: [s], (0.05, 2)
-    double land_after_s = 3;                         ///< [s], (0.1, 60), more than hover_after_s
-    double gain = 0.3;                               ///< share of the largest tilt per m/s, (0, 2)
-    double largest_share = 0.5;                      ///< (0, 1]
-    double largest_climb = 0.7;                      ///< [m/s], (0, 5)
-    double largest_turn = 1.74;                      ///< [rad/s], (0, 7)
-    vpHomogeneousMatrix bMc;                         ///< camera in the body; default: looks ahead at the body's origin
     Eigen::Vector2d start = Eigen::Vector2d::Zero(); ///< where it stands [m]
     double heading = 0;                              ///< [rad]
     double rate_hz = 10;                             ///< of the camera, 1 to 60
@@ -74,13 +64,6 @@ public:
   void emergency(); ///< motors off: the simulated drone stands on the ground at once
   void trim();
   void setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v) override;
-  enum class Watchdog
-  {
-    idle,
-    content,
-    hovers,
-    lands
-  };
   Watchdog watchdog() const;
   void init() override {}
   void get_eJe(vpMatrix &jacobian) override;                                          ///< 6x4: columns vx, vy, vz, wz
