@@ -4,6 +4,7 @@
 #include "data_files.h"
 #include "interrupt.h"
 
+#include "lab/simulation/words.h"
 #include "lab/trials/accuracy_trial.h"
 #include "lab/trials/median_interval.h"
 #include "output/atomic_file.h"
@@ -28,8 +29,10 @@ struct BenchmarkArguments
   int seeds = 5, frames = 120, samples = 4;
   std::uint64_t first_seed = 101;
   std::vector<double> densities{0.04, 0.08};
-  std::vector<std::string> lights{"sun", "overcast"};
-  std::string path = "forward", bark = "mixed", folder, config;
+  std::vector<Light> lights{Light::sun, Light::overcast};
+  PathKind path = PathKind::forward;
+  Bark bark = Bark::mixed;
+  std::string folder, config;
   std::vector<std::string> settings;
   double h264_kbps = 0;
 };
@@ -38,7 +41,7 @@ struct BenchmarkFlight
 {
   std::uint64_t seed;
   double density;
-  std::string light;
+  Light light;
   AccuracyTrialResult result;
 };
 
@@ -78,14 +81,14 @@ std::string titleOf(const Measure &measure)
 }
 double factorOf(const Measure &measure) { return *measure.unit == '%' ? 100 : 1; }
 
-SceneOptions sceneOf(const BenchmarkArguments &arguments, std::uint64_t seed, double density, const std::string &light)
+SceneOptions sceneOf(const BenchmarkArguments &arguments, std::uint64_t seed, double density, Light light)
 {
   SceneOptions scene;
   scene.setSeed(seed);
   scene.forest.density = density;
-  scene.forest.light = light == "sun" ? Light::sun : Light::overcast;
-  scene.forest.bark = arguments.bark == "dark" ? Bark::dark : arguments.bark == "bright" ? Bark::bright : Bark::mixed;
-  scene.flight.kind = pathKindFromString(arguments.path);
+  scene.forest.light = light;
+  scene.forest.bark = arguments.bark;
+  scene.flight.kind = arguments.path;
   scene.renderer.samples_per_pixel = arguments.samples;
   scene.h264_kbps = arguments.h264_kbps;
   scene.validate();
@@ -99,8 +102,8 @@ std::string csvOf(const std::vector<BenchmarkFlight> &flights)
     text += fmt::format(",{}", titleOf(measure));
   for (const BenchmarkFlight &flight : flights) {
     const TrunkMetrics &trunks = flight.result.trunks;
-    text += fmt::format("\n{},{},{},{},{},{},{}", flight.seed, flight.density, flight.light, trunks.all.expected,
-                        trunks.all.found, trunks.confirmed, trunks.matches.size());
+    text += fmt::format("\n{},{},{},{},{},{},{}", flight.seed, flight.density, wordOf(flight.light),
+                        trunks.all.expected, trunks.all.found, trunks.confirmed, trunks.matches.size());
     for (const Measure &measure : measures()) {
       const double value = factorOf(measure) * measure.of(flight.result);
       text += std::isnan(value) ? "," : fmt::format(",{:.5g}", value);
@@ -150,8 +153,9 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Benchm
 
 void report(const BenchmarkArguments &arguments, const std::vector<BenchmarkFlight> &flights)
 {
-  nlohmann::json json{{"version", BOLE_VERSION}, {"frames", arguments.frames}, {"samples", arguments.samples},
-                      {"path", arguments.path},  {"bark", arguments.bark},     {"first_seed", arguments.first_seed}};
+  nlohmann::json json{{"version", BOLE_VERSION},        {"frames", arguments.frames},
+                      {"samples", arguments.samples},   {"path", wordOf(arguments.path)},
+                      {"bark", wordOf(arguments.bark)}, {"first_seed", arguments.first_seed}};
   const auto group = [&](const std::string &name, const auto &belongs) {
     std::vector<const BenchmarkFlight *> members;
     for (const BenchmarkFlight &flight : flights)
@@ -165,8 +169,8 @@ void report(const BenchmarkArguments &arguments, const std::vector<BenchmarkFlig
       group(fmt::format("{} trunks a m^2", density),
             [density](const BenchmarkFlight &f) { return f.density == density; });
   if (arguments.lights.size() > 1)
-    for (const std::string &light : arguments.lights)
-      group(light, [&light](const BenchmarkFlight &f) { return f.light == light; });
+    for (const Light light : arguments.lights)
+      group(wordOf(light), [light](const BenchmarkFlight &f) { return f.light == light; });
   group("all", [](const BenchmarkFlight &) { return true; });
   if (arguments.folder.empty())
     return;
@@ -181,7 +185,7 @@ void run(const BenchmarkArguments &arguments)
     readConfig(findPreset(arguments.config), options);
   setOptions(arguments.settings, options);
   for (const double density : arguments.densities) // before any work
-    sceneOf(arguments, arguments.first_seed, density, "sun");
+    sceneOf(arguments, arguments.first_seed, density, Light::sun);
   if (!arguments.folder.empty()) {
     std::error_code error;
     std::filesystem::create_directories(arguments.folder, error);
@@ -197,7 +201,7 @@ void run(const BenchmarkArguments &arguments)
   std::size_t confirmed = 0;
   for (int k = 0; k < arguments.seeds; ++k)
     for (const double density : arguments.densities)
-      for (const std::string &light : arguments.lights) {
+      for (const Light light : arguments.lights) {
         const std::uint64_t seed = arguments.first_seed + static_cast<std::uint64_t>(k);
         BenchmarkFlight flight{seed, density, light, {}};
         flight.result =
@@ -230,13 +234,11 @@ void addBenchmark(CLI::App &app)
   command->add_option("--first-seed", arguments->first_seed, "The others follow it")->capture_default_str();
   command->add_option("--density", arguments->densities, "Trunks a square metre, one or more (default 0.04 0.08)");
   command->add_option("--light", arguments->lights, "sun, overcast or both (default)")
-      ->check(CLI::IsMember({"sun", "overcast"}));
-  command->add_option("--bark", arguments->bark, "dark, bright or mixed")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"dark", "bright", "mixed"}));
-  command->add_option("--path", arguments->path, "forward, lateral, loop or slalom")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"forward", "lateral", "loop", "slalom"}));
+      ->transform(CLI::CheckedTransformer(wordsOf(Light())));
+  command->add_option("--bark", arguments->bark, "dark, bright or mixed (default)")
+      ->transform(CLI::CheckedTransformer(wordsOf(Bark())));
+  command->add_option("--path", arguments->path, "forward (default), lateral, loop or slalom")
+      ->transform(CLI::CheckedTransformer(wordsOf(PathKind())));
   command->add_option("--frames", arguments->frames, "Of a flight")
       ->capture_default_str()
       ->check(CLI::Range(20, 100000));

@@ -3,9 +3,9 @@
 #include "commands.h"
 
 #include "lab/simulation/simulated_flight.h"
+#include "lab/simulation/words.h"
 
 #include <fmt/format.h>
-#include <map>
 #include <memory>
 
 namespace bole::apps
@@ -25,18 +25,15 @@ struct SimulateArguments
 void run(const CLI::App &command, const SimulateArguments &arguments)
 {
   SceneOptions scene = arguments.scene_file.empty() ? SceneOptions() : readScene(arguments.scene_file);
-  if (arguments.scene_file.empty() && command.count("--samples") == 0) {
+  if (arguments.scene_file.empty() && command.count("--samples") == 0)
     scene.renderer.samples_per_pixel = 8;
-  }
   const SceneOptions &given = arguments.scene;
   const auto take = [&command](const char *name, auto &field, const auto &value) {
-    if (command.count(name) > 0) {
+    if (command.count(name) > 0)
       field = value;
-    }
   };
-  if (command.count("--seed") > 0) {
+  if (command.count("--seed") > 0)
     scene.setSeed(arguments.seed);
-  }
   take("--density", scene.forest.density, given.forest.density);
   take("--light", scene.forest.light, given.forest.light);
   take("--bark", scene.forest.bark, given.forest.bark);
@@ -56,9 +53,8 @@ void run(const CLI::App &command, const SimulateArguments &arguments)
   }
   const int frames = arguments.record.frames;
   recordFlight(scene, arguments.record, [&](int done) {
-    if (!arguments.quiet && (done % 10 == 0 || done == frames)) {
+    if (!arguments.quiet && (done % 10 == 0 || done == frames))
       fmt::print(stderr, "\rframe {} of {}{}", done, frames, done == frames ? "\n" : "");
-    }
   });
   fmt::print("{}\n", arguments.record.folder);
 }
@@ -69,23 +65,17 @@ void addSimulate(CLI::App &app)
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App *command =
       app.add_subcommand("simulate", "Render a flight through a forest, with its truth, as an ASL folder");
-  const std::map<std::string, Light> lights{{"sun", Light::sun}, {"overcast", Light::overcast}};
-  const std::map<std::string, Bark> barks{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}};
-  const std::map<std::string, PathKind> paths{{"forward", PathKind::forward},
-                                              {"lateral", PathKind::lateral},
-                                              {"loop", PathKind::loop},
-                                              {"slalom", PathKind::slalom}};
   SceneOptions &scene = arguments->scene;
   command->add_option("-o,--output", arguments->record.folder, "Folder to write")->required();
   command->add_option("--scene", arguments->scene_file, "Scene file (YAML); the options below go on top of it");
   command->add_option("--seed", arguments->seed, "Same seed, same bytes (default 1)");
   command->add_option("--density", scene.forest.density, "Trunks a square metre (default 0.06)");
   command->add_option("--light", scene.forest.light, "sun or overcast (default)")
-      ->transform(CLI::CheckedTransformer(lights));
+      ->transform(CLI::CheckedTransformer(wordsOf(Light())));
   command->add_option("--bark", scene.forest.bark, "dark (default), bright or mixed")
-      ->transform(CLI::CheckedTransformer(barks));
+      ->transform(CLI::CheckedTransformer(wordsOf(Bark())));
   command->add_option("--path", scene.flight.kind, "forward (default), lateral, loop or slalom")
-      ->transform(CLI::CheckedTransformer(paths));
+      ->transform(CLI::CheckedTransformer(wordsOf(PathKind())));
   command->add_option("--frames", arguments->record.frames, "Number of frames (default 120)");
   command->add_option("--speed", scene.flight.speed, "[m/s] (default 1)");
   command->add_option("--flight-height", scene.flight.height, "Over the ground at the start [m] (default 1.2)");

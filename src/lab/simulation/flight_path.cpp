@@ -11,8 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -20,31 +18,6 @@ namespace
 {
 constexpr double kTwoPi = 2 * M_PI;
 } // namespace
-
-const char *toString(PathKind kind)
-{
-  switch (kind) {
-  case PathKind::forward:
-    return "forward";
-  case PathKind::lateral:
-    return "lateral";
-  case PathKind::loop:
-    return "loop";
-  case PathKind::slalom:
-    return "slalom";
-  }
-  return "forward";
-}
-
-PathKind pathKindFromString(const std::string &word)
-{
-  for (PathKind kind : {PathKind::forward, PathKind::lateral, PathKind::loop, PathKind::slalom}) {
-    if (word == toString(kind)) {
-      return kind;
-    }
-  }
-  throw vpException(vpException::badValue, fmt::format("path = {}, must be forward, lateral, loop or slalom", word));
-}
 
 void FlightOptions::validate() const
 {
@@ -58,9 +31,8 @@ FlightPath::FlightPath(const FlightOptions &options) : m_options(options)
 {
   options.validate();
   Random random(options.seed, 301);
-  for (double &phase : m_phase) {
+  for (double &phase : m_phase)
     phase = random.uniform(0, kTwoPi);
-  }
   switch (options.kind) {
   case PathKind::forward:
     m_swing = random.uniform(0.9, 1.3);
@@ -126,8 +98,7 @@ Eigen::Vector3d FlightPath::acceleration(double t) const
 
 Pose FlightPath::bodyPose(double t) const
 {
-  // Thrust is along z of the body, so z points along acceleration minus gravity; x towards the
-  // heading.
+  // Thrust is along z of the body, so z points along acceleration minus gravity; x towards the heading.
   const Eigen::Vector3d up = (acceleration(t) + Eigen::Vector3d(0, 0, kGravity)).normalized();
   const double yaw = heading(t);
   const Eigen::Vector3d left = up.cross(Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0)).normalized();
@@ -149,18 +120,16 @@ std::vector<Eigen::Vector3d> FlightPath::waypoints() const
 {
   const double step = 0.05 / std::max(0.2, m_options.speed);
   std::vector<Eigen::Vector3d> points;
-  for (double t = 0; t < m_options.duration + step; t += step) {
+  for (double t = 0; t < m_options.duration + step; t += step)
     points.push_back(position(std::min(t, m_options.duration)));
-  }
   return points;
 }
 
 std::vector<SimulatedTrunk> FlightPath::gates() const
 {
   std::vector<SimulatedTrunk> trunks;
-  if (m_options.kind != PathKind::slalom) {
+  if (m_options.kind != PathKind::slalom)
     return trunks;
-  }
   Random random(m_options.seed, 302);
   const double length = m_options.speed * m_options.duration + 6;
   for (double x = 0.25 * m_wave_length, side = 1; x < length; x += 0.5 * m_wave_length, side = -side) {

@@ -18,9 +18,6 @@ enum class PathKind
   loop,    ///< a circle that closes, heading along it
   slalom   ///< round gate trunks left and right, heading along the path
 };
-const char *toString(PathKind kind);
-/// Throws vpException for another word.
-PathKind pathKindFromString(const std::string &word);
 
 struct FlightOptions
 {

@@ -34,9 +34,8 @@ enum Stream : std::uint64_t
 double distanceToPath(const Eigen::Vector2d &p, const std::vector<Eigen::Vector3d> &path)
 {
   double best = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector3d &q : path) {
+  for (const Eigen::Vector3d &q : path)
     best = std::min(best, (q.head<2>() - p).squaredNorm());
-  }
   return std::sqrt(best);
 }
 
@@ -65,8 +64,7 @@ bool isFree(const Eigen::Vector2d &p, const std::vector<SimulatedTrunk> &trunks,
   });
 }
 
-/// Darts thrown at the rectangle \p low, \p high until \p count trunks stand, or there is no more
-/// room.
+/// Darts thrown at the rectangle \p low, \p high until \p count trunks stand, or there is no more room.
 template <class Accept>
 void throwTrunks(Forest &forest, std::vector<SimulatedTrunk> &trunks, std::uint64_t stream, int first_id, double count,
                  const Eigen::Vector2d &low, const Eigen::Vector2d &high, const Accept &accept)
@@ -76,9 +74,8 @@ void throwTrunks(Forest &forest, std::vector<SimulatedTrunk> &trunks, std::uint6
   for (std::size_t attempt = 0; attempt < 30 * wanted && trunks.size() < wanted; ++attempt) {
     SimulatedTrunk trunk = grow(random, forest.options);
     const double x = random.uniform(low.x(), high.x()), y = random.uniform(low.y(), high.y());
-    if (!accept(Eigen::Vector2d(x, y), trunk) || !isFree({x, y}, trunks, kSpacing + trunk.radius)) {
+    if (!accept(Eigen::Vector2d(x, y), trunk) || !isFree({x, y}, trunks, kSpacing + trunk.radius))
       continue;
-    }
     trunk.id = first_id + static_cast<int>(trunks.size());
     trunk.foot = {x, y, forest.terrain.height(x, y)};
     trunks.push_back(trunk);
@@ -95,9 +92,8 @@ void plantUndergrowth(Forest &forest, const std::vector<Eigen::Vector3d> &path)
     const double y = random.uniform(forest.near_min.y(), forest.near_max.y());
     const double radius = random.uniform(0.25, 0.75), height = random.uniform(0.25, 0.8);
     const double shade = random.uniform(0.6, 1.4);
-    if (distanceToPath({x, y}, path) > radius + 0.5) {
+    if (distanceToPath({x, y}, path) > radius + 0.5)
       forest.bushes.push_back({{x, y, forest.terrain.height(x, y)}, radius, height, shade});
-    }
   }
   Random stems(options.seed, kSaplings);
   for (int k = static_cast<int>(options.saplings * size.prod()); k > 0; --k) {
@@ -105,9 +101,8 @@ void plantUndergrowth(Forest &forest, const std::vector<Eigen::Vector3d> &path)
     const double y = stems.uniform(forest.near_min.y(), forest.near_max.y());
     const Eigen::Vector2d lean(0.12 * stems.normal(), 0.12 * stems.normal());
     const double radius = stems.uniform(0.01, 0.025), height = stems.uniform(0.8, 3);
-    if (distanceToPath({x, y}, path) > 0.8) {
+    if (distanceToPath({x, y}, path) > 0.8)
       forest.saplings.push_back({{x, y, forest.terrain.height(x, y)}, lean, radius, height});
-    }
   }
 }
 
@@ -119,10 +114,6 @@ void placeSun(Forest &forest)
                    std::sin(elevation)};
 }
 } // namespace
-
-const char *toString(Light light) { return light == Light::sun ? "sun" : "overcast"; }
-
-const char *toString(Bark bark) { return bark == Bark::dark ? "dark" : bark == Bark::bright ? "bright" : "mixed"; }
 
 void ForestOptions::validate() const
 {
@@ -179,9 +170,8 @@ Terrain::Terrain(std::uint64_t seed, double amplitude)
 double Terrain::height(double x, double y) const
 {
   double z = -m_offset;
-  for (const Wave &wave : m_waves) {
+  for (const Wave &wave : m_waves)
     z += wave.amplitude * std::sin(wave.kx * x + wave.ky * y + wave.phase);
-  }
   return z;
 }
 
@@ -189,9 +179,8 @@ Forest Forest::plant(const ForestOptions &options, const std::vector<Eigen::Vect
                      const std::vector<SimulatedTrunk> &wanted)
 {
   options.validate();
-  if (path.empty()) {
+  if (path.empty())
     throw vpException(vpException::badValue, "path = (no points), must be at least one point");
-  }
   Forest forest;
   forest.options = options;
   forest.terrain = Terrain(options.seed, options.ground_amplitude);

@@ -23,8 +23,6 @@ enum class Bark
   bright,
   mixed
 };
-const char *toString(Light light);
-const char *toString(Bark bark);
 
 /// Lengths in metres.
 struct ForestOptions
@@ -67,8 +65,7 @@ struct SimulatedTrunk
   /// Point of the axis \p h above the foot, world.
   Eigen::Vector3d axisAt(double h) const;
   double radiusAt(double h) const;
-  /// The cylinder that fits best where a drone looks: axis and radius between 0.6 and 2 m above the
-  /// foot.
+  /// The cylinder that fits best where a drone looks: axis and radius between 0.6 and 2 m above the foot.
   Trunk cylinder() const;
 };
 
@@ -102,8 +99,7 @@ private:
   double m_offset = 0;
 };
 
-/// Trunks near the path (with truth), trunks far away (scenery, positions only), undergrowth,
-/// ground, sun.
+/// Trunks near the path (with truth), trunks far away (scenery, positions only), undergrowth, ground, sun.
 struct Forest
 {
   ForestOptions options;
@@ -115,13 +111,11 @@ struct Forest
   Eigen::Vector3d to_sun = Eigen::Vector3d::UnitZ(); ///< unit vector, world
   Eigen::Vector2d near_min, near_max;                ///< rectangle of the trunks with truth
 
-  /// Plants a forest round \p path (points in the world; nothing grows within the clearance of
-  /// them). \p wanted trunks are planted first, as they are, with a new id and the foot put on the
-  /// ground.
+  /// Plants a forest round \p path (points in the world; nothing grows within the clearance of them). \p wanted trunks
+  /// are planted first, as they are, with a new id and the foot put on the ground.
   static Forest plant(const ForestOptions &options, const std::vector<Eigen::Vector3d> &path,
                       const std::vector<SimulatedTrunk> &wanted = {});
-  /// Distance from \p point to the nearest bark of a trunk at its height, negative inside; +inf
-  /// without trunks.
+  /// Distance from \p point to the nearest bark of a trunk at its height, negative inside; +inf without trunks.
   double distanceToBark(const Eigen::Vector3d &point) const;
 };
 } // namespace bole

@@ -2,33 +2,20 @@
 #include "lab/simulation/simulated_flight.h"
 
 #include "input/yaml_file.h"
+#include "lab/simulation/words.h"
+
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <set>
+#include <type_traits>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-const char *distortionName(Distortion distortion)
-{
-  switch (distortion) {
-  case Distortion::none:
-    return "none";
-  case Distortion::radial_tangential:
-    return "radial-tangential";
-  case Distortion::equidistant:
-    return "equidistant";
-  case Distortion::fov:
-    return "fov";
-  }
-  return "none";
-}
-
-/// Names every field of a scene to \p visit(section, key, field), for the reader and the writer
-/// alike.
+/// Names every field of a scene to \p visit(section, key, field), for the reader and the writer alike.
 template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit)
 {
   auto &forest = scene.forest;
@@ -109,29 +96,25 @@ public:
   Section(const std::string &file, const YAML::Node &node, const std::string &name)
       : m_file(file), m_node(node), m_name(name)
   {
-    if (node && !node.IsMap()) {
+    if (node && !node.IsMap())
       fail(node, name, "a mapping of keys to values");
-    }
   }
   template <class T> void read(const char *key, T &field)
   {
     m_known.insert(key);
     const YAML::Node node = m_node ? m_node[key] : YAML::Node(YAML::NodeType::Undefined);
-    if (node) {
+    if (node)
       assign(node, key, field);
-    }
   }
   void finish() const
   {
     std::set<std::string> seen;
     for (const auto &entry : m_node) {
       const std::string key = entry.first.as<std::string>();
-      if (!m_known.count(key)) {
+      if (!m_known.count(key))
         fail(entry.first, key, fmt::format("a key of the section {}", m_name));
-      }
-      if (!seen.insert(key).second) {
+      if (!seen.insert(key).second)
         fail(entry.first, key, "given once");
-      }
     }
   }
   [[noreturn]] void fail(const YAML::Node &node, const std::string &key, const std::string &wanted) const
@@ -145,17 +128,15 @@ private:
   template <class T> void number(const YAML::Node &node, const char *key, T &field, const char *wanted) const
   {
     T value{};
-    if (!node.IsScalar() || !YAML::convert<T>::decode(node, value)) {
+    if (!node.IsScalar() || !YAML::convert<T>::decode(node, value))
       fail(node, key, wanted);
-    }
     field = value;
   }
   void assign(const YAML::Node &node, const char *key, double &field) const
   {
     number(node, key, field, "a number");
-    if (!std::isfinite(field)) {
+    if (!std::isfinite(field))
       fail(node, key, "a finite number");
-    }
   }
   void assign(const YAML::Node &node, const char *key, int &field) const { number(node, key, field, "a whole number"); }
   void assign(const YAML::Node &node, const char *key, std::uint64_t &field) const
@@ -165,50 +146,23 @@ private:
   void assign(const YAML::Node &node, const char *key, bool &field) const { number(node, key, field, "true or false"); }
   void assign(const YAML::Node &node, const char *key, std::array<double, 4> &field) const
   {
-    if (!node.IsSequence() || node.size() != 4) {
+    if (!node.IsSequence() || node.size() != 4)
       fail(node, key, "a list of four numbers");
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t k = 0; k < 4; ++k)
       assign(node[k], key, field[k]);
-    }
   }
-  template <class T, std::size_t N>
-  void oneOf(const YAML::Node &node, const char *key, T &field,
-             const std::array<std::pair<const char *, T>, N> &words) const
+  template <class T, class = std::enable_if_t<std::is_enum_v<T>>>
+  void assign(const YAML::Node &node, const char *key, T &field) const
   {
     std::string wanted;
-    for (const auto &[word, value] : words) {
+    for (const auto &[word, value] : wordsOf(field)) {
       if (node.IsScalar() && node.Scalar() == word) {
         field = value;
         return;
       }
-      wanted += (wanted.empty() ? "" : ", ") + std::string(word);
+      wanted += (wanted.empty() ? "" : ", ") + word;
     }
     fail(node, key, "one of " + wanted);
-  }
-  void assign(const YAML::Node &node, const char *key, Light &field) const
-  {
-    oneOf<Light, 2>(node, key, field, {{{"sun", Light::sun}, {"overcast", Light::overcast}}});
-  }
-  void assign(const YAML::Node &node, const char *key, Bark &field) const
-  {
-    oneOf<Bark, 3>(node, key, field, {{{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}}});
-  }
-  void assign(const YAML::Node &node, const char *key, PathKind &field) const
-  {
-    oneOf<PathKind, 4>(node, key, field,
-                       {{{"forward", PathKind::forward},
-                         {"lateral", PathKind::lateral},
-                         {"loop", PathKind::loop},
-                         {"slalom", PathKind::slalom}}});
-  }
-  void assign(const YAML::Node &node, const char *key, Distortion &field) const
-  {
-    oneOf<Distortion, 4>(node, key, field,
-                         {{{"none", Distortion::none},
-                           {"radial-tangential", Distortion::radial_tangential},
-                           {"equidistant", Distortion::equidistant},
-                           {"fov", Distortion::fov}}});
   }
 
   std::string m_file;
@@ -217,14 +171,13 @@ private:
   std::set<std::string> m_known;
 };
 
-std::string text(double value) { return fmt::format("{}", value); }
-std::string text(int value) { return fmt::format("{}", value); }
-std::string text(std::uint64_t value) { return fmt::format("{}", value); }
-std::string text(bool value) { return value ? "true" : "false"; }
-std::string text(Light value) { return toString(value); }
-std::string text(Bark value) { return toString(value); }
-std::string text(PathKind value) { return toString(value); }
-std::string text(Distortion value) { return distortionName(value); }
+template <class T> std::string text(const T &value)
+{
+  if constexpr (std::is_enum_v<T>)
+    return wordOf(value);
+  else
+    return fmt::format("{}", value);
+}
 std::string text(const std::array<double, 4> &value)
 {
   return fmt::format("[{}, {}, {}, {}]", value[0], value[1], value[2], value[3]);
@@ -232,17 +185,15 @@ std::string text(const std::array<double, 4> &value)
 
 void readTrunks(const std::string &path, const YAML::Node &node, std::vector<SimulatedTrunk> &trunks)
 {
-  if (node && !node.IsSequence()) {
+  if (node && !node.IsSequence())
     Section(path, {}, "trunks").fail(node, "trunks", "a list");
-  }
   for (const YAML::Node &entry : node) {
     Section section(path, entry, "trunks");
     SimulatedTrunk trunk;
     visitTrunk(trunk, [&](const char *, const char *key, auto &field) { section.read(key, field); });
     section.finish();
-    if (!(trunk.radius >= 0.01 && trunk.radius <= 2) || !(trunk.height >= 1 && trunk.height <= 100)) {
+    if (!(trunk.radius >= 0.01 && trunk.radius <= 2) || !(trunk.height >= 1 && trunk.height <= 100))
       section.fail(entry, "trunk", "of a radius of 0.01 to 2 and a height of 1 to 100");
-    }
     trunks.push_back(trunk);
   }
 }
@@ -252,9 +203,8 @@ SceneOptions readScene(const std::string &path)
 {
   const YAML::Node root = loadYaml(path);
   SceneOptions scene;
-  if (!root.IsMap()) {
+  if (!root.IsMap())
     throw vpException(vpException::badValue, fmt::format("{}:1: a scene must be a mapping of sections", path));
-  }
   const char *names[] = {"forest", "flight", "camera", "sensors"};
   Section top(path, root, "scene");
   YAML::Node trunks;
@@ -264,14 +214,12 @@ SceneOptions readScene(const std::string &path)
       readTrunks(path, entry.second, scene.trunks);
       continue;
     }
-    if (std::find(std::begin(names), std::end(names), name) == std::end(names)) {
+    if (std::find(std::begin(names), std::end(names), name) == std::end(names))
       top.fail(entry.first, name, "one of the sections forest, flight, camera, sensors, trunks");
-    }
     Section section(path, entry.second, name);
     visitFields(scene, [&](const char *of, const char *key, auto &field) {
-      if (name == of) {
+      if (name == of)
         section.read(key, field);
-      }
     });
     section.finish();
   }
@@ -294,9 +242,8 @@ std::string sceneText(const SceneOptions &scene)
     }
     out += fmt::format("  {}: {}\n", key, text(field));
   });
-  if (!scene.trunks.empty()) {
+  if (!scene.trunks.empty())
     out += "trunks:\n";
-  }
   for (const SimulatedTrunk &trunk : scene.trunks) {
     std::string line;
     visitTrunk(trunk, [&](const char *, const char *key, const auto &field) {
