@@ -3,6 +3,7 @@
 
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
+#include "geometry/require_range.h"
 #include "input/frame_health.h"
 #include "input/rectifier.h"
 
@@ -125,8 +126,7 @@ struct ArDroneSource::State
 void ArDroneSource::Options::validate() const
 {
   grabber.validate();
-  if (!(give_up_s > 0.5 && give_up_s < 86400))
-    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0.5, 86400) s", give_up_s);
+  requireRange("give_up_s", give_up_s, 0.5, 86400);
   if (max_width_px != 0 && max_width_px < 64)
     throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px", max_width_px);
 }

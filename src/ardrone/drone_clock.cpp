@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_clock.h"
+#include "geometry/require_range.h"
 
 #include <algorithm>
 #include <cstdlib>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -37,12 +37,9 @@ std::uint32_t navdataTimeWord(std::int64_t microseconds)
 
 void ClockFit::Options::validate() const
 {
-  if (!(drift > 1e-6 && drift < 1e-2))
-    throw vpException(vpException::badValue, "drift = %g, must be in (1e-6, 1e-2) s/s", drift);
-  if (!(jump_s > 0.1 && jump_s < 100))
-    throw vpException(vpException::badValue, "jump_s = %g, must be in (0.1, 100) s", jump_s);
-  if (!(settle_s >= 0 && settle_s <= 60))
-    throw vpException(vpException::badValue, "settle_s = %g, must be in [0, 60] s", settle_s);
+  requireRange("drift", drift, 1e-6, 1e-2);
+  requireRange("jump_s", jump_s, 0.1, 100);
+  requireRange("settle_s", settle_s, 0, 60);
 }
 
 ClockFit::ClockFit() : ClockFit(Options{}) {}

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_link.h"
+#include "geometry/require_range.h"
 
 #include "ardrone/receivers.h"
 #include "ardrone/video_stamps.h"
@@ -7,7 +8,6 @@
 #include <condition_variable>
 #include <fmt/format.h>
 #include <mutex>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -95,11 +95,11 @@ struct DroneLink::State
   void checkStamp(LiveFrame &frame, bool is_measured) const
   {
     constexpr double kLargestRatio = 1.4; // of the two clocks of one drone; bursts and stalls stay below
-    const auto video = video_rate.rate(), motion = navdata_rate.rate();
-    if (video && motion && *motion > 0 && (*video > kLargestRatio * *motion || *video * kLargestRatio < *motion)) {
+    const auto seen = video_rate.rate(), motion = navdata_rate.rate();
+    if (seen && motion && *motion > 0 && (*seen > kLargestRatio * *motion || *seen * kLargestRatio < *motion)) {
       frame.status = FrameStatus::doubtful;
       frame.message =
-          fmt::format("the video's clock runs {:.2g} times as fast as that of the navdata", *video / *motion);
+          fmt::format("the video's clock runs {:.2g} times as fast as that of the navdata", *seen / *motion);
     }
     else if (!is_measured) {
       frame.status = FrameStatus::doubtful;
@@ -110,15 +110,15 @@ struct DroneLink::State
   /// \return the state bits of a good packet.
   std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
   {
-    Navdata navdata;
-    const NavdataError error = parseNavdata(data, size, navdata);
+    Navdata packet;
+    const NavdataError error = parseNavdata(data, size, packet);
     const std::lock_guard<std::mutex> lock(mutex);
     if (error != NavdataError::none) {
       ++counters.navdata_refused;
       return std::nullopt;
     }
-    if (last_sequence && navdata.sequence <= *last_sequence) {
-      const bool restart = navdata.sequence == 1 || arrival_ns - last_navdata_ns > kSilence_ns;
+    if (last_sequence && packet.sequence <= *last_sequence) {
+      const bool restart = packet.sequence == 1 || arrival_ns - last_navdata_ns > kSilence_ns;
       if (!restart) {
         ++counters.navdata_late;
         return std::nullopt;
@@ -128,19 +128,19 @@ struct DroneLink::State
       navdata_clock.reset();
       odometry.restart();
     }
-    last_sequence = navdata.sequence;
+    last_sequence = packet.sequence;
     last_navdata_ns = arrival_ns;
     ++counters.navdata_packets;
-    if (navdata.demo) {
+    if (packet.demo) {
       // Demo packets have no time: then the arrival must do.
       const std::int64_t stamp_ns =
-          navdata.time ? navdata_time.unwrap(navdataTimeMicroseconds(*navdata.time)) * 1000 : arrival_ns;
+          packet.time ? navdata_time.unwrap(navdataTimeMicroseconds(*packet.time)) * 1000 : arrival_ns;
       navdata_rate.add(stamp_ns, arrival_ns);
       if (!navdata_clock.add(stamp_ns, arrival_ns))
         odometry.restart();
-      odometry.add(stamp_ns, navdata);
+      odometry.add(stamp_ns, packet);
     }
-    return navdata.state;
+    return packet.state;
   }
 
   // -- together, with the mutex held
@@ -190,14 +190,10 @@ struct DroneLink::State
 
 void LinkOptions::validate() const
 {
-  if (!(silence_s > 0.1 && silence_s < 30))
-    throw vpException(vpException::badValue, "silence_s = %g, must be in (0.1, 30) s", silence_s);
-  if (!(retry_s > 0.01 && retry_s < 5))
-    throw vpException(vpException::badValue, "retry_s = %g, must be in (0.01, 5) s", retry_s);
-  if (!(frozen_m > 0 && frozen_m < 10))
-    throw vpException(vpException::badValue, "frozen_m = %g, must be in (0, 10) m", frozen_m);
-  if (!(frozen_rad > 0 && frozen_rad < 3))
-    throw vpException(vpException::badValue, "frozen_rad = %g, must be in (0, 3) rad", frozen_rad);
+  requireRange("silence_s", silence_s, 0.1, 30);
+  requireRange("retry_s", retry_s, 0.01, 5);
+  requireRange("frozen_m", frozen_m, 1e-9, 10);
+  requireRange("frozen_rad", frozen_rad, 1e-9, 3);
 }
 
 DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options{}) {}

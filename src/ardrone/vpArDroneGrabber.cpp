@@ -3,6 +3,7 @@
 
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
+#include "geometry/require_range.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -10,10 +11,8 @@
 
 void vpArDroneGrabber::Options::validate() const
 {
-  if (!(open_timeout_s > 0.1 && open_timeout_s < 600))
-    throw vpException(vpException::badValue, "open_timeout_s = %g, must be in (0.1, 600) s", open_timeout_s);
-  if (!(frame_timeout_s > 0.02 && frame_timeout_s < 60))
-    throw vpException(vpException::badValue, "frame_timeout_s = %g, must be in (0.02, 60) s", frame_timeout_s);
+  bole::requireRange("open_timeout_s", open_timeout_s, 0.1, 600);
+  bole::requireRange("frame_timeout_s", frame_timeout_s, 0.02, 60);
   link.validate();
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/visibility.h"
 
+#include "geometry/silhouette.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -28,7 +30,7 @@ View viewOf(const TruthTrunk &trunk, const Pose &wMc, const PinholeCamera &camer
   view.bearing = std::atan2(to.y(), to.x());
   if (trunk.radius <= 0 || view.range <= trunk.radius)
     return view;
-  view.half_width = std::asin(trunk.radius / view.range);
+  view.half_width = silhouetteHalfWidth(trunk.radius, view.range);
   view.is_in_image = true;
   for (const double side : {-1.0, 1.0}) {
     const double angle = view.bearing + side * view.half_width;

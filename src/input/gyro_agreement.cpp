@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/gyro_agreement.h"
+#include "geometry/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,16 +25,14 @@ constexpr double kJump_rad = 0.03;     // more than the parallax of a flight amo
 constexpr double kJumpInSpreads = 8;
 constexpr double kLargestSpread_rad = 6e-3; // the images agreed with the gyro so far
 
-Eigen::Vector2d median(std::vector<Eigen::Vector2d> values)
+Eigen::Vector2d median(const std::vector<Eigen::Vector2d> &values)
 {
-  Eigen::Vector2d result;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  for (int axis : {0, 1}) {
-    std::nth_element(values.begin(), middle, values.end(),
-                     [axis](const auto &a, const auto &b) { return a[axis] < b[axis]; });
-    result[axis] = (*middle)[axis];
+  std::vector<double> x, y;
+  for (const Eigen::Vector2d &value : values) {
+    x.push_back(value.x());
+    y.push_back(value.y());
   }
-  return result;
+  return {medianOf(std::move(x)), medianOf(std::move(y))};
 }
 } // namespace
 
@@ -96,9 +95,8 @@ bool GyroAgreement::hasJumped() const
   std::vector<double> spread;
   for (const Eigen::Vector2d &difference : before)
     spread.push_back((difference - centre).norm());
-  std::nth_element(spread.begin(), spread.begin() + static_cast<std::ptrdiff_t>(spread.size() / 2), spread.end());
   const double off = (m_intervals.back().image - m_intervals.back().gyro - centre).norm();
-  const double usual = spread[spread.size() / 2];
+  const double usual = medianOf(std::move(spread));
   return m_intervals.back().is_sure && usual < kLargestSpread_rad && off > kJump_rad && off > kJumpInSpreads * usual;
 }
 

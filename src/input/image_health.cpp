@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/image_health.h"
+#include "geometry/median.h"
 #include "input/gyro_agreement.h"
 #include "input/image_measures.h"
 
@@ -34,12 +35,7 @@ constexpr double kFlipLeast = 0.6;      // correlation that it must reach
 constexpr int kLastsMost = 30;          // frames that blur and noise are refused before they count as usual
 constexpr int kJumpsMost = 5;           // frames out of order before the new place is believed
 
-double medianOf(const std::deque<double> &values)
-{
-  std::vector<double> sorted(values.begin(), values.end());
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  return sorted[sorted.size() / 2];
-}
+double middleOf(const std::deque<double> &values) { return medianOf({values.begin(), values.end()}); }
 
 void remember(std::deque<double> &values, double value)
 {
@@ -147,7 +143,7 @@ ImageFault ImageHealth::State::judgeQuality(const ImageNumbers &numbers)
     fault = say(ImageFault::smeared,
                 fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
   else if (noises.size() >= 2) {
-    const double usual = medianOf(noises) * numbers.deviation, usual_sharpness = medianOf(sharpnesses);
+    const double usual = middleOf(noises) * numbers.deviation, usual_sharpness = middleOf(sharpnesses);
     if (numbers.noise > kNoiseFactor * usual && numbers.noise > usual + kNoiseAdded)
       fault = say(ImageFault::noise, fmt::format("noise of {:.0f} grey levels after {:.0f}", numbers.noise, usual));
     else if (numbers.sharpness < kBlurFactor * usual_sharpness)

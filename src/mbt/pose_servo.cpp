@@ -2,6 +2,7 @@
 // The virtual visual servoing of PoseEstimator: from found places to a pose and its information.
 #include "mbt/pose_estimator.h"
 
+#include "geometry/median.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Dense>
@@ -66,9 +67,8 @@ void PoseEstimator::weigh(double focal_px)
   forEachPiece([&](const FoundPiece &piece, const ModelBorder &) { sizes.push_back(std::abs(piece.residual)); });
   if (sizes.empty())
     return;
-  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double limit = kTukey * std::max(1.4826 * *middle, options.border_sigma_px / 1.48 / focal_px);
+  const double limit =
+      kTukey * std::max(1.4826 * medianOf(std::move(sizes)), options.border_sigma_px / 1.48 / focal_px);
   for (const std::size_t k : m_in_view)
     for (ModelBorder &border : trunks[k].borders())
       for (FoundPiece &piece : border.pieces) {

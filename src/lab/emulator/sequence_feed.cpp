@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+#include "geometry/require_range.h"
 
 #include "geometry/constants.h"
 #include "geometry/so3.h"
@@ -159,10 +160,8 @@ void SequenceFeedOptions::validate() const
 {
   if (generation != 1 && generation != 2)
     throw vpException(vpException::badValue, "generation = %d, must be 1 or 2", generation);
-  if (!(navdata_rate_hz > 1 && navdata_rate_hz < 1000))
-    throw vpException(vpException::badValue, "navdata_rate_hz = %g, must be in (1, 1000) Hz", navdata_rate_hz);
-  if (!(video_delay_s >= 0 && video_delay_s <= 0.5))
-    throw vpException(vpException::badValue, "video_delay_s = %g, must be in [0, 0.5] s", video_delay_s);
+  requireRange("navdata_rate_hz", navdata_rate_hz, 1, 1000);
+  requireRange("video_delay_s", video_delay_s, 0, 0.5);
 }
 
 std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options)
