@@ -109,8 +109,8 @@ void setRange(StageOptions &o, const Options::Range &range)
     o.saliency.near_range = std::max(range.near, kNearest);
     o.saliency.min_range = std::min(o.saliency.min_range, o.saliency.near_range / 2);
   }
-  constexpr double kInside = 0.5; // m: at near itself the labels are undecided
-  o.detection.near_range = o.map.near_range = std::max(0.0, range.near - kInside);
+  constexpr double kUndecided = 0.5; // m: at near itself the labels are undecided
+  o.detection.near_range = o.map.near_range = std::max(0.0, range.near - kUndecided);
   o.map.through_range = range.through;
 }
 
