@@ -5,10 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -46,20 +43,5 @@ std::vector<TruthTrunk> readTruthTrunks(const std::string &sequence)
   if (std::filesystem::exists(folder / "trees_far.csv"))
     readTrees((folder / "trees_far.csv").string(), true, ids, trunks);
   return trunks;
-}
-
-vpImage<float> readDepth(const std::string &path)
-{
-  const cv::Mat depth = cv::imread(path, cv::IMREAD_UNCHANGED);
-  if (depth.empty() || depth.type() != CV_16UC1)
-    throw vpException(vpException::ioError, fmt::format("{}: must be a 16-bit grey PNG", path));
-  vpImage<float> metres(static_cast<unsigned>(depth.rows), static_cast<unsigned>(depth.cols));
-  for (int v = 0; v < depth.rows; ++v)
-    for (int u = 0; u < depth.cols; ++u) {
-      const auto millimetres = depth.at<unsigned short>(v, u);
-      metres[static_cast<unsigned>(v)][static_cast<unsigned>(u)] =
-          millimetres == 65535 ? std::numeric_limits<float>::infinity() : 1e-3f * static_cast<float>(millimetres);
-    }
-  return metres;
 }
 } // namespace bole

@@ -7,14 +7,12 @@
 
 #include <string>
 #include <vector>
-#include <visp3/core/vpImage.h>
 
 namespace bole
 {
-/// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground,
-/// where forest inventories measure: in the rendered forests the axes that were fitted to the depth
-/// maps pass (x, y) at 1.3 m to about 6 mm, with this radius to 7 mm, and are up to 0.08 m away from it at
-/// the foot.
+/// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground, where forest
+/// inventories measure: in the rendered forests the axes that were fitted to the depth maps pass (x, y) at 1.3 m to
+/// about 6 mm, with this radius to 7 mm, and are up to 0.08 m away from it at the foot.
 struct TruthTrunk
 {
   int id = 0;
@@ -27,8 +25,4 @@ struct TruthTrunk
 /// the folder \p sequence; empty when the sequence has no `trees.csv`. Errors: vpException with
 /// file:line for a row that is not what it must be or an id that comes twice.
 std::vector<TruthTrunk> readTruthTrunks(const std::string &sequence);
-
-/// Distance along the optical axis [m] from a 16-bit PNG of millimetres; infinity where it says
-/// 65535. Throws vpException when the file is not such a PNG.
-vpImage<float> readDepth(const std::string &path);
 } // namespace bole

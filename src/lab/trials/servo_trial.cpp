@@ -7,14 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <limits>
 #include <memory>
 
 namespace bole
 {
 namespace
 {
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFinal_s = 5; ///< final errors are those of the last seconds
 constexpr double kBearing_deg = 0.5, kDistance = 0.03;
 constexpr double kLeastGap = 1.2;  ///< true free width that another gap than the one set up must have [m]
@@ -119,12 +117,12 @@ double valueOf(const ServoTask::Values &values, const char *name)
   for (const auto &[key, value] : values)
     if (key == name)
       return value;
-  return kNaN;
+  return kNotMeasured;
 }
 
 struct Moments
 {
-  double mean = kNaN, rms = kNaN;
+  double mean = kNotMeasured, rms = kNotMeasured;
 };
 
 /// Of a true error over the last seconds; NaN where it is not known in each of them.
@@ -178,7 +176,7 @@ std::unique_ptr<ServoTask> makeTask(const ServoTrialOptions &options, const Pose
 /// How far round the trunk the drone went while it servoed [deg].
 double turnedRound(const LoopRecord &record, const SimulatedTrunk &trunk)
 {
-  double turned = 0, last = kNaN;
+  double turned = 0, last = kNotMeasured;
   for (const LoopSample &sample : record.samples) {
     if (sample.phase != TaskPhase::servoing)
       continue;
@@ -285,24 +283,6 @@ void judgeFault(ServoTrialResult &result)
   }
 }
 } // namespace
-
-ServoTrialResult::ServoTrialResult()
-    : servoing_from_s(kNaN),
-      bearing_rms_deg(kNaN),
-      distance_rms(kNaN),
-      distance_mean(kNaN),
-      ratio_rms(kNaN),
-      turned_deg(kNaN),
-      least_clearance(kNaN),
-      gap_width(kNaN),
-      progress(kNaN),
-      mean_speed(kNaN),
-      median_loop_ms(kNaN),
-      p95_loop_ms(kNaN),
-      hover_after_s(kNaN),
-      drift(kNaN)
-{
-}
 
 vpSimulatorArDrone::Options ServoTrialOptions::defaultRobot()
 {

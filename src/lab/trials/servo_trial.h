@@ -6,6 +6,7 @@
 #include "lab/trials/closed_loop.h"
 #include "lab/trials/scenario.h"
 #include "pipeline/stage_options.h"
+#include <bole/evaluation.h>
 
 namespace bole
 {
@@ -31,22 +32,23 @@ struct ServoTrialResult
 {
   std::uint64_t seed = 0;
   bool is_success = false;
-  std::string outcome;    ///< one line: why not, where it failed
-  double servoing_from_s; ///< NaN where the task never found what it flies by
+  std::string outcome;                   ///< one line: why not, where it failed
+  double servoing_from_s = kNotMeasured; ///< NaN where the task never found what it flies by
   double duration_s = 0;
-  double bearing_rms_deg, distance_rms; ///< hold, circle: true errors over the last 5 s; distance relative
-  double distance_mean;                 ///< of the same: what does not average out
-  double ratio_rms;                     ///< of r/d against the one asked for: the image's share of distance_rms
-  double turned_deg;                    ///< circle: how far round
-  double least_clearance;               ///< body's origin to bark [m]
-  double gap_width;                     ///< gap: true free width of the one passed [m]
-  bool is_other_gap = false;            ///< gap: not the one that the scenario has set up
-  double progress, mean_speed;          ///< slalom [m], [m/s]
-  double median_loop_ms, p95_loop_ms;
-  double hover_after_s, drift; ///< fault: until it hovered [s]; how far it moved while it lasted [m]
+  double bearing_rms_deg = kNotMeasured; ///< hold, circle: true errors over the last 5 s
+  double distance_rms = kNotMeasured;    ///< the same, relative
+  double distance_mean = kNotMeasured;   ///< the same: what does not average out
+  double ratio_rms = kNotMeasured;       ///< of r/d against the one asked for: the image's share of distance_rms
+  double turned_deg = kNotMeasured;      ///< circle: how far round
+  double least_clearance = kNotMeasured; ///< body's origin to bark [m]
+  double gap_width = kNotMeasured;       ///< gap: true free width of the one passed [m]
+  bool is_other_gap = false;             ///< gap: not the one that the scenario has set up
+  double progress = kNotMeasured;        ///< slalom [m]
+  double mean_speed = kNotMeasured;      ///< slalom [m/s]
+  double median_loop_ms = kNotMeasured, p95_loop_ms = kNotMeasured;
+  double hover_after_s = kNotMeasured; ///< fault: until it hovered [s]
+  double drift = kNotMeasured;         ///< fault: how far it moved while it lasted [m]
   LoopRecord record;
-
-  ServoTrialResult();
 };
 
 /// Flies it. Success: hold and circle: right trunk, rms of the true bearing within 0.5 degrees and of the distance
