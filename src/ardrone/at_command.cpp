@@ -25,14 +25,13 @@ std::vector<std::string> splitArguments(const std::string &text)
 {
   std::vector<std::string> out(1);
   bool quoted = false;
-  for (const char c : text) {
+  for (const char c : text)
     if (c == '"')
       quoted = !quoted;
     else if (c == ',' && !quoted)
       out.emplace_back();
     else
       out.back() += c;
-  }
   return out;
 }
 } // namespace

@@ -21,8 +21,7 @@ struct AtCommand
 /// The commands of a datagram; what is not a command is left out. For the emulator and the tests.
 std::vector<AtCommand> parseAtCommands(const std::string &datagram);
 
-/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is
-/// -1085485875).
+/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
 std::string atFloat(float value);
 /// The inverse of atFloat().
 float atFloatValue(const std::string &text);

@@ -9,8 +9,7 @@
 
 namespace bole
 {
-/// The number of type \p T at \p p, stored with its least significant byte first. Reads sizeof(T)
-/// bytes.
+/// The number of type \p T at \p p, stored with its least significant byte first. Reads sizeof(T) bytes.
 template <typename T> T readLittleEndian(const std::uint8_t *p)
 {
   std::uint64_t bits = 0;

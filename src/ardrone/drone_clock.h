@@ -11,9 +11,8 @@ namespace bole
 {
 /// Turns a counter that wraps into one that does not.
 ///
-/// A stamp is taken as the nearest to the one before: up to half the period ahead or behind, so
-/// packets out of order are no wrap. Law (a test): differences of stamps less than half a period
-/// apart are exact.
+/// A stamp is taken as the nearest to the one before: up to half the period ahead or behind, so packets out of order
+/// are no wrap. Law (a test): differences of stamps less than half a period apart are exact.
 class ClockUnwrapper
 {
 public:
@@ -29,19 +28,16 @@ private:
 
 /// Microseconds in the navdata's time word: 11 bits of seconds, 21 bits of microseconds.
 std::int64_t navdataTimeMicroseconds(std::uint32_t time);
-/// The inverse, for the emulator: \p microseconds since any start, reduced to the 2048 s that the
-/// word holds.
+/// The inverse, for the emulator: \p microseconds since any start, reduced to the 2048 s that the word holds.
 std::uint32_t navdataTimeWord(std::int64_t microseconds);
 constexpr std::int64_t kNavdataTimePeriod_us = 2048LL * 1'000'000;
 constexpr std::int64_t kPaveTimePeriod_ms = std::int64_t{1} << 32;
 
-/// Offset between a drone's clock and the host's, from packets that arrive late by an unknown,
-/// varying time.
+/// Offset between a drone's clock and the host's, from packets that arrive late by an unknown, varying time.
 ///
-/// Idea: arrival minus stamp is the offset plus a delay that is never negative, so its running
-/// minimum is the offset plus the shortest delay. The minimum is let rise by the largest drift
-/// between two quartz clocks, so that it follows one that falls behind. A jump beyond \p jump_s is
-/// a reboot: it starts anew.
+/// Idea: arrival minus stamp is the offset plus a delay that is never negative, so its running minimum is the offset
+/// plus the shortest delay. The minimum is let rise by the largest drift between two quartz clocks, so that it follows
+/// one that falls behind. A jump beyond \p jump_s is a reboot: it starts anew.
 class ClockFit
 {
 public:

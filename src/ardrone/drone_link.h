@@ -32,13 +32,12 @@ struct LiveFrame
 /// Talks to a drone as a listener: wakes the streams, asks for full navdata, keeps the
 /// communication watchdog content. Never sends a flight command.
 ///
-/// Idea: one thread drains the video socket and decodes everything (predicted frames need their
-/// predecessors), but keeps only the newest frame for the consumer: a slow consumer gets fewer
-/// frames, never old ones. A second thread integrates navdata. The two streams have clocks of their
-/// own; each is fitted to the host's (ClockFit), and a frame exposed video_delay_s before its
-/// fastest arrival finds its navdata that way. A picture that hardly differs from an earlier one
-/// although the navdata say that the body moved on by more than frozen_m or frozen_rad is `stale`:
-/// the camera is frozen. A link silent for silence_s is opened anew, every retry_s.
+/// Idea: one thread drains the video socket and decodes everything (predicted frames need their predecessors), but
+/// keeps only the newest frame for the consumer: a slow consumer gets fewer frames, never old ones. A second thread
+/// integrates navdata. The two streams have clocks of their own; each is fitted to the host's (ClockFit), and a frame
+/// exposed video_delay_s before its fastest arrival finds its navdata that way. A picture that hardly differs from an
+/// earlier one although the navdata say that the body moved on by more than frozen_m or frozen_rad is `stale`: the
+/// camera is frozen. A link silent for silence_s is opened anew, every retry_s.
 ///
 /// Thread-safe. Cost: H.264 640x360 about 2 ms a frame on its own thread.
 class DroneLink
@@ -52,8 +51,7 @@ public:
   DroneLink(const DroneLink &) = delete;
   DroneLink &operator=(const DroneLink &) = delete;
 
-  /// The newest frame not yet given out; waits for one at most \p timeout_s. False when there is
-  /// none.
+  /// The newest frame not yet given out; waits for one at most \p timeout_s. False when there is none.
   bool next(LiveFrame &frame, double timeout_s);
   /// Adds what the navdata say to a frame that did not come: body, gyro and covariance at
   /// frame.stamp_ns. It counts as given out.

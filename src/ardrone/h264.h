@@ -27,9 +27,8 @@ struct YuvPicture
 
 /// Decodes one access unit at a time, without delay.
 ///
-/// Whatever libavcodec says about damage (an error, a missing reference, concealed blocks) makes
-/// the picture `damaged`: it conceals by copying, which for a tracker is worse than nothing. Not
-/// thread-safe.
+/// Whatever libavcodec says about damage (an error, a missing reference, concealed blocks) makes the picture `damaged`:
+/// it conceals by copying, which for a tracker is worse than nothing. Not thread-safe.
 class H264Decoder
 {
 public:

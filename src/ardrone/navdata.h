@@ -69,8 +69,7 @@ enum class NavdataError
 const char *toString(NavdataError error);
 
 /// Reads one datagram. Only packets with a right checksum get through.
-/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input
-/// terminates.
+/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input terminates.
 NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
 
 /// The datagram of \p navdata: its typed options 0, 1 and 3 where they are set (with zeros for what

@@ -109,8 +109,7 @@ void NavdataOdometry::add(std::int64_t stamp_ns, const Navdata &navdata)
     state.wMb.t = before->wMb.t + (bridged ? elapsed : 0.0) * mean_velocity;
     if (state.height > 0) {
       const double jump = m_ground + state.height - state.wMb.t.z();
-      // The filter behind the height converges slowly: small differences belong to z, large ones to
-      // the ground.
+      // The filter behind the height converges slowly: small differences belong to z, large ones to the ground.
       if (std::abs(jump) > m_options.ground_step)
         m_ground -= jump;
       else

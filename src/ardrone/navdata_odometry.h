@@ -17,8 +17,7 @@ namespace bole
 ///
 /// The drone's frames have y to the right and z down, ours y left and z up; half a turn about x, F,
 /// takes one to the other, so wRb = F Rz(yaw) Ry(pitch) Rx(roll) F = Rz(-yaw) Ry(-pitch) Rx(roll).
-/// Law (a test): the drone turned about one of its axes turns the right way about ours, each axis
-/// alone.
+/// Law (a test): the drone turned about one of its axes turns the right way about ours, each axis alone.
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw);
 /// Roll, pitch, yaw [rad] as the drone counts them.
 Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb);
@@ -27,13 +26,11 @@ inline Eigen::Vector3d flipDroneAxes(const Eigen::Vector3d &v) { return {v.x(), 
 
 /// Integrates navdata to poses wMb.
 ///
-/// Idea: horizontal position by integrating the velocity (mm/s, drone's axes) turned by the
-/// attitude, by the trapezoid rule in the drone's own time, since packets come in bursts; z is the
-/// height that the sonar and the drone's filter report. Where the height jumps although the drone
-/// does not climb, the ground has a step (a bush, a wall): z goes on with the vertical velocity and
-/// the step is kept as an offset. The world stands on the ground below the first sample, z up; its
-/// x axis is where the drone's yaw is zero. After a reboot (restart()) the pose goes on where it
-/// was.
+/// Idea: horizontal position by integrating the velocity (mm/s, drone's axes) turned by the attitude, by the trapezoid
+/// rule in the drone's own time, since packets come in bursts; z is the height that the sonar and the drone's filter
+/// report. Where the height jumps although the drone does not climb, the ground has a step (a bush, a wall): z goes on
+/// with the vertical velocity and the step is kept as an offset. The world stands on the ground below the first sample,
+/// z up; its x axis is where the drone's yaw is zero. After a reboot (restart()) the pose goes on where it was.
 ///
 /// Noise (stepCovariance()): independent from step to step, growing with time, so that a step over
 /// t has the variance velocity_sigma^2 t tau + (scale_sigma |v| t)^2 per horizontal axis, tau = 0.1
@@ -63,8 +60,7 @@ public:
   /// The drone's clock and yaw start anew: the next sample takes on the last pose.
   void restart();
 
-  /// State at \p stamp_ns, interpolated; nothing before the history, beyond the extrapolation, or
-  /// in a gap.
+  /// State at \p stamp_ns, interpolated; nothing before the history, beyond the extrapolation, or in a gap.
   std::optional<BodyState> at(std::int64_t stamp_ns) const;
   std::optional<BodyState> newest() const;
   /// Angular rates and specific forces in (from, to], oldest first.

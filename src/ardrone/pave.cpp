@@ -132,8 +132,7 @@ std::optional<PaveFrame> PaveParser::next()
     if (!header)
       return std::nullopt;
     const std::size_t frame_size = header->header_size + header->payload_size;
-    // The length may be damaged: a header inside the payload shows where the next frame really
-    // begins.
+    // The length may be damaged: a header inside the payload shows where the next frame really begins.
     const std::size_t end = std::min(frame_size, left);
     const std::size_t inner = findHeader(m_begin + header->header_size) - m_begin;
     if (inner + kShortHeader <= end && parsePaveHeader(m_buffer.data() + m_begin + inner, left - inner)) {

@@ -37,8 +37,7 @@ struct PaveHeader
   std::uint8_t header1_size = 0, header2_size = 0; ///< [byte] SPS and PPS in front of a key frame
   std::uint32_t advertised_size = 0;
 
-  /// True when the fields are such as a drone can send: the signature alone appears in payloads by
-  /// chance.
+  /// True when the fields are such as a drone can send: the signature alone appears in payloads by chance.
   bool isPlausible() const;
 };
 
@@ -57,10 +56,9 @@ struct PaveFrame
 
 /// Cuts a byte stream into PaVE frames and finds its way again after damage.
 ///
-/// Idea: keep the bytes not yet used; when the front is not a plausible header, search for the next
-/// signature that is one, and say so in the next frame (after_gap). A damaged length cannot swallow
-/// the stream: payloads above 1 MiB are implausible, and a frame whose successor is not a header is
-/// searched for a header inside it.
+/// Idea: keep the bytes not yet used; when the front is not a plausible header, search for the next signature that is
+/// one, and say so in the next frame (after_gap). A damaged length cannot swallow the stream: payloads above 1 MiB are
+/// implausible, and a frame whose successor is not a header is searched for a header inside it.
 ///
 /// Laws (each a test): how the stream is cut into push() calls does not matter; a frame pushed
 /// whole comes out; any input terminates. Cost: linear in the bytes. Not thread-safe.

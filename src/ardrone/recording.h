@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Flights as they came off the air: raw bytes with their times, in a form that survives being cut
-/// anywhere.
+/// Flights as they came off the air: raw bytes with their times, in a form that survives being cut anywhere.
 
 #include "ardrone/drone_link.h"
 
@@ -22,15 +21,13 @@ struct RecordedPiece
   std::vector<std::uint8_t> bytes;
 };
 
-/// Writes `raw.bin`: a line of text that names the form and the generation, then pieces of
-/// `u32 0x45434542 ("BECE"), u8 channel, 3 reserved, i64 arrival [ns], u32 size, bytes, u32 CRC-32`
-/// of all before, little-endian. Each piece is one write(), so a killed process leaves whole pieces
-/// but for the last, which the reader drops. Thread-safe.
+/// Writes `raw.bin`: a line of text that names the form and the generation, then pieces of `u32 0x45434542 ("BECE"), u8
+/// channel, 3 reserved, i64 arrival [ns], u32 size, bytes, u32 CRC-32` of all before, little-endian. Each piece is one
+/// write(), so a killed process leaves whole pieces but for the last, which the reader drops. Thread-safe.
 class RecordingWriter
 {
 public:
-  /// Creates \p folder and raw.bin in it; throws vpException when it cannot, or when there is a
-  /// recording already.
+  /// Creates \p folder and raw.bin in it; throws vpException when it cannot, or when there is a recording already.
   explicit RecordingWriter(const std::string &folder);
   ~RecordingWriter();
   RecordingWriter(const RecordingWriter &) = delete;

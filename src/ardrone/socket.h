@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Sockets that close themselves. Failures are results, not exceptions: on a radio link they are
-/// daily life.
+/// Sockets that close themselves. Failures are results, not exceptions: on a radio link they are daily life.
 
 #include <chrono>
 #include <cstddef>
@@ -35,8 +34,7 @@ public:
   static Socket connectTcp(const std::string &host, std::uint16_t port, Milliseconds timeout);
   /// A UDP socket that talks to one peer only.
   static Socket connectUdp(const std::string &host, std::uint16_t port);
-  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when
-  /// the port is taken.
+  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when the port is taken.
   static Socket bindUdp(const std::string &host, std::uint16_t port);
   static Socket listenTcp(const std::string &host, std::uint16_t port);
 
@@ -58,8 +56,7 @@ public:
                    Milliseconds timeout) const;
   bool send(const void *data, std::size_t size) const; ///< false on any failure
   bool sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const;
-  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is
-  /// gone.
+  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is gone.
   std::int64_t sendSome(const std::uint8_t *data, std::size_t size) const;
   Socket accept() const;
 

@@ -3,30 +3,23 @@
 /// \file
 /// UVLC, the intra-only video of the AR.Drone 1, which no packaged library decodes.
 ///
-/// Facts, each found alike in at least two of: (a) AR.Drone Developer Guide, SDK 1.6 and 1.7,
-/// section 7.2 "The video stream"; (b) the SDK's own description, VLIB/Docs/uvlc.txt; (c) the notes
-/// of djtrance's ardrone1_video_decoder; (d) the decoders of JavaDrone's family (cvdrone,
-/// libkovan).
-/// - A datagram is a picture: little-endian 32-bit words, read from their most significant bit (c,
-/// d).
-/// - Start code of 22 bits, `0000 0000 0000 0000 1nnn nn`, on a byte of the stream; n = 0 begins a
-/// picture,
+/// Facts, each found alike in at least two of: (a) AR.Drone Developer Guide, SDK 1.6 and 1.7, section 7.2 "The video
+/// stream"; (b) the SDK's own description, VLIB/Docs/uvlc.txt; (c) the notes of djtrance's ardrone1_video_decoder; (d)
+/// the decoders of JavaDrone's family (cvdrone, libkovan).
+/// - A datagram is a picture: little-endian 32-bit words, read from their most significant bit (c, d).
+/// - Start code of 22 bits, `0000 0000 0000 0000 1nnn nn`, on a byte of the stream; n = 0 begins a picture,
 ///   1 .. 30 a group of blocks (GOB), 31 ends the sequence (a, b, d).
-/// - Picture: format 2 bits (1 CIF family, 88x72 base; 2 VGA family, 160x120 base), resolution 3
-/// bits
+/// - Picture: format 2 bits (1 CIF family, 88x72 base; 2 VGA family, 160x120 base), resolution 3 bits
 ///   (base << (resolution - 1)), type 3 bits (0 intra), quantiser 5 bits, number 32 bits; the
 ///   header of the first GOB is left out (a, b, c, d). Other GOBs: quantiser 5 bits (a, b, d).
-/// - GOB: a row of 16x16 macroblocks. Macroblock: 1 bit, **0 when it is coded** ((a) and (b) print
-/// the
+/// - GOB: a row of 16x16 macroblocks. Macroblock: 1 bit, **0 when it is coded** ((a) and (b) print the
 ///   opposite; (c) says that they err, (d) reads it so); then 8 bits, least significant first: AC
 ///   coefficients in Y0 Y1 Y2 Y3 Cb Cr, quantiser change, always 1 (a, b, c, d); then the blocks.
-/// - Block: DC 10 bits; with AC, pairs of run and level. Run: n zeros, a one, then n - 1 bits x: 0
-/// for
+/// - Block: DC 10 bits; with AC, pairs of run and level. Run: n zeros, a one, then n - 1 bits x: 0 for
 ///   n = 0, else 2^(n-1) + x. Level the same with a sign bit behind (1 = negative), but for n = 0,
 ///   which is
 ///   +-1, and n = 1, which ends the block (a, c, d).
-/// - Quantiser 31, the only one ever seen on the wire (c), stands for the table 3 + 2 (i + j), DC
-/// too; any
+/// - Quantiser 31, the only one ever seen on the wire (c), stands for the table 3 + 2 (i + j), DC too; any
 ///   other is refused (c, d). Order zigzag, orthonormal 8x8 DCT, no level shift: the DC is positive
 ///   (a, d).
 /// - P264, the drone's other video (video:video_codec 64 instead of 32, in the enumerations of the
@@ -46,8 +39,7 @@
 
 namespace bole
 {
-/// Reads bits from little-endian 32-bit words, most significant first. Past the end it gives zeros
-/// and says so.
+/// Reads bits from little-endian 32-bit words, most significant first. Past the end it gives zeros and says so.
 class UvlcBits
 {
 public:

@@ -21,9 +21,8 @@ struct DecodedFrame
   YuvPicture picture;                        ///< empty when nothing could be decoded
   std::uint32_t number = 0;                  ///< as the drone counts
   std::optional<std::uint32_t> timestamp_ms; ///< PaVE; an AR.Drone 1 sends none
-  /// Hardly different from the picture that last was: the camera stands still, or is frozen (the
-  /// encoder's refinement of one picture changes block means by up to 0.65 grey levels, a slow
-  /// flight by several).
+  /// Hardly different from the picture that last was: the camera stands still, or is frozen (the encoder's refinement
+  /// of one picture changes block means by up to 0.65 grey levels, a slow flight by several).
   bool unchanged = false;
 };
 

@@ -38,14 +38,13 @@ std::vector<int> assignRows(const Eigen::MatrixXd &cost)
           nearest = c;
         }
       }
-      for (Eigen::Index c = 0; c <= columns; ++c) {
+      for (Eigen::Index c = 0; c <= columns; ++c)
         if (is_done[static_cast<std::size_t>(c)]) {
           row_price[row_of[static_cast<std::size_t>(c)]] += least;
           column_price[c] -= least;
         }
         else if (c < columns)
           slack[c] -= least;
-      }
       at = nearest;
     }
     while (at != none) {

@@ -41,9 +41,8 @@ std::vector<PosePair> pairPoses(const Trajectory &estimate, const Trajectory &tr
 std::int64_t motionShift(const Trajectory &estimate, const Trajectory &truth, std::int64_t start_ns,
                          double range_s = 2);
 
-/// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products
-/// of the centred horizontal positions, scale = their ratio. Identity for no pairs; a trajectory
-/// that does not move keeps scale 1.
+/// The transform of \p alignment in closed form: yaw = atan2 of the summed cross and dot products of the centred
+/// horizontal positions, scale = their ratio. Identity for no pairs; a trajectory that does not move keeps scale 1.
 PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
 
 /// Errors after \p transform.

@@ -28,9 +28,8 @@ Eigen::Vector2d directionMinus(const Eigen::Vector3d &e, const Eigen::Vector3d &
 {
   Eigen::Vector2d in_plane = directionBasis(d).transpose() * e;
   const double sine = in_plane.norm();
-  if (sine < 1e-12) {
+  if (sine < 1e-12)
     return in_plane;
-  }
   return in_plane * (std::atan2(sine, d.dot(e)) / sine);
 }
 } // namespace bole

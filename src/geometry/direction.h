@@ -19,8 +19,7 @@ using Matrix32d = Eigen::Matrix<double, 3, 2>;
 /// x d) with e the coordinate axis least aligned with d (the first of equals), b2 = d x b1.
 Matrix32d directionBasis(const Eigen::Vector3d &d);
 
-/// The direction at the angle |tau| [rad] from \p d along directionBasis(d) * tau (exponential
-/// map).
+/// The direction at the angle |tau| [rad] from \p d along directionBasis(d) * tau (exponential map).
 Eigen::Vector3d directionPlus(const Eigen::Vector3d &d, const Eigen::Vector2d &tau);
 
 /// Tangent tau [rad] at \p d with directionPlus(d, tau) == \p e.

@@ -170,8 +170,7 @@ std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
 {
   std::int64_t stamp_ns = 0;
   if (!parseSeconds(m_fields.at(column), stamp_ns))
-    // Scientific notation, as numpy.savetxt writes it: exact enough after rounding for stamps below
-    // 2^53 ns.
+    // Scientific notation, as numpy.savetxt writes it: exact enough after rounding for stamps below 2^53 ns.
     stamp_ns = std::llround(number(column, "timestamp") * 1e9);
   return rising(stamp_ns);
 }

@@ -22,9 +22,8 @@ struct CsvFormat
 /// Reads a table row by row. Lines that start with '#' and empty lines are skipped; every row has
 /// the number of columns of the first one.
 ///
-/// Errors: every fault throws vpException "file:line: what, must be ...": a missing file, a wrong
-/// header, a wrong number of columns, a field that is not a whole or finite number, a stamp that
-/// goes back.
+/// Errors: every fault throws vpException "file:line: what, must be ...": a missing file, a wrong header, a wrong
+/// number of columns, a field that is not a whole or finite number, a stamp that goes back.
 ///
 /// \code
 /// CsvReader csv("odom0/data.csv", {8});

@@ -29,8 +29,7 @@ class FrameBuilder
 public:
   FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording);
 
-  /// Fills \p frame from the raw image \p file taken at \p stamp_ns. Stamps must rise from call to
-  /// call.
+  /// Fills \p frame from the raw image \p file taken at \p stamp_ns. Stamps must rise from call to call.
   void build(std::int64_t stamp_ns, ImageFile file, Frame &frame);
 
   /// Size of the images that build() takes [px].

@@ -20,10 +20,9 @@ namespace bole
 std::optional<Pose> interpolate(const Trajectory &trajectory, std::int64_t stamp_ns,
                                 std::int64_t max_gap_ns = 1'000'000'000);
 
-/// Reads a trajectory: TUM ("t tx ty tz qx qy qz qw" in seconds, blank separated) when the first
-/// row has no comma, else ASL / EuRoC ("stamp [ns],x,y,z,qw,qx,qy,qz[,...]"). Errors: vpException
-/// with file:line for a row that is not eight finite numbers, a quaternion whose norm is not 1 to 1
-/// %, a stamp that goes back, or an empty file.
+/// Reads a trajectory: TUM ("t tx ty tz qx qy qz qw" in seconds, blank separated) when the first row has no comma, else
+/// ASL / EuRoC ("stamp [ns],x,y,z,qw,qx,qy,qz[,...]"). Errors: vpException with file:line for a row that is not eight
+/// finite numbers, a quaternion whose norm is not 1 to 1 %, a stamp that goes back, or an empty file.
 Trajectory readTrajectory(const std::string &path);
 Trajectory readAslTrajectory(const std::string &path);
 Trajectory readTumTrajectory(const std::string &path);

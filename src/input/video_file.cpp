@@ -187,8 +187,7 @@ void VideoFile::decodeMore()
   m_counted += is_hidden;
   if (has_packet && packet.pts != AV_NOPTS_VALUE && !is_hidden)
     m_pending.insert(packet.pts);
-  // A damaged packet is an error here; its place in m_pending is reported when a later picture
-  // comes.
+  // A damaged packet is an error here; its place in m_pending is reported when a later picture comes.
   m_libav->decoder->send(has_packet ? &packet : nullptr);
   av_packet_unref(&packet);
   while (const AVFrame *frame = m_libav->decoder->receive())

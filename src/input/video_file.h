@@ -26,11 +26,10 @@ struct Picture
 
 /// Decodes the best video stream of a file, in the order of presentation, one thread.
 ///
-/// Every packet of the stream must end in a picture: one that does not (lost reference, damaged
-/// data) is reported in its place as damaged, so that nothing is skipped silently. Pictures the
-/// decoder had to conceal are damaged too. A file that was cut off goes on with missing pictures up
-/// to the count of its container (AVI, MP4; Matroska has none). A rotation by quarter turns that the
-/// file asks for is applied.
+/// Every packet of the stream must end in a picture: one that does not (lost reference, damaged data) is reported in
+/// its place as damaged, so that nothing is skipped silently. Pictures the decoder had to conceal are damaged too. A
+/// file that was cut off goes on with missing pictures up to the count of its container (AVI, MP4; Matroska has none).
+/// A rotation by quarter turns that the file asks for is applied.
 class VideoFile
 {
 public:

@@ -31,14 +31,12 @@ template <class Pixel>
 void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameters &cam, const vpImage<Pixel> &I,
                     const vpColor &color, unsigned int thickness)
 {
-  if (relative.log_ratio >= 0) {
+  if (relative.log_ratio >= 0)
     return;
-  }
   for (bole::Border border : {bole::Border::left, bole::Border::right}) {
     const Vector3d low = relative.borderDirection(border, -0.5), high = relative.borderDirection(border, 1.0);
-    if (low.z() <= 0.05 || high.z() <= 0.05) {
+    if (low.z() <= 0.05 || high.z() <= 0.05)
       continue;
-    }
     const auto pixel = [&cam](const Vector3d &d) {
       return vpImagePoint(cam.get_py() * d.y() / d.z() + cam.get_v0(), cam.get_px() * d.x() / d.z() + cam.get_u0());
     };
@@ -46,8 +44,7 @@ void displayBorders(const bole::RelativeTrunk &relative, const vpCameraParameter
   }
 }
 
-/// Unit normal of the plane through the camera's centre and an image line x cos(theta) + y
-/// sin(theta) = rho.
+/// Unit normal of the plane through the camera's centre and an image line x cos(theta) + y sin(theta) = rho.
 Vector3d planeOf(const vpFeatureLine &line)
 {
   return Vector3d(std::cos(line.getTheta()), std::sin(line.getTheta()), -line.getRho()).normalized();
@@ -62,9 +59,8 @@ void vpFeatureTrunk::init()
   nbParameters = 1;
   s.resize(dim_s);
   s[3] = std::log(0.05);
-  if (!flags) {
+  if (!flags)
     flags = new bool[nbParameters];
-  }
   resetFlags();
 }
 
@@ -97,9 +93,8 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
 {
   Vector3d one = planeOf(border), other = planeOf(other_border);
   Vector3d axis = one.cross(other); // in both planes
-  if (axis.norm() < 1e-9) {
+  if (axis.norm() < 1e-9)
     throw vpException(vpException::badValue, "border lines = one line twice, must be two");
-  }
   axis.normalize();
   axis = axis.y() > 0 ? Vector3d(-axis) : axis;
   // Directions in the planes, across the axis, in front of the camera; the trunk is between them.
@@ -108,9 +103,8 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
   to_other = to_other.z() < 0 ? Vector3d(-to_other) : to_other;
   const Vector3d m = (to_one + to_other).normalized();
   const double ratio = 0.5 * (to_one - to_other).norm(); // sine of half the angle between the borders
-  if (!(ratio < 1) || !m.allFinite()) {
+  if (!(ratio < 1) || !m.allFinite())
     throw vpException(vpException::badValue, fmt::format("r/d = {}, must be below 1", ratio));
-  }
   bole::RelativeTrunk relative;
   relative.cRt << m, axis.cross(m), axis;
   relative.log_ratio = std::log(ratio);
@@ -135,13 +129,11 @@ bole::RelativeTrunk vpFeatureTrunk::relativeTrunk() const
   return relative;
 }
 
-/// With a' = -w x a for the axis and m' = -n (n.v) / d - w x m for the line of sight, see the
-/// header.
+/// With a' = -w x a for the axis and m' = -n (n.v) / d - w x m for the line of sight, see the header.
 vpMatrix vpFeatureTrunk::interaction(unsigned int select)
 {
-  if (!flags[0]) {
+  if (!flags[0])
     throw vpException(vpException::notInitialized, "vpFeatureTrunk: buildFrom() must come before interaction()");
-  }
   const Eigen::Matrix3d cRt = frameOf(s[0], s[1], s[2]);
   const Vector3d m = cRt.col(0), n = cRt.col(1), a = cRt.col(2);
   const double across = m.z() * m.z() + n.z() * n.z(), flat = a.x() * a.x() + a.y() * a.y();
@@ -157,9 +149,8 @@ vpMatrix vpFeatureTrunk::interaction(unsigned int select)
   for (unsigned int row = 0; row < 4; ++row) {
     if (select & FEATURE_LINE[row]) {
       vpMatrix line(1, 6);
-      for (unsigned int k = 0; k < 6; ++k) {
+      for (unsigned int k = 0; k < 6; ++k)
         line[0][k] = L(row, k);
-      }
       result.stack(line);
     }
   }
@@ -182,11 +173,9 @@ void vpFeatureTrunk::print(unsigned int select) const
 {
   const char *names[] = {"bearing", "inclination", "tip", "log r/d"};
   std::printf("Trunk:");
-  for (unsigned int k = 0; k < 4; ++k) {
-    if (select & FEATURE_LINE[k]) {
+  for (unsigned int k = 0; k < 4; ++k)
+    if (select & FEATURE_LINE[k])
       std::printf(" %s = %g", names[k], s[k]);
-    }
-  }
   std::printf("\n");
 }
 

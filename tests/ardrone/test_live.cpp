@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The live path against the emulator. Nothing here measures time; limits are for machines that
-// hang.
+// The live path against the emulator. Nothing here measures time; limits are for machines that hang.
 #include "flight.h"
 
 #include <gtest/gtest.h>
@@ -134,8 +133,7 @@ TEST_P(Live, ComesBackByItselfAfterAReboot)
   EXPECT_EQ(emulator->counters().reboots, 1u);
   EXPECT_GE(counters.connections, GetParam() == 2 ? 2u : 1u);
   EXPECT_EQ(counters.navdata_restarts, 1u);
-  // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was
-  // flown.
+  // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was flown.
   // The last ones may be too fresh for navdata on a slow machine: the newest that has some.
   const auto last = std::find_if(frames.rbegin(), frames.rend(),
                                  [](const Frame &f) { return f.status == FrameStatus::ok && f.wMb_odometry; });

@@ -91,8 +91,7 @@ TEST(NavdataOdometry, ASlipToTheRightIsNegativeY)
 
 TEST(NavdataOdometry, ACircleFlownInBurstsClosesInDroneTime)
 {
-  // One turn to the left in 10 s at 1 m/s; three packets of five are lost. Host time has no part in
-  // it.
+  // One turn to the left in 10 s at 1 m/s; three packets of five are lost. Host time has no part in it.
   NavdataOdometry odometry;
   for (int i = 0; i <= 2000; ++i)
     if (i % 5 < 2 || i == 2000)
@@ -161,8 +160,7 @@ TEST(NavdataOdometry, StepCovarianceGrowsWithTimeAndSpeedAndTurnsWithTheBody)
 
 TEST(NavdataOdometry, ReadsTheSignsOfARealFlight)
 {
-  // AR.Drone 1, a step of the forward command: nose down (negative pitch) makes the drone fly
-  // forward.
+  // AR.Drone 1, a step of the forward command: nose down (negative pitch) makes the drone fly forward.
   const std::string folder = std::string(BOLE_SHARED_DATA_DIR) + "/ardrone/ardrone1_telemetry/8sStepHalfMagNH1/";
   std::FILE *pitch_file = std::fopen((folder + "theta_dump.dat").c_str(), "r");
   std::FILE *speed_file = std::fopen((folder + "vx_dump.dat").c_str(), "r");

@@ -69,8 +69,7 @@ TEST(RobotArDrone, TakesOffMovesAndLands)
   robot.setMaxTranslationVelocity(10);
   robot.setMaxRotationVelocity(3);
 
-  // Camera's z is forward and its y down: faster than it flies, so nose down; climbing; turning
-  // left.
+  // Camera's z is forward and its y down: faster than it flies, so nose down; climbing; turning left.
   vpColVector v(6, 0.0);
   v[2] = 8;
   v[1] = -0.35;

@@ -107,9 +107,8 @@ TEST(Uvlc, ReadsTheHeaderOfAPictureThatADroneSent)
 
 TEST(Uvlc, DecodesAPictureWrittenByHand)
 {
-  // 160x120: eight rows of ten macroblocks. The first is white on its left half (DC 680 * 3 / 8 =
-  // 255), the second is not coded, the others are black; the last four lines of the last row are
-  // not shown.
+  // 160x120: eight rows of ten macroblocks. The first is white on its left half (DC 680 * 3 / 8 = 255), the second is
+  // not coded, the others are black; the last four lines of the last row are not shown.
   std::string bits = kPicture;
   bits += "0 10000000 1010101000 0000000000 1010101000 0000000000 0101010101 0101010101 1 ";
   for (int i = 2; i < 10; ++i)

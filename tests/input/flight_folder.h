@@ -15,8 +15,7 @@
 
 namespace bole::test
 {
-/// 64x48 images at 10 Hz, gyro at 100 Hz, odometry that moves 0.1 m a frame along x. Removed at the
-/// end.
+/// 64x48 images at 10 Hz, gyro at 100 Hz, odometry that moves 0.1 m a frame along x. Removed at the end.
 class FlightFolder
 {
 public:

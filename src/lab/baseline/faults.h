@@ -4,9 +4,8 @@
 /// What trackers say and do when the camera or its link fails for a few frames.
 ///
 /// Idea: pieces of a flight, each started at the true pose a few frames before some of its images are replaced. A
-/// failure is silent when the pose is wrong and nothing is said, during the fault or after it. Recovered
-/// is the first frame after the fault that is right without complaint and stays so for two more; nobody helps
-/// beyond what Help says.
+/// failure is silent when the pose is wrong and nothing is said, during the fault or after it. Recovered is the first
+/// frame after the fault that is right without complaint and stays so for two more; nobody helps beyond what Help says.
 
 #include "lab/baseline/comparison.h"
 #include "lab/faults/image_fault.h"

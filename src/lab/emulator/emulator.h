@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// A drone made of sockets: serves video, navdata and the command port as an AR.Drone does, faults
-/// included.
+/// A drone made of sockets: serves video, navdata and the command port as an AR.Drone does, faults included.
 
 #include "ardrone/address.h"
 #include "ardrone/at_command.h"
@@ -55,9 +54,8 @@ struct SequenceFeedOptions
   std::size_t max_bytes = std::size_t{2} << 30; ///< of images in memory: a longer sequence is refused
   void validate() const;
 };
-/// Frames of \p source with navdata made from its odometry (velocity from differences, attitude,
-/// height) and gyro; level and still where it has none. Read into memory, since a loop flies it
-/// backwards too.
+/// Frames of \p source with navdata made from its odometry (velocity from differences, attitude, height) and gyro;
+/// level and still where it has none. Read into memory, since a loop flies it backwards too.
 std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options);
 /// The raw bytes of a recording (see recording.h).
 std::unique_ptr<PacketFeed> makeRecordingFeed(const std::string &folder);

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on
-/// board.
+/// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on board.
 
 #include "lab/simulation/random.h"
 #include <bole/pose.h>
 
 namespace bole
 {
-/// Noise of a small drone's sensors; the defaults are those of the recorded sequences this project
-/// is developed on.
+/// Noise of a small drone's sensors; the defaults are those of the recorded sequences this project is developed on.
 struct SensorOptions
 {
   std::uint64_t seed = 1;
@@ -37,8 +35,7 @@ class SimulatedImu
 {
 public:
   explicit SimulatedImu(const SensorOptions &options);
-  /// \param rate angular rate in the body frame [rad/s]; \param acceleration of the body in the
-  /// world [m/s^2].
+  /// \param rate angular rate in the body frame [rad/s]; \param acceleration of the body in the world [m/s^2].
   ImuSample measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate, const Eigen::Vector3d &acceleration);
 
 private:

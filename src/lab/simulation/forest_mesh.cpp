@@ -22,16 +22,13 @@ double polygonRadius(int sides)
 
 std::vector<double> ringHeights(const SimulatedTrunk &trunk, bool far)
 {
-  if (far) {
+  if (far)
     return {-0.3, 0.4, 3, 7, trunk.height};
-  }
   std::vector<double> heights{-0.3, 0, 0.05, 0.1, 0.16, 0.24, 0.34, 0.5, 0.75};
-  for (double h = 1; h < 4; h += 0.5) {
+  for (double h = 1; h < 4; h += 0.5)
     heights.push_back(h);
-  }
-  for (double h = 4; h < trunk.height; h += 1.5) {
+  for (double h = 4; h < trunk.height; h += 1.5)
     heights.push_back(h);
-  }
   heights.push_back(trunk.height);
   return heights;
 }
@@ -114,9 +111,8 @@ void addCrown(ForestMesh &mesh, const SimulatedTrunk &trunk, int leaves, double 
     const Eigen::Vector3d out(std::cos(angle), std::sin(angle), random.uniform(-0.2, 0.7));
     const Eigen::Vector3d tip = trunk.axisAt(h) + length * out;
     addTwig(mesh, trunk.axisAt(h), tip, 0.012 + 0.08 * trunk.radius, 0.12 * trunk.shade);
-    for (int leaf = 0; leaf < 5; ++leaf) {
+    for (int leaf = 0; leaf < 5; ++leaf)
       addLeaf(mesh, tip - out * random.uniform(0, 0.4) + random.normal3(0.1), 0.09, random.uniform(0.06, 0.18), random);
-    }
   }
 }
 
@@ -147,24 +143,19 @@ void addGround(ForestMesh &mesh, const Forest &forest)
 {
   const auto ticks = [](double low, double high) {
     std::vector<double> values;
-    for (double t = low - 90; t < low; t += 3) {
+    for (double t = low - 90; t < low; t += 3)
       values.push_back(t);
-    }
-    for (double t = low; t < high; t += 0.5) {
+    for (double t = low; t < high; t += 0.5)
       values.push_back(t);
-    }
-    for (double t = high; t <= high + 90; t += 3) {
+    for (double t = high; t <= high + 90; t += 3)
       values.push_back(t);
-    }
     return values;
   };
   const std::vector<double> xs = ticks(forest.near_min.x(), forest.near_max.x());
   const std::vector<double> ys = ticks(forest.near_min.y(), forest.near_max.y());
-  for (double y : ys) {
-    for (double x : xs) {
+  for (double y : ys)
+    for (double x : xs)
       mesh.ground.add({x, y, forest.terrain.height(x, y)});
-    }
-  }
   const std::uint32_t stride = static_cast<std::uint32_t>(xs.size());
   for (std::uint32_t row = 0; row + 1 < ys.size(); ++row) {
     for (std::uint32_t column = 0; column + 1 < stride; ++column) {
@@ -202,11 +193,9 @@ ForestMesh::ForestMesh(const Forest &forest)
     addCrown(*this, trunk, static_cast<int>(0.4 * crown_leaves), 0.26, false, random);
   }
   Random random(forest.options.seed, 500);
-  for (const Bush &bush : forest.bushes) {
+  for (const Bush &bush : forest.bushes)
     addBush(*this, bush, random);
-  }
-  for (const Sapling &sapling : forest.saplings) {
+  for (const Sapling &sapling : forest.saplings)
     addSapling(*this, sapling, random);
-  }
 }
 } // namespace bole

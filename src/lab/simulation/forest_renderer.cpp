@@ -27,11 +27,9 @@ class RayTable
 public:
   explicit RayTable(const CameraModel &camera) : m_stride(camera.pinhole.width + 1)
   {
-    for (int row = 0; row <= camera.pinhole.height; ++row) {
-      for (int column = 0; column <= camera.pinhole.width; ++column) {
+    for (int row = 0; row <= camera.pinhole.height; ++row)
+      for (int column = 0; column <= camera.pinhole.width; ++column)
         m_xy.push_back(undistorted(camera, {column - 0.5, row - 0.5}).cast<float>());
-      }
-    }
   }
   /// At (column + fu, row + fv), fu and fv from 0 to 1 across the pixel.
   Eigen::Vector2f at(int column, int row, float fu, float fv) const
@@ -202,13 +200,11 @@ float ForestRenderer::State::skyAt(const Eigen::Vector3f &direction) const
   const Eigen::Vector3f d = direction.normalized();
   const float azimuth = azimuthOf(d.x(), d.y());
   const float ridge = 0.03f + 0.05f * cover.at(azimuth * 90, 300, 6);
-  if (d.z() < ridge) { // woods beyond the scenery, with stems in them
+  if (d.z() < ridge) // woods beyond the scenery, with stems in them
     return haze_radiance * (0.55f + 0.3f * furrowed.at(azimuth * 800, 2000 * d.z(), 1));
-  }
   const float cloud = 0.8f + 0.2f * cover.at(azimuth * 60, 200 * d.z(), 8);
-  if (forest.options.light == Light::overcast) {
+  if (forest.options.light == Light::overcast)
     return cloud * (1.15f - 0.2f * d.z());
-  }
   const float to_sun = std::max(0.f, d.dot(forest.to_sun.cast<float>()));
   const float glow = to_sun * to_sun * to_sun;
   return cloud * (0.6f - 0.2f * d.z()) + 0.5f * glow * glow;
@@ -240,9 +236,8 @@ float ForestRenderer::State::shadeBark(unsigned quad, float u, float v, float di
 float ForestRenderer::State::shade(const RTCRayHit16 &packet, int k) const
 {
   const Eigen::Vector3f direction(packet.ray.dir_x[k], packet.ray.dir_y[k], packet.ray.dir_z[k]);
-  if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
+  if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID)
     return skyAt(direction);
-  }
   const float distance = packet.ray.tfar[k];
   float value = 0;
   if (packet.hit.geomID[k] == RayScene::kGround) {
@@ -266,9 +261,8 @@ void ForestRenderer::State::trace(const Pose &wMc_open, const Pose &wMc_close)
   std::fill(radiance.begin(), radiance.end(), 0.f);
   const Vector6d motion = wMc_close.minus(wMc_open);
   std::vector<Pose> poses;
-  for (int sample = 0; sample < samples; ++sample) {
+  for (int sample = 0; sample < samples; ++sample)
     poses.push_back(wMc_open.plus((sample + 0.5) / samples * motion));
-  }
   alignas(64) RTCRayHit16 packet;
   alignas(64) int valid[16];
   for (int row = 0; row < height; row += 4) {
@@ -278,17 +272,14 @@ void ForestRenderer::State::trace(const Pose &wMc_open, const Pose &wMc_close)
       for (int sample = 0; sample < samples; ++sample) {
         aim(poses[sample], tiles[sample], first, packet);
         scene.intersect(valid, packet);
-        for (int k = 0; k < 16; ++k) {
-          if (valid[k]) {
+        for (int k = 0; k < 16; ++k)
+          if (valid[k])
             radiance[static_cast<std::size_t>(row + (k >> 2)) * width + column + (k & 3)] += shade(packet, k);
-          }
-        }
       }
     }
   }
-  for (float &value : radiance) {
+  for (float &value : radiance)
     value /= samples;
-  }
 }
 
 void ForestRenderer::State::traceTruth(const Pose &wMc, RenderedFrame &frame) const
@@ -305,9 +296,8 @@ void ForestRenderer::State::traceTruth(const Pose &wMc, RenderedFrame &frame) co
       aim(wMc, centres, first, packet);
       scene.intersect(valid, packet);
       for (int k = 0; k < 16; ++k) {
-        if (!valid[k] || packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
+        if (!valid[k] || packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID)
           continue;
-        }
         const double depth = packet.ray.tfar[k];
         frame.depth[row + (k >> 2)][column + (k & 3)] =
             depth < kDepthReach ? static_cast<std::uint16_t>(std::lround(1000 * depth)) : kNothing;
@@ -338,8 +328,7 @@ void ForestRenderer::render(const Pose &wMc_open, const Pose &wMc_close, Rendere
   frame.gain = m_state->sensor.expose(m_state->radiance, frame.image);
   frame.depth.resize(0, 0);
   frame.trunk_id.resize(0, 0);
-  if (with_truth) {
+  if (with_truth)
     m_state->traceTruth(wMc_open.plus(0.5 * wMc_close.minus(wMc_open)), frame);
-  }
 }
 } // namespace bole

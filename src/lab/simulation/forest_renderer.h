@@ -3,11 +3,10 @@
 /// \file
 /// Pictures of a forest, by ray casting (Intel Embree), fast enough for a closed loop.
 ///
-/// Idea: the forest stands still and only the camera moves, so everything that does not depend on
-/// the camera is computed once: sun and sky light on the ground, on each trunk and on each leaf go
-/// into light maps. A frame then costs its primary rays, in coherent packets of 16, and table
-/// look-ups. The samples of a pixel are spread over its area and over the time of exposure:
-/// antialiasing and motion blur are one.
+/// Idea: the forest stands still and only the camera moves, so everything that does not depend on the camera is
+/// computed once: sun and sky light on the ground, on each trunk and on each leaf go into light maps. A frame then
+/// costs its primary rays, in coherent packets of 16, and table look-ups. The samples of a pixel are spread over its
+/// area and over the time of exposure: antialiasing and motion blur are one.
 
 #include "lab/simulation/forest.h"
 #include <bole/camera.h>
@@ -32,8 +31,7 @@ struct RendererOptions
   void validate() const;
 };
 
-/// One picture. Depth and trunk ids are those of the ray through each pixel's centre in the middle
-/// of the exposure.
+/// One picture. Depth and trunk ids are those of the ray through each pixel's centre in the middle of the exposure.
 struct RenderedFrame
 {
   vpImage<unsigned char> image;
@@ -42,9 +40,8 @@ struct RenderedFrame
   double gain = 1;                 ///< of this frame's exposure
 };
 
-/// Laws (each a test): same forest, options and poses, same bytes; the borders of a trunk without
-/// lean, bow, taper and flare are those of relativeTrunk() to 0.1 px; depth agrees with the
-/// ray-cylinder distance.
+/// Laws (each a test): same forest, options and poses, same bytes; the borders of a trunk without lean, bow, taper and
+/// flare are those of relativeTrunk() to 0.1 px; depth agrees with the ray-cylinder distance.
 ///
 /// Cost: about 9 ms a sample a pixel and frame of 320x240 on one core (3 samples: 27 ms);
 /// construction a second or two. Not thread-safe: one renderer a thread.

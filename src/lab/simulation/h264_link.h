@@ -13,8 +13,7 @@ namespace bole
 class H264Link
 {
 public:
-  /// \param width, height even [px]; \param kbps 50 to 20000. Throws vpException where libavcodec
-  /// has no H.264 encoder.
+  /// \param width, height even [px]; \param kbps 50 to 20000. Throws vpException where libavcodec has no H.264 encoder.
   H264Link(int width, int height, double rate_hz, double kbps);
   ~H264Link();
   H264Link(H264Link &&) noexcept;

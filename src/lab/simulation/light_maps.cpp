@@ -29,9 +29,8 @@ double skyShare(const RayScene &scene, const Eigen::Vector3d &point, const Eigen
   double seen = 0;
   for (const Eigen::Vector3d &direction : directions) {
     const double cosine = normal.dot(direction);
-    if (cosine > 0 && !scene.occluded(point, direction, 40)) {
+    if (cosine > 0 && !scene.occluded(point, direction, 40))
       seen += cosine;
-    }
   }
   return seen / 6; // 6 = the sum of the cosines on open ground
 }
@@ -69,9 +68,8 @@ LightGrid groundLight(const Forest &forest, const RayScene &scene, const LightMa
   LightGrid grid = emptyGrid(low, high, cell);
   fill(grid, [&](double x, double y) {
     double light = sky.at(static_cast<float>(x), static_cast<float>(y));
-    if (maps.sun > 0 && !scene.occluded(above(x, y), forest.to_sun)) {
+    if (maps.sun > 0 && !scene.occluded(above(x, y), forest.to_sun))
       light += maps.sun * forest.to_sun.z();
-    }
     return light;
   });
   return grid;
@@ -115,9 +113,8 @@ BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const Ray
     double light = sky.at(turn, height);
     const auto [point, normal] = pointAndNormal(turn, height);
     const double cosine = normal.dot(forest.to_sun);
-    if (maps.sun > 0 && cosine > 0 && !scene.occluded(point, forest.to_sun)) {
+    if (maps.sun > 0 && cosine > 0 && !scene.occluded(point, forest.to_sun))
       light += maps.sun * cosine;
-    }
     return light;
   });
   return map;
@@ -133,9 +130,8 @@ std::vector<float> leafLight(const Forest &forest, const ForestMesh &mesh, const
     const Eigen::Vector3d normal = (corner(2) - corner(0)).cross(corner(3) - corner(1)).normalized();
     const Eigen::Vector3d centre = 0.25 * (corner(0) + corner(1) + corner(2) + corner(3));
     double value = maps.sky * (0.35 + 0.4 * std::abs(normal.z()));
-    if (maps.sun > 0 && !scene.occluded(centre + 0.03 * forest.to_sun, forest.to_sun)) {
+    if (maps.sun > 0 && !scene.occluded(centre + 0.03 * forest.to_sun, forest.to_sun))
       value += 0.75 * maps.sun * std::abs(normal.dot(forest.to_sun)); // leaves let light through
-    }
     light[k] = static_cast<float>(value);
   }
   return light;
@@ -170,12 +166,10 @@ LightMaps::LightMaps(const Forest &forest, const ForestMesh &mesh, const RayScen
   near_ground = groundLight(forest, scene, *this, forest.near_min, forest.near_max, 0.1, 0.7);
   const Eigen::Vector2d reach(90, 90);
   far_ground = groundLight(forest, scene, *this, forest.near_min - reach, forest.near_max + reach, 0.6, 6);
-  for (const SimulatedTrunk &trunk : forest.trunks) {
+  for (const SimulatedTrunk &trunk : forest.trunks)
     bark.push_back(barkLight(forest, trunk, scene, *this, false));
-  }
-  for (const SimulatedTrunk &trunk : forest.far_trunks) {
+  for (const SimulatedTrunk &trunk : forest.far_trunks)
     bark.push_back(barkLight(forest, trunk, scene, *this, true));
-  }
   leaves = leafLight(forest, mesh, scene, *this);
 }
 } // namespace bole

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Light that does not depend on the camera, computed once: irradiance over pi of ground, bark and
-/// leaves.
+/// Light that does not depend on the camera, computed once: irradiance over pi of ground, bark and leaves.
 
 #include "lab/simulation/ray_scene.h"
 

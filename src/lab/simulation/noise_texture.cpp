@@ -10,15 +10,13 @@ namespace bole
 {
 namespace
 {
-/// Periodic value noise with \p cells_u x \p cells_v random values over the texture, added to \p
-/// texels.
+/// Periodic value noise with \p cells_u x \p cells_v random values over the texture, added to \p texels.
 void addNoise(std::vector<float> &texels, int columns, int rows, int cells_u, int cells_v, float amplitude,
               Random &random)
 {
   std::vector<float> grid(static_cast<std::size_t>(cells_u) * cells_v);
-  for (float &value : grid) {
+  for (float &value : grid)
     value = static_cast<float>(random.normal());
-  }
   const auto smooth = [](float t) { return t * t * (3 - 2 * t); };
   for (int row = 0; row < rows; ++row) {
     const float y = static_cast<float>(row) * cells_v / rows;
@@ -42,9 +40,8 @@ std::vector<float> exponential(std::vector<float> texels)
     value = std::exp(std::clamp(value, -2.f, 2.f));
     sum += value;
   }
-  for (float &value : texels) {
+  for (float &value : texels)
     value *= static_cast<float>(texels.size() / sum);
-  }
   return texels;
 }
 } // namespace
@@ -75,9 +72,8 @@ NoiseTexture furrowedBark(std::uint64_t seed)
   std::vector<float> texels(kColumns * kRows, 0.f), ridges(kColumns * kRows, 0.f);
   addNoise(ridges, kColumns, kRows, 32, 40, 1.f, random); // furrows along the trunk
   addNoise(ridges, kColumns, kRows, 64, 120, 0.5f, random);
-  for (std::size_t k = 0; k < texels.size(); ++k) {
+  for (std::size_t k = 0; k < texels.size(); ++k)
     texels[k] = 0.6f * std::min(1.f, std::abs(ridges[k])) - 0.3f;
-  }
   addNoise(texels, kColumns, kRows, 4, 8, 0.14f, random); // moss and stains
   addNoise(texels, kColumns, kRows, 16, 64, 0.12f, random);
   addNoise(texels, kColumns, kRows, 128, 512, 0.16f, random);
@@ -90,9 +86,8 @@ NoiseTexture smoothBark(std::uint64_t seed)
   Random random(seed, 102);
   std::vector<float> texels(kColumns * kRows, 0.f), marks(kColumns * kRows, 0.f);
   addNoise(marks, kColumns, kRows, 16, 256, 1.f, random); // wide and low: cross marks
-  for (std::size_t k = 0; k < texels.size(); ++k) {
+  for (std::size_t k = 0; k < texels.size(); ++k)
     texels[k] = marks[k] > 1.3f ? -1.1f : 0.f;
-  }
   addNoise(texels, kColumns, kRows, 4, 6, 0.10f, random);
   addNoise(texels, kColumns, kRows, 16, 32, 0.07f, random);
   addNoise(texels, kColumns, kRows, 128, 512, 0.06f, random);
@@ -105,9 +100,8 @@ NoiseTexture groundCover(std::uint64_t seed)
   Random random(seed, 103);
   std::vector<float> texels(kSize * kSize, 0.f);
   for (const auto &[cells, amplitude] :
-       {std::pair(8, 0.12f), {32, 0.10f}, {128, 0.13f}, {256, 0.18f}, {512, 0.22f}, {1024, 0.24f}}) {
+       {std::pair(8, 0.12f), {32, 0.10f}, {128, 0.13f}, {256, 0.18f}, {512, 0.22f}, {1024, 0.24f}})
     addNoise(texels, kSize, kSize, cells, cells, amplitude, random);
-  }
   return NoiseTexture(kSize, kSize, exponential(std::move(texels)));
 }
 } // namespace bole

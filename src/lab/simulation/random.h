@@ -9,9 +9,8 @@
 
 namespace bole
 {
-/// A small generator (SplitMix64, public domain algorithm of S. Vigna) with the few distributions
-/// the simulator needs; the distributions of the standard library differ from one implementation to
-/// the next.
+/// A small generator (SplitMix64, public domain algorithm of S. Vigna) with the few distributions the simulator needs;
+/// the distributions of the standard library differ from one implementation to the next.
 ///
 /// Law: two generators of one seed and stream give the same numbers. Different streams of one seed
 /// are independent, so that asking one part of the forest for more numbers changes no other part.

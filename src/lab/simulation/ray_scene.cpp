@@ -11,9 +11,8 @@ RayScene::RayScene(const ForestMesh &mesh)
 {
   // One thread: builds are the same every time and a closed loop keeps to its core.
   m_device = rtcNewDevice("threads=1,set_affinity=0");
-  if (!m_device) {
+  if (!m_device)
     throw vpException(vpException::fatalError, "Embree could not start on this processor");
-  }
   m_scene = rtcNewScene(m_device);
   rtcSetSceneBuildQuality(m_scene, RTC_BUILD_QUALITY_MEDIUM);
   attach(mesh.ground, kGround);
@@ -30,9 +29,8 @@ RayScene::~RayScene()
 
 void RayScene::attach(const QuadMesh &mesh, unsigned id)
 {
-  if (mesh.size() == 0) {
+  if (mesh.size() == 0)
     return;
-  }
   RTCGeometry geometry = rtcNewGeometry(m_device, RTC_GEOMETRY_TYPE_QUAD);
   void *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                            mesh.vertices.size());
