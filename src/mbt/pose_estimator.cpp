@@ -21,11 +21,13 @@ constexpr double kRefine_px = 5;       ///< greatest half-width of the second
 constexpr double kReach_px = 4;        ///< between the place of a piece and that of its border
 constexpr double kKnownVelocity = 0.3; ///< how much a known velocity changes, as a share of an unknown one
 constexpr double kClimb = 0.25;        ///< a step along the trunks, as a share of a step across them
-// Without a prior: limits below which right poses of simulated flights rarely fall.
+// Without a prior: limits below which right poses of rendered flights rarely fall.
 constexpr double kRightAgreement = 0.79; ///< mean of right poses; wrong ones have 0.57
 constexpr double kMinAgreement = 0.68;
-constexpr double kTrustAgain = 0.06; ///< beyond kMinAgreement, after a doubt
-constexpr double kMaxJump = 9;       ///< squared Mahalanobis distance from the motion expected
+constexpr double kTrustAgain = 0.06;     ///< beyond kMinAgreement, after a doubt
+constexpr double kAgreementSigma = 0.07; ///< of right poses from one frame to the next, as a share of what it was
+constexpr double kMaxSurprise = 9;       ///< chi-square of a motion and a loss of agreement that no flight has
+constexpr double kAgreementRate = 0.25, kSurprisedRate = 0.05; ///< how fast the remembered agreement follows
 
 /// What a border may show at each offset: how well it continues what it showed before, 0 .. 1, widened by a pixel.
 std::vector<float> responseOf(const ModelBorder &border)
@@ -237,15 +239,25 @@ PoseEstimator::Status PoseEstimator::search(const vpImage<unsigned char> &I, con
   choosePeaks(Vector6d::Zero(), kReach_px - 1, camera);
   servo(expected, focalOf(camera));
 
-  const double supporting = support();
-  m_agreement += 0.25 * (0.5 * (voted.score + supporting) - m_agreement);
+  const double supporting = support(), agreement = 0.5 * (voted.score + supporting);
+  const bool is_surprise = !prior && surprise(expected, agreement) > kMaxSurprise;
+  m_agreement += (is_surprise ? kSurprisedRate : kAgreementRate) * (agreement - m_agreement);
   m_is_doubtful = m_agreement < kMinAgreement + (m_is_doubtful ? kTrustAgain : 0);
-  const Vector6d jump = twistBetween(expected.cMo, m_pose);
-  const bool has_jumped = !prior && jump.dot(expected.covariance.llt().solve(jump)) > kMaxJump;
-  if (!has_jumped && supporting >= options.min_support)
+  if (!is_surprise && supporting >= options.min_support)
     return Status::tracked;
-  m_message = "the borders of the trunks are not where they can be";
+  m_message = is_surprise ? "the camera jumped: the borders found are not those of the frames before"
+                          : "the borders of the trunks are not where they can be";
   return Status::lost;
+}
+
+/// How unlikely the pose just found is after the frames before: the squared Mahalanobis distance from the motion
+/// expected, and that of the loss of \p agreement. After a jump beyond the scan some other pose within the motion
+/// expected fits part of the borders by chance; a right one keeps nearly all that it had.
+double PoseEstimator::surprise(const ExpectedPose &expected, double agreement) const
+{
+  const Vector6d jump = twistBetween(expected.cMo, m_pose);
+  const double loss = std::max(0.0, 1 - agreement / m_agreement) / kAgreementSigma;
+  return jump.dot(expected.covariance.llt().solve(jump)) + loss * loss;
 }
 
 /// Covariance and unobserved directions of the pose just found.

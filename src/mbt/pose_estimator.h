@@ -79,6 +79,7 @@ private:
   Vote agree(const Matrix6d &covariance) const;
   void choosePeaks(const Vector6d &twist, double reach_px, const PinholeCamera &camera);
   Status search(const vpImage<unsigned char> &I, const PinholeCamera &camera, const ExpectedPose &expected);
+  double surprise(const ExpectedPose &expected, double agreement) const;
   void keep(const ExpectedPose &expected);
   Status judge();
   // pose_servo.cpp

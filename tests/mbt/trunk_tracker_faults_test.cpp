@@ -171,6 +171,20 @@ TEST(TrunkTrackerFaults, AJumpThatThePriorExpectsIsFollowed)
   EXPECT_LT(test::metresApart(Pose::fromVisp(scene.tracker.getPose()), jumped), 0.05);
 }
 
+/// The true pose lies beyond the scan, and others fit part of the borders by chance.
+TEST(TrunkTrackerFaults, AJumpWithoutAPriorIsSaidAtOnceAndTheFlightGoesOnWhereItEnds)
+{
+  for (const double aside : {-0.9, -0.75, -0.6, -0.45, 0.45, 0.6, 0.75, 0.9}) {
+    Scene scene;
+    for (int k = 1; k <= 4; ++k)
+      ASSERT_FALSE(scene.complains(scene.image(k)));
+    const Pose jumped = cameraAt({0.2, aside, 1.2}, 0.03);
+    EXPECT_TRUE(scene.complains(test::drawTrunks(scene.camera, jumped, scene.trunks, 9))) << aside;
+    EXPECT_EQ(scene.tracker.getStatus(), Status::lost) << aside;
+    EXPECT_LE(framesToRecovery(scene, 6), 3) << aside;
+  }
+}
+
 TEST(TrunkTrackerFaults, NoTrunkInViewIsSaid)
 {
   Scene scene;
