@@ -15,7 +15,8 @@ struct ServoTrialOptions
   double distance = 3;      ///< hold [m], 0.5 to 20
   double ratio = 0;         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
   double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
-  Options pipeline = defaultPipeline();
+  PerceptionKind perception = PerceptionKind::real;
+  Options pipeline = defaultPipeline(); ///< of real perception
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
@@ -45,6 +46,7 @@ struct ServoTrialResult
   double median_loop_ms, p95_loop_ms;
   double hover_after_s, drift; ///< fault: until it hovered [s]; how far it moved while it lasted [m]
   LoopRecord record;
+  std::vector<SimulatedTrunk> trunks; ///< it flew among
 
   ServoTrialResult();
 };
