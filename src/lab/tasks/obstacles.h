@@ -66,6 +66,8 @@ class SeenSpace
 public:
   /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
   void see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s);
+  /// Where the drone is, nothing else stands.
+  void stand(const Eigen::Vector2d &p);
   /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
   bool isSeen(const Eigen::Vector2d &p) const;
 
@@ -82,10 +84,4 @@ private:
   std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
   double m_time_s = 0;
 };
-
-/// \p velocity [m/s, world] at \p p, with what of it leads to a confirmed trunk of at least \p evidence cut to a speed
-/// that dies out with the free way between a body of \p body_radius [m] and the bark. Nothing pushes back: what is no
-/// trunk must not drive the drone into one.
-Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
-                          double body_radius, double evidence);
 } // namespace bole
