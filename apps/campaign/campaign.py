@@ -250,8 +250,8 @@ def summaries(campaign, flights):
                 add("precision", ratio_interval([f for f in judged if f["confirmed"]], "matches", "confirmed"))
                 for name in MEASURES:
                     add(name, bootstrap_median([f.get(name) for f in judged]))
-            if some and "succeeded" in some[0]:
-                k = sum(bool(f["succeeded"]) for f in some)
+            if some and "success" in some[0]:
+                k = sum(bool(f["success"]) for f in some)
                 add("succeeded", (k / len(some), *wilson(k, len(some))))
     return rows
 

@@ -6,6 +6,7 @@
 #include "overlay_window.h"
 
 #include "lab/trials/error_curves.h"
+#include "lab/trials/failure_sheet.h"
 #include "lab/trials/median_interval.h"
 #include "lab/trials/servo_trial.h"
 #include "output/atomic_file.h"
@@ -22,6 +23,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <visp3/io/vpImageIo.h>
 
 namespace bole::apps
 {
@@ -30,7 +32,7 @@ namespace
 struct ServoArguments
 {
   ServoTrialOptions trial;
-  std::string folder, fault = "none", config;
+  std::string folder, fault = "none", perception = "real", config;
   std::vector<std::string> settings;
   int runs = 1;
   bool is_shown = false, has_video = true, is_ungated = false;
@@ -58,11 +60,17 @@ const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::ser
                                       {"hover after fault [s]", &ServoTrialResult::hover_after_s},
                                       {"drift in fault [m]", &ServoTrialResult::drift}};
 
-vpImage<vpRGBa> pictureOf(const Frame &frame, const FrameReport &report, const LoopSample &sample,
-                          const PinholeCamera &camera)
+/// A frame and what was found in it: the sheet of a failure shows one, and which is known at the end only.
+struct SeenFrame
+{
+  vpImage<unsigned char> image;
+  std::vector<TrunkInView> trunks;
+};
+
+vpImage<vpRGBa> pictureOf(const SeenFrame &frame, const LoopSample &sample, const PinholeCamera &camera)
 {
   Overlay overlay;
-  for (const TrunkInView &trunk : report.trunks)
+  for (const TrunkInView &trunk : frame.trunks)
     overlay.trunks.push_back(
         {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
   overlay.is_warning = sample.is_lost;
@@ -145,6 +153,7 @@ void writeTables(const ServoArguments &arguments, const std::vector<ServoTrialRe
                       {"failures", failures(results)},
                       {"gated", arguments.trial.pipeline.stages.saliency},
                       {"fault", arguments.fault},
+                      {"perception", arguments.perception},
                       {"version", BOLE_VERSION}};
   for (const Column &column : kColumns) {
     const MedianInterval median = medianOf(column, results);
@@ -193,18 +202,41 @@ std::string runFolder(const ServoArguments &arguments, std::uint64_t seed)
   return folder;
 }
 
+/// sheet.html, and parting.png where there are images.
+void writeSheet(const std::string &folder, const std::string &title, const ServoTrialResult &result,
+                const std::vector<SeenFrame> &frames, const PinholeCamera &camera)
+{
+  const auto parting = findParting(result.record, result.trunks);
+  std::string picture;
+  if (parting && parting->sample < frames.size()) {
+    picture = "parting.png";
+    AtomicFile file(folder + "/" + picture);
+    vpImageIo::write(pictureOf(frames[parting->sample], result.record.samples[parting->sample], camera),
+                     file.temporaryPath());
+    file.commit();
+  }
+  writeAtomically(folder + "/sheet.html", failureSheet(result.record, result.trunks, title, parting, picture));
+  std::fprintf(stderr, "%s/sheet.html: %s\n", folder.c_str(),
+               parting ? parting->what.c_str() : "belief and truth did not part");
+}
+
 ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, std::uint64_t seed,
                      OverlayWindow &window)
 {
   trial.scenario.seed = seed;
   const std::string folder = runFolder(arguments, seed);
   std::unique_ptr<VideoWriter> video;
-  if (arguments.has_video && !folder.empty())
+  const bool has_video = arguments.has_video && !folder.empty();
+  trial.robot.has_images = trial.perception != PerceptionKind::truth || has_video || arguments.is_shown;
+  if (has_video)
     video = std::make_unique<VideoWriter>(folder + "/overlay.mp4");
   const PinholeCamera camera = trial.robot.renderer.camera.pinhole;
+  std::vector<SeenFrame> frames;
   const auto watcher = [&](const Frame &frame, const FrameReport &report, const LoopSample &sample) {
+    if (trial.robot.has_images && !folder.empty())
+      frames.push_back({frame.image, report.trunks});
     if (video || arguments.is_shown) {
-      const vpImage<vpRGBa> picture = pictureOf(frame, report, sample, camera);
+      const vpImage<vpRGBa> picture = pictureOf({frame.image, report.trunks}, sample, camera);
       if (video)
         video->write(picture, frame.stamp_ns);
       window.show(picture);
@@ -219,6 +251,8 @@ ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, s
                                           result.is_success ? "succeeded" : result.outcome);
     writeAtomically(folder + "/errors.svg", errorCurves(result.record, title));
     writeAtomically(folder + "/samples.csv", samplesCsv(result.record));
+    if (!result.is_success)
+      writeSheet(folder, title, result, frames, camera);
   }
   return result;
 }
@@ -230,7 +264,13 @@ void run(ServoArguments &arguments)
   setOptions(arguments.settings, arguments.trial.pipeline);
   if (arguments.is_ungated)
     arguments.trial.pipeline.stages.saliency = false;
-  arguments.trial.loop.fault.kind = faultKindFromString(arguments.fault);
+  const FaultOptions fault = faultFromString(arguments.fault);
+  arguments.trial.loop.fault.kind = fault.kind;
+  arguments.trial.loop.fault.sensor = fault.sensor;
+  arguments.trial.perception = perceptionFromString(arguments.perception);
+  if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
+    throw vpException(vpException::badValue, "fault = %s with perception = truth, must be none: no image is looked at",
+                      arguments.fault.c_str());
   arguments.trial.loop.validate();
   OverlayWindow window(arguments.is_shown, "bole servo");
   endAtInterrupt();
@@ -244,6 +284,7 @@ void run(ServoArguments &arguments)
                  static_cast<unsigned long long>(result.seed),
                  result.is_success ? "succeeded" : result.outcome.c_str());
     result.record.samples.clear(); // written already; a hundred of them would fill the memory
+    result.trunks.clear();
     results.push_back(std::move(result));
     writeTables(arguments, results);
   }
@@ -285,11 +326,20 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
     task->add_option("--length", trial.scenario.length, "[m]")->capture_default_str()->check(CLI::Range(1.0, 1000.0));
   }
   task->add_option("--duration", trial.loop.duration_s, "Of servoing, at most [s]")->capture_default_str();
-  task->add_option("--fault", arguments->fault, "black, freeze or noise: what the camera shows for a while");
+  task->add_option("--fault", arguments->fault,
+                   "For a while: black, freeze, noise, smear (images), odometry-freeze, odometry-jump, odometry-gone, "
+                   "gyro-gone, gyro-bias");
   task->add_option("--fault-at", trial.loop.fault.start_s, "After servoing began [s]")->capture_default_str();
   task->add_option("--fault-for", trial.loop.fault.duration_s, "[s]")->capture_default_str();
+  task->add_option("--perception", arguments->perception,
+                   "What the task is told: real (the tracker), truth-map (images tracked against the true trunks) or "
+                   "truth (no image is looked at)")
+      ->capture_default_str();
   task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();
   task->add_option("--samples", trial.robot.renderer.samples_per_pixel, "Rays a pixel")->capture_default_str();
+  task->add_option("--latency", trial.robot.video_delay_s,
+                   "From exposure to the frame's arrival [s], known to the task")
+      ->capture_default_str();
   task->add_option("--gust", trial.robot.body.gust, "Standard deviation of the wind's push [m/s^2]")
       ->capture_default_str();
   task->add_option("--config", arguments->config, "Options of the pipeline (YAML)");

@@ -3,6 +3,7 @@
 /// \file
 /// Flying an AR.Drone with ViSP's robot interface.
 
+#include <bole/flight_laws.h>
 #include <bole/vpArDroneGrabber.h>
 
 #include <bole/visp.h>
@@ -14,10 +15,10 @@
 /// Idea: nothing is sent until open() gets the permission to fly; without it every command throws.
 /// The drone obeys tilts, not velocities, so a loop at 30 Hz turns the wanted horizontal velocity
 /// into tilts by a proportional law on the velocity of the navdata: tilt = gain (wanted - measured)
-/// of the largest tilt. Climb and turn are shares of the drone's largest rates. A watchdog stands
-/// in the same loop: setVelocity() not renewed within hover_after_s makes the drone hover, within
-/// land_after_s land; navdata that stay out do the same. The destructor and close() land a drone
-/// that this object took off.
+/// of the largest tilt. Climb and turn are shares of the drone's largest rates. In the same loop stand
+/// bole::FlightLaws: commands or navdata that stay out make the drone hover and then land, a low battery lands it, a
+/// fence and a band of heights cut what leads beyond them. The destructor and close() land a drone that this object
+/// took off.
 ///
 /// Degrees of freedom: vx, vy, vz, wz of the body (x forward, y left, z up); the others follow from
 /// flying and are ignored. Thread-safe.
@@ -43,8 +44,7 @@ public:
   /// Limits of what is sent.
   struct Options
   {
-    double hover_after_s = 0.5; ///< [s], (0.05, 2): five frames of a slow tracker
-    double land_after_s = 3;    ///< [s], (0.1, 60), more than hover_after_s
+    bole::FlightLawOptions laws;
     double gain = 0.3;          ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
     double largest_share = 0.5; ///< (0, 1]: of tilt, climb and turn
     double largest_climb = 0.7; ///< [m/s], (0, 5): the drone's setting control:control_vz_max
@@ -90,7 +90,8 @@ public:
     hovers,
     lands
   };
-  Watchdog watchdog() const; ///< what the loop does now
+  Watchdog watchdog() const;     ///< what the loop does now
+  std::string brokenLaw() const; ///< the law that overrules what was wanted now; empty where none does
 
   // The rest of vpRobot.
   /// Nothing to be done: open() starts it.

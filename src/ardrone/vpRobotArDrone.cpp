@@ -7,6 +7,7 @@
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
 #include "geometry/require_range.h"
+#include "geometry/yaw.h"
 
 #include <algorithm>
 #include <atomic>
@@ -24,7 +25,7 @@ constexpr int kRepeats = 3;                      // single datagrams get lost
 
 struct vpRobotArDrone::State
 {
-  State(vpArDroneGrabber &g, const Options &o) : grabber(g), options(o) {}
+  State(vpArDroneGrabber &g, const Options &o) : grabber(g), options(o), laws(o.laws) {}
 
   vpArDroneGrabber &grabber;
   const Options options;
@@ -35,7 +36,8 @@ struct vpRobotArDrone::State
   int emergency_pulses = 0;
   Eigen::Vector4d wanted = Eigen::Vector4d::Zero(); // vx, vy, vz, wz of the body
   bool has_wanted = false;
-  std::int64_t renewed_ns = 0;
+  bole::FlightLaws laws;
+  const char *law = "";
   Watchdog watchdog = Watchdog::idle;
   std::optional<bole::Pose> last_position;
 
@@ -43,6 +45,8 @@ struct vpRobotArDrone::State
   {
     return static_cast<float>(std::clamp(value, -options.largest_share, options.largest_share));
   }
+
+  static double now_s() { return 1e-9 * static_cast<double>(bole::steadyNowNs()); }
 
   void run()
   {
@@ -66,8 +70,12 @@ struct vpRobotArDrone::State
       commands.reference(false, false);
       return;
     }
-    const double age_s = static_cast<double>(bole::steadyNowNs() - renewed_ns) * 1e-9;
-    if (age_s > options.land_after_s) {
+    std::optional<bole::OwnState> own;
+    if (body)
+      own = {body->wMb.t.head<2>(), bole::yawOf(body->wMb), body->height, body->battery};
+    const bole::FlightOrder order = laws.apply(now_s(), has_wanted ? std::optional(wanted) : std::nullopt, own);
+    law = order.law;
+    if (order.kind == bole::FlightOrder::Kind::lands) {
       watchdog = Watchdog::lands;
       in_air = false;
       has_wanted = false;
@@ -75,16 +83,16 @@ struct vpRobotArDrone::State
       return;
     }
     commands.reference(true, false);
-    const bool fresh = has_wanted && age_s <= options.hover_after_s && body;
-    watchdog = fresh || !has_wanted ? Watchdog::content : Watchdog::hovers;
-    if (!fresh) {
+    const bool flies = order.kind == bole::FlightOrder::Kind::flies;
+    watchdog = flies || !has_wanted ? Watchdog::content : Watchdog::hovers;
+    if (!flies) {
       commands.move(false, 0, 0, 0, 0);
       return;
     }
     // Forward needs the nose down and leftward the left side down: both negative for the drone.
-    const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body->velocity.head<2>());
-    commands.move(true, share(-tilt.y()), share(-tilt.x()), share(wanted.z() / options.largest_climb),
-                  share(-wanted.w() / options.largest_turn));
+    const Eigen::Vector2d tilt = options.gain * (order.velocity.head<2>() - body->velocity.head<2>());
+    commands.move(true, share(-tilt.y()), share(-tilt.x()), share(order.velocity.z() / options.largest_climb),
+                  share(-order.velocity.w() / options.largest_turn));
   }
 
   void requireOpen() const
@@ -99,8 +107,7 @@ vpRobotArDrone::Options::Options() : bMc(bole::forwardCamera().toVisp()) {}
 
 void vpRobotArDrone::Options::validate() const
 {
-  bole::requireRange("hover_after_s", hover_after_s, 0.05, 2);
-  bole::requireRange("land_after_s", land_after_s, hover_after_s, 60);
+  laws.validate();
   bole::requireRange("gain", gain, 1e-9, 2);
   bole::requireRange("largest_share", largest_share, 1e-9, 1);
   bole::requireRange("largest_climb", largest_climb, 1e-9, 5);
@@ -147,7 +154,7 @@ void vpRobotArDrone::takeOff()
   const std::lock_guard<std::mutex> lock(m_state->mutex);
   m_state->in_air = true;
   m_state->has_wanted = false;
-  m_state->renewed_ns = bole::steadyNowNs();
+  m_state->laws.takeOff(m_state->now_s());
 }
 
 void vpRobotArDrone::land()
@@ -164,7 +171,7 @@ void vpRobotArDrone::hover()
   m_state->requireOpen();
   const std::lock_guard<std::mutex> lock(m_state->mutex);
   m_state->has_wanted = false;
-  m_state->renewed_ns = bole::steadyNowNs();
+  m_state->laws.renew(m_state->now_s());
 }
 
 void vpRobotArDrone::emergency()
@@ -191,13 +198,19 @@ void vpRobotArDrone::setVelocity(const vpRobot::vpControlFrameType frame, const 
   const std::lock_guard<std::mutex> lock(m_state->mutex);
   m_state->wanted = wanted;
   m_state->has_wanted = true;
-  m_state->renewed_ns = bole::steadyNowNs();
+  m_state->laws.renew(m_state->now_s());
 }
 
 vpRobotArDrone::Watchdog vpRobotArDrone::watchdog() const
 {
   const std::lock_guard<std::mutex> lock(m_state->mutex);
   return m_state->watchdog;
+}
+
+std::string vpRobotArDrone::brokenLaw() const
+{
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  return m_state->law;
 }
 
 void vpRobotArDrone::get_eJe(vpMatrix &jacobian) { jacobian = bole::quadrotorJacobian(); }

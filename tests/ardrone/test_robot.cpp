@@ -40,8 +40,8 @@ struct Flying
 vpRobotArDrone::Options patient()
 {
   vpRobotArDrone::Options options;
-  options.hover_after_s = 1.9; // a machine under load must not look like a dead tracker
-  options.land_after_s = 50;
+  options.laws.hover_after_s = 1.9; // a machine under load must not look like a dead tracker
+  options.laws.land_after_s = 50;
   return options;
 }
 } // namespace
@@ -104,8 +104,8 @@ TEST(RobotArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
 {
   Flying flying;
   vpRobotArDrone::Options options;
-  options.hover_after_s = 0.1;
-  options.land_after_s = 0.6;
+  options.laws.hover_after_s = 0.1;
+  options.laws.land_after_s = 0.6;
   vpRobotArDrone robot(flying.grabber, options);
   robot.open(vpRobotArDrone::Permission::fly);
   robot.takeOff();
@@ -117,6 +117,18 @@ TEST(RobotArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
     return c.name == "REF" && (std::stol(c.arguments[0]) & 1 << 9) != 0;
   }));
   EXPECT_TRUE(eventually([&] { return robot.watchdog() == vpRobotArDrone::Watchdog::idle; }));
+}
+
+TEST(RobotArDrone, KeepsTheFlightLaws)
+{
+  Flying flying;
+  vpRobotArDrone::Options options = patient();
+  options.laws.least_battery = 0.81; // the emulated drone says 80 per cent
+  vpRobotArDrone robot(flying.grabber, options);
+  robot.open(vpRobotArDrone::Permission::fly);
+  robot.takeOff();
+  EXPECT_TRUE(eventually([&] { return robot.brokenLaw() == "battery"; }));
+  EXPECT_TRUE(eventually([&] { return flying.last("REF") && !flying.inAir(); }));
 }
 
 TEST(RobotArDrone, LandsADroneThatItTookOffWhenItIsDestroyed)

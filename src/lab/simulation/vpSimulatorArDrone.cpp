@@ -3,7 +3,10 @@
 #include "geometry/body_velocity.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
+#include "geometry/yaw.h"
 #include "lab/simulation/h264_link.h"
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -27,10 +30,12 @@ struct vpSimulatorArDrone::State
         body(o.body, o.start, o.heading, f.terrain.height(o.start.x(), o.start.y())),
         imu(o.sensors),
         filter(o.sensors),
-        renderer(f, o.renderer),
         bMc(bole::Pose::fromVisp(o.bMc)),
+        laws(o.laws),
         last(body.pose())
   {
+    if (options.has_images)
+      renderer.emplace(forest, options.renderer);
     if (options.h264_kbps > 0)
       link.emplace(options.renderer.camera.pinhole.width, options.renderer.camera.pinhole.height, options.rate_hz,
                    options.h264_kbps);
@@ -41,13 +46,16 @@ struct vpSimulatorArDrone::State
   bole::Quadrotor body;
   bole::SimulatedImu imu;
   bole::PoseFilter filter;
-  bole::ForestRenderer renderer;
+  std::optional<bole::ForestRenderer> renderer;
   std::optional<bole::H264Link> link;
   const bole::Pose bMc;
 
   bool is_open = false, in_air = false, has_wanted = false;
   Eigen::Vector4d wanted = Eigen::Vector4d::Zero(); // vx, vy, vz, wz of the body
-  double renewed = 0;
+  bole::FlightLaws laws;
+  const char *law = "";
+  bool navdata_are_lost = false;
+  Eigen::Vector2d reckoned = Eigen::Vector2d::Zero(); // by the drone's own velocity, from where it stood [m]
   Watchdog watchdog = Watchdog::idle;
 
   long ticks = 0;
@@ -66,23 +74,39 @@ struct vpSimulatorArDrone::State
   void control()
   {
     bole::QuadrotorCommand command;
-    const double age = time() - renewed;
+    reckoned += kTicksPerCommand * kTick * (Eigen::Rotation2Dd(bole::yawOf(body.pose())) * body.measuredVelocity());
     watchdog = Watchdog::idle;
-    if (in_air && age > options.land_after_s) {
-      watchdog = Watchdog::lands;
-      in_air = has_wanted = false;
+    law = "";
+    bole::FlightOrder order;
+    if (in_air) {
+      order = laws.apply(time(), has_wanted ? std::optional(wanted) : std::nullopt, own());
+      law = order.law;
+      if (order.kind == bole::FlightOrder::Kind::lands) {
+        watchdog = Watchdog::lands;
+        in_air = has_wanted = false;
+      }
     }
     if (in_air) {
-      const bool fresh = has_wanted && age <= options.hover_after_s;
-      watchdog = fresh || !has_wanted ? Watchdog::content : Watchdog::hovers;
+      const bool flies = order.kind == bole::FlightOrder::Kind::flies;
+      watchdog = flies || !has_wanted ? Watchdog::content : Watchdog::hovers;
       command.is_flying = true;
-      command.is_hovering = !fresh;
-      const Eigen::Vector2d tilt = options.gain * (wanted.head<2>() - body.measuredVelocity());
+      command.is_hovering = !flies;
+      const Eigen::Vector2d tilt = options.gain * (order.velocity.head<2>() - body.measuredVelocity());
       command.tilt = {share(tilt.x()), share(tilt.y())};
-      command.climb = options.largest_climb * share(wanted.z() / options.largest_climb);
-      command.turn = options.largest_turn * share(wanted.w() / options.largest_turn);
+      command.climb = options.largest_climb * share(order.velocity.z() / options.largest_climb);
+      command.turn = options.largest_turn * share(order.velocity.w() / options.largest_turn);
     }
     body.command(command);
+  }
+
+  /// Navdata, as the robot's loop gets them.
+  std::optional<bole::OwnState> own() const
+  {
+    if (navdata_are_lost)
+      return std::nullopt;
+    const bole::Pose wMb = body.pose();
+    const double height = wMb.t.z() - forest.terrain.height(wMb.t.x(), wMb.t.y());
+    return bole::OwnState{reckoned, bole::yawOf(wMb), height, std::max(0.0, 1 - time() / options.battery_s)};
   }
 
   void tick()
@@ -135,6 +159,7 @@ void vpSimulatorArDrone::Options::validate() const
 {
   vpRobotArDrone::Options::validate();
   bole::requireRange("rate_hz", rate_hz, 1, 60);
+  bole::requireRange("battery_s", battery_s, 1, 1e5);
   bole::requireRange("exposure_s", exposure_s, 0, 0.1);
   bole::requireRange("video_delay_s", video_delay_s, 0, 1);
   bole::requireRange("h264_kbps", h264_kbps, 0, 20000);
@@ -165,7 +190,7 @@ void vpSimulatorArDrone::takeOff()
   m_state->requireOpen();
   m_state->in_air = true;
   m_state->has_wanted = false;
-  m_state->renewed = m_state->time();
+  m_state->laws.takeOff(m_state->time());
 }
 
 void vpSimulatorArDrone::land()
@@ -178,7 +203,7 @@ void vpSimulatorArDrone::hover()
 {
   m_state->requireOpen();
   m_state->has_wanted = false;
-  m_state->renewed = m_state->time();
+  m_state->laws.renew(m_state->time());
 }
 
 void vpSimulatorArDrone::emergency()
@@ -198,10 +223,12 @@ void vpSimulatorArDrone::setVelocity(const vpRobot::vpControlFrameType frame, co
   m_state->wanted =
       bole::bodyVelocity(frame, v, m_state->options.bMc, getMaxTranslationVelocity(), getMaxRotationVelocity());
   m_state->has_wanted = true;
-  m_state->renewed = m_state->time();
+  m_state->laws.renew(m_state->time());
 }
 
 vpSimulatorArDrone::Watchdog vpSimulatorArDrone::watchdog() const { return m_state->watchdog; }
+std::string vpSimulatorArDrone::brokenLaw() const { return m_state->law; }
+void vpSimulatorArDrone::loseNavdata(bool are_lost) { m_state->navdata_are_lost = are_lost; }
 
 void vpSimulatorArDrone::get_eJe(vpMatrix &jacobian) { jacobian = bole::quadrotorJacobian(); }
 
@@ -236,9 +263,11 @@ bool vpSimulatorArDrone::next(bole::Frame &frame)
   const double t = state.next_exposure;
   const bole::Pose open = state.poseAt(t - half), middle = state.poseAt(t), shut = state.poseAt(t + half);
   bole::RenderedFrame rendered;
-  state.renderer.render(open * state.bMc, shut * state.bMc, rendered);
-  if (state.link)
-    state.link->pass(rendered.image);
+  if (state.renderer) {
+    state.renderer->render(open * state.bMc, shut * state.bMc, rendered);
+    if (state.link)
+      state.link->pass(rendered.image);
+  }
 
   frame.stamp_ns = nanoseconds(t);
   frame.index = state.frames++;

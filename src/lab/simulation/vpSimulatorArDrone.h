@@ -6,6 +6,7 @@
 #include "lab/simulation/flight_sensors.h"
 #include "lab/simulation/forest_renderer.h"
 #include "lab/simulation/quadrotor.h"
+#include <bole/flight_laws.h>
 #include <bole/frame.h>
 #include <bole/vpRobotArDrone.h>
 
@@ -14,7 +15,7 @@
 /// Takes the calls of vpRobotArDrone and moves a simulated drone; its camera, gyro and pose filter are a
 /// bole::FrameSource. A loop written against one flies the other.
 ///
-/// Idea: the same velocity loop at 30 Hz, the same watchdog and the same limits as vpRobotArDrone, on a
+/// Idea: the same velocity loop at 30 Hz, the same laws and the same limits as vpRobotArDrone, on a
 /// bole::Quadrotor instead of a radio. Time is simulated: it passes in next() and advance() and nowhere else, so the
 /// same seed and the same commands give the same flight on any machine. next() returns when a frame has come over the
 /// video link, video_delay_s after it was taken: commands given then act on a drone that has moved on.
@@ -40,8 +41,10 @@ public:
     double heading = 0;                              ///< [rad]
     double rate_hz = 10;                             ///< of the camera, 1 to 60
     double exposure_s = 0.006;                       ///< motion blur, 0 to 0.1
+    double battery_s = 720;                          ///< a full one lasts, 1 to 100000: an AR.Drone's 12 minutes
     double video_delay_s = 0.06;                     ///< from the middle of the exposure to next(), 0 to 1
     double h264_kbps = 0;                            ///< of the video link, 0 = uncompressed, to 20000
+    bool has_images = true;                          ///< false: frames come without pixels, at no cost
     bole::QuadrotorOptions body;
     bole::SensorOptions sensors;
     bole::RendererOptions renderer; ///< its lens must have no distortion: frames are taken as a pinhole's
@@ -65,6 +68,7 @@ public:
   void trim();
   void setVelocity(const vpRobot::vpControlFrameType frame, const vpColVector &v) override;
   Watchdog watchdog() const;
+  std::string brokenLaw() const; ///< the law that overrules what was wanted now; empty where none does
   void init() override {}
   void get_eJe(vpMatrix &jacobian) override;                                          ///< 6x4: columns vx, vy, vz, wz
   void get_fJe(vpMatrix &jacobian) override;                                          ///< throws
@@ -84,6 +88,7 @@ public:
   void advance(double seconds); ///< time passes and no picture is taken (taking off, waiting)
   double time() const;          ///< [s]
   bool isInAir() const;
+  void loseNavdata(bool are_lost); ///< from now on, as far as the robot's loop can tell
   /// The truth: for evaluation only.
   const bole::Quadrotor &body() const;
   /// Least distance of the body's origin to the bark of a trunk since take-off [m].

@@ -3,6 +3,8 @@
 
 #include "geometry/require_range.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,10 +14,11 @@ namespace
 {
 constexpr double kSweep_s = 9;        ///< one sidestep to and fro before a gap is chosen
 constexpr double kSearchAgain = 0.35; ///< amplitude of the sidestep once it has left its start [m]
-constexpr double kAcrossGain = 0.8;   ///< [1/s]
-constexpr double kLinedUp = 0.2;      ///< across the axis, at the entry [m]
-constexpr double kInView = 1.2;       ///< nearer to the middle the trunks leave the image [m]
-constexpr int kViews = 8;             ///< of a candidate that counts as in the way
+constexpr double kLeavesView = 2.5;   ///< nearer to the middle the trunks may leave the image on both sides [m]
+constexpr double kStopsTurning = 1.2; ///< nearer the camera looks along the gap and not at its middle [m]
+constexpr double kWall = 0.3;     ///< half as thick is what closes the sides of the gap [m]: more than a knight's step
+constexpr double kStraight = 1.5; ///< the way is straight as far before and behind the middle [m]
+constexpr int kViews = 8;         ///< of a candidate that counts as in the way
 
 Eigen::Vector2d leftOf(const Eigen::Vector2d &v) { return {-v.y(), v.x()}; }
 
@@ -26,15 +29,21 @@ double distanceToSegment(const Eigen::Vector2d &p, const Eigen::Vector2d &a, con
   return (a + t * ab - p).norm();
 }
 
+bool isLookedFor(const FrameReport &report, int id)
+{
+  return std::any_of(report.trunks.begin(), report.trunks.end(),
+                     [id](const TrunkInView &trunk) { return trunk.id == id; });
+}
+
 bool isFree(const Gap &gap, const std::vector<Obstacle> &trunks, const Eigen::Vector2d &from,
             const GapTaskOptions &options)
 {
-  const Eigen::Vector2d entry = gap.middle - options.entry * gap.along, exit = gap.middle + options.beyond * gap.along;
+  const Eigen::Vector2d entry = gap.middle - kStraight * gap.along, exit = gap.middle + kStraight * gap.along;
   for (const Obstacle &other : trunks) {
     if (other.id == gap.left || other.id == gap.right)
       continue;
     const double near = std::min(distanceToSegment(other.xy, from, entry), distanceToSegment(other.xy, entry, exit));
-    if (near - other.radius < options.body_radius + 0.15)
+    if (near - other.radius < options.way.hull + options.way.free)
       return false;
   }
   return true;
@@ -48,11 +57,10 @@ void GapTaskOptions::validate() const
   requireRange("range", range, 1, 20);
   requireRange("evidence", evidence, -20, 20);
   requireRange("angle", angle, 0.05, 0.7);
-  requireRange("body_radius", body_radius, 0.05, 2);
-  requireRange("entry", entry, 0.3, 5);
+  requireRange("off_axis", off_axis, 0, 10);
   requireRange("beyond", beyond, 0.3, 5);
-  requireRange("speed", speed, 0.05, 3);
   requireRange("search_s", search_s, 1, 600);
+  way.validate();
   safety.validate();
 }
 
@@ -95,7 +103,8 @@ std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::V
   return best;
 }
 
-GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety), m_options(options)
+GapTask::GapTask(const GapTaskOptions &options)
+    : ServoTask(options.safety), m_options(options), m_response(options.response)
 {
   m_options.validate();
 }
@@ -107,12 +116,12 @@ ServoTask::Values GapTask::errors() const
   return {{"across [m]", m_across}, {"to go [m]", -m_ahead}};
 }
 
-/// Before the gap at least one of its trunks is in view; in it nothing can be asked for.
+/// At least one of its trunks is in view, or, near it, neither is where the camera looks.
 bool GapTask::sees(const FrameReport &report) const
 {
-  if (!m_gap || m_ahead > -kInView)
+  if (!m_gap || trackedTrunk(report, m_gap->left) || trackedTrunk(report, m_gap->right))
     return true;
-  return trackedTrunk(report, m_gap->left) || trackedTrunk(report, m_gap->right);
+  return m_ahead > -kLeavesView && !isLookedFor(report, m_gap->left) && !isLookedFor(report, m_gap->right);
 }
 
 TaskCommand GapTask::search(const FrameReport &report)
@@ -149,45 +158,55 @@ void GapTask::refresh(const std::vector<Obstacle> &trunks, const Pose &wMb)
   m_across = from_middle.dot(leftOf(m_gap->along));
 }
 
-TaskCommand GapTask::fly(const std::vector<Obstacle> &around, const Pose &wMb)
+TaskCommand GapTask::fly(std::vector<Obstacle> surfaces, const Pose &wMb)
 {
-  if (m_is_lined_up && m_ahead > m_options.beyond) {
+  if (m_ahead > m_options.beyond) {
     enter(TaskPhase::done);
     return {true, Eigen::Vector4d::Zero(), "through"};
   }
-  m_is_lined_up |= m_ahead > -m_options.entry - 0.3 && std::abs(m_across) < kLinedUp;
-  const Eigen::Vector2d to_middle = m_gap->middle - wMb.t.head<2>();
-  const Eigen::Vector2d ahead = m_is_lined_up ? m_gap->along : to_middle; // keeps both trunks in view
-  const double heading = std::atan2(ahead.y(), ahead.x());
-  Eigen::Vector2d velocity;
-  if (m_is_lined_up)
-    velocity = m_options.speed * m_gap->along - kAcrossGain * m_across * leftOf(m_gap->along);
-  else {
-    const Eigen::Vector2d to_entry = m_gap->middle - m_options.entry * m_gap->along - wMb.t.head<2>();
-    velocity = limited(kAcrossGain * to_entry, m_options.speed);
+  Eigen::Matrix2d axes; // along, to the left
+  axes << m_gap->along.transpose(), leftOf(m_gap->along).transpose();
+  for (Obstacle &surface : surfaces) {
+    surface.xy = axes * (surface.xy - m_gap->middle);
+    surface.covariance = axes * surface.covariance * axes.transpose();
   }
-  velocity = keptClear(limited(velocity, 1.2 * m_options.speed), wMb.t.head<2>(), around, m_options.body_radius,
-                       m_options.evidence);
-  return {false, towards(wMb, velocity, heading), m_is_lined_up ? "passes the gap" : "lines up"};
+  WayGoal goal;
+  goal.x_end = m_options.beyond + 1;
+  goal.y_high = std::abs(m_across) + 2;
+  goal.y_low = -goal.y_high;
+  goal.detour = [this](double, double y) { return m_options.off_axis * std::abs(y); };
+  goal.is_wall = [half = 0.5 * m_gap->width](double x, double y) { return std::abs(x) < kWall && std::abs(y) > half; };
+  const auto is_seen = [&](double x, double y) {
+    return around().isSeen(m_gap->middle + axes.transpose() * Eigen::Vector2d(x, y));
+  };
+  m_way = planWay(surfaces, axes * (m_response.rest() - m_gap->middle), goal, m_options.way, m_way, is_seen);
+  const Eigen::Vector2d velocity = axes.transpose() * (m_way.speed / m_response.obeyed() * m_way.ahead);
+  const Eigen::Vector2d look =
+      m_ahead < -kStopsTurning ? m_gap->middle - wMb.t.head<2>() : m_gap->along; // keeps both in view
+  return {false, towards(wMb, velocity, std::atan2(look.y(), look.x())), m_way.is_open ? "flies" : "no way"};
+}
+
+void GapTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
+{
+  m_response.send(Eigen::Rotation2Dd(yawOf(report.wMb)) * velocity.head<2>());
 }
 
 /// It may stand between trunks now, and the last search was straight behind: sweeps less.
 void GapTask::giveUpTarget()
 {
   m_gap.reset();
-  m_is_lined_up = false;
+  m_way = {};
   m_sidestep.restart(kSearchAgain);
   enter(TaskPhase::searching);
 }
 
 TaskCommand GapTask::act(const FrameReport &report)
 {
-  m_near_points.see(placedPoints(report, kNearRange), report.wMb, 1e-9 * static_cast<double>(report.stamp_ns));
+  m_response.see(report.wMb.t.head<2>(), 1e-9 * static_cast<double>(report.stamp_ns));
   if (!m_gap)
     return search(report);
-  std::vector<Obstacle> around = obstacles(report, 20, 1);
-  refresh(around, report.wMb);
-  m_near_points.addTo(around, report.wMb, kNearRange);
-  return fly(around, report.wMb);
+  const std::vector<Obstacle> surfaces = around().surfaces(report, 20, kViews);
+  refresh(surfaces, report.wMb);
+  return fly(surfaces, report.wMb);
 }
 } // namespace bole

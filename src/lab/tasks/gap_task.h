@@ -3,13 +3,15 @@
 /// \file
 /// Flying between two trunks.
 ///
-/// Idea: sidestep until the map holds two confirmed trunks with a gap between them and nothing in the way, line up on
-/// the gap's axis before it, then fly along the axis. All positions are read from the map in each frame, so the axis
-/// follows the estimates, and trunks that are found later are avoided too, as are upright columns of triangulated
-/// points. When the trunks leave the image on both sides the last metre is flown by map and points alone.
+/// Idea: sidestep until the map holds two confirmed trunks with a gap between them and nothing in the way; then plan
+/// the quickest safe way through it (way_planner.h) anew each frame, where what is beside the gap is a wall and being
+/// off its axis costs time. All places are those of the map, taken anew each frame, so a trunk that moves in the map
+/// moves the way, and what was not known when the gap was chosen is kept clear of. When the trunks leave the image on
+/// both sides the map and the points carry the last metre.
 
-#include "lab/tasks/obstacles.h"
+#include "lab/tasks/plane_response.h"
 #include "lab/tasks/servo_task.h"
+#include "lab/tasks/way_planner.h"
 
 #include <optional>
 
@@ -17,16 +19,16 @@ namespace bole
 {
 struct GapTaskOptions
 {
-  double width_min = 1.2;    ///< least free width, bark to bark [m], 0.3 to 5
-  double width_max = 3.5;    ///< wider is no gap [m], more than width_min, to 20
-  double range = 8;          ///< of the gap's middle [m], 1 to 20
-  double evidence = 1.5;     ///< of both its trunks, at first: lower log odds only after two sweeps, -20 to 20
-  double angle = 0.5;        ///< of the gap's middle from straight ahead [rad], 0.05 to 0.7
-  double body_radius = 0.28; ///< of the drone with its hull [m], 0.05 to 2
-  double entry = 1.5;        ///< lines up this far before the middle [m], 0.3 to 5
-  double beyond = 1.5;       ///< and stops this far behind it [m], 0.3 to 5
-  double speed = 0.6;        ///< [m/s], 0.05 to 3
-  double search_s = 45;      ///< gives up after [s], 1 to 600
+  double width_min = 1.2; ///< least free width, bark to bark [m], 0.3 to 5
+  double width_max = 3.5; ///< wider is no gap [m], more than width_min, to 20
+  double range = 8;       ///< of the gap's middle [m], 1 to 20
+  double evidence = 1.5;  ///< of both its trunks, at first: lower log odds only after two sweeps, -20 to 20
+  double angle = 0.5;     ///< of the gap's middle from straight ahead [rad], 0.05 to 0.7
+  double beyond = 1.5;    ///< stops this far behind it [m], 0.3 to 5
+  double off_axis = 0.5;  ///< a second spent a metre off its axis counts as so much longer [1/m], 0 to 10
+  double search_s = 45;   ///< gives up after [s], 1 to 600
+  WayOptions way{0.6};
+  ResponseOptions response;
   SafetyOptions safety;
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
@@ -61,17 +63,18 @@ protected:
   bool sees(const FrameReport &report) const override;
   void giveUpTarget() override;
   TaskCommand act(const FrameReport &report) override;
+  void sent(const Eigen::Vector4d &velocity, const FrameReport &report) override;
 
 private:
   TaskCommand search(const FrameReport &report);
   void refresh(const std::vector<Obstacle> &trunks, const Pose &wMb);
-  TaskCommand fly(const std::vector<Obstacle> &around, const Pose &wMb);
+  TaskCommand fly(std::vector<Obstacle> surfaces, const Pose &wMb);
 
   GapTaskOptions m_options;
   Sidestep m_sidestep{0.8, 9};
-  NearPoints m_near_points;
+  PlaneResponse m_response; ///< in world axes
   std::optional<Gap> m_gap;
-  bool m_is_lined_up = false;
+  Way m_way;
   double m_across = 0, m_ahead = -100; ///< of the drone, from the gap's axis and middle [m]
 };
 } // namespace bole

@@ -122,27 +122,20 @@ void SeenSpace::see(const std::vector<TriangulatedRay> &sights, const Eigen::Vec
   }
 }
 
+void SeenSpace::stand(const Eigen::Vector2d &p)
+{
+  for (const double dx : {-kCell, 0.0, kCell})
+    for (const double dy : {-kCell, 0.0, kCell}) {
+      Cell &cell = cellAt(p + Eigen::Vector2d(dx, dy));
+      cell.rays = kRays;
+      cell.last_s = m_time_s;
+    }
+}
+
 bool SeenSpace::isSeen(const Eigen::Vector2d &p) const
 {
   const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
   const Cell &cell = m_cells[placeIn(kSide, x, y)];
   return cell.x == x && cell.y == y && cell.rays >= kRays && m_time_s - cell.last_s < kSeenFor_s;
-}
-
-Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
-                          double body_radius, double evidence)
-{
-  constexpr double kDamping = 0.7; // [1/s]: the drone's lag is about half a second
-  constexpr double kLeast = 0.12;  // free way at which nothing more leads nearer [m]
-  for (const Obstacle &trunk : trunks) {
-    const Eigen::Vector2d w = trunk.xy - p;
-    const double distance = w.norm();
-    if (!trunk.is_confirmed || trunk.evidence < evidence || distance < 1e-6)
-      continue;
-    const Eigen::Vector2d u = w / distance;
-    const double most = std::max(0.0, kDamping * (distance - trunk.radius - body_radius - kLeast));
-    velocity -= std::max(0.0, velocity.dot(u) - most) * u;
-  }
-  return velocity;
 }
 } // namespace bole

@@ -65,7 +65,9 @@ class SeenSpace
 public:
   /// \p sights of one frame, from a camera at \p from (world, [m]): what they pass at about its height.
   void see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s);
-  /// Whether \p p (world, [m]) was observed to be free in the last seconds, to a cell of 0.2 m.
+  /// Where the drone is, nothing else stands.
+  void stand(const Eigen::Vector2d &p);
+  /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
   bool isSeen(const Eigen::Vector2d &p) const;
 
 private:
@@ -81,10 +83,4 @@ private:
   std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
   double m_time_s = 0;
 };
-
-/// \p velocity [m/s, world] at \p p with its component towards each confirmed trunk of at least \p evidence limited in
-/// proportion to the distance between a body of \p body_radius [m] and the bark. It never adds a velocity away from a
-/// trunk: a false one must not push the drone into a real one.
-Eigen::Vector2d keptClear(Eigen::Vector2d velocity, const Eigen::Vector2d &p, const std::vector<Obstacle> &trunks,
-                          double body_radius, double evidence);
 } // namespace bole

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/servo_task.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -16,6 +14,7 @@ namespace
 constexpr double kPlaceGain = 0.7;   ///< [1/s]
 constexpr double kTurnGain = 1.0;    ///< [1/s]
 constexpr double kLargestTurn = 0.6; ///< [rad/s]
+constexpr double kGuarded = 4;       ///< surfaces farther are no danger yet [m]
 } // namespace
 
 const char *toString(TaskPhase phase)
@@ -31,13 +30,6 @@ const char *toString(TaskPhase phase)
     return "failed";
   }
   return "?";
-}
-
-void SafetyOptions::validate() const
-{
-  requireRange("lost_frames", lost_frames, 1, 100);
-  requireRange("sure_frames", sure_frames, 1, 100);
-  requireRange("patience_frames", patience_frames, 1, 10000);
 }
 
 ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
@@ -60,14 +52,30 @@ TaskCommand ServoTask::step(const FrameReport &report)
     m_is_lost = false;
   TaskCommand hover;
   if (m_phase == TaskPhase::done || m_phase == TaskPhase::failed) {
-    hover.reason = toString(m_phase);
+    hover.reason = m_phase == TaskPhase::failed && !m_failure.empty() ? m_failure + ": hovers" : toString(m_phase);
     return hover;
   }
   if (m_is_lost) {
     hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(report.frame_status) + ": hovers";
     return hover;
   }
-  return act(report);
+  for (const SensorVerdict &verdict : report.verdicts)
+    if (verdict.sensor == "odometry") { // what is near is placed by it, and so are steps aside
+      enter(TaskPhase::failed);
+      m_failure = verdict.text;
+      hover.reason = m_failure + ": hovers";
+      return hover;
+    }
+  m_around.see(report);
+  TaskCommand command = act(report);
+  if (command.is_hovering)
+    return command;
+  const Eigen::Rotation2Dd heading(yawOf(report.wMb));
+  command.velocity.head<2>() =
+      heading.inverse() * safeVelocity(heading * Eigen::Vector2d(command.velocity.head<2>()), report.wMb.t.head<2>(),
+                                       m_around.surfaces(report, kGuarded, 1), m_around, m_safety);
+  sent(command.velocity, report);
+  return command;
 }
 
 Eigen::Vector2d limited(const Eigen::Vector2d &v, double largest)

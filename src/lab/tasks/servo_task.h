@@ -6,12 +6,14 @@
 /// Idea: a task sees only the report of a frame, never a robot, so the same task flies vpRobotArDrone and
 /// vpSimulatorArDrone. What every task shares is when *not* to act: step() commands a hover at once where a frame is
 /// not ok, and where what the task hangs on was not found for lost_frames; it goes on after sure_frames in which it
-/// was, and looks for another after patience_frames in which it was not. A drone that hovers holds its place by its
+/// was, and looks for another after patience_frames in which it was not; and what no velocity may do near that which is
+/// believed or was not seen (safeVelocity). A drone that hovers holds its place by its
 /// floor camera and its height by its sonar, without this one.
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
 #include "geometry/yaw.h"
+#include "lab/tasks/surroundings.h"
 #include <bole/report.h>
 
 #include <string>
@@ -36,17 +38,9 @@ struct TaskCommand
   std::string reason;                                 ///< one line for a person
 };
 
-struct SafetyOptions
-{
-  int lost_frames = 5;      ///< frames without what the task hangs on before it hovers, 1 to 100
-  int sure_frames = 3;      ///< frames with it before it goes on, 1 to 100
-  int patience_frames = 40; ///< good frames without it before it looks for another, 1 to 10000
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
-};
-
 /// Laws (each a test): a frame that is not ok gives a hover in the same step; so do lost_frames without the target;
-/// a hover ends only after sure_frames in a row.
+/// a hover ends only after sure_frames in a row; an odometry that the other sensors contradict ends the task; no
+/// command breaks the laws of safeVelocity().
 class ServoTask
 {
 public:
@@ -68,10 +62,15 @@ protected:
   /// What the task hangs on is gone for good: search anew.
   virtual void giveUpTarget() {}
   virtual TaskCommand act(const FrameReport &report) = 0;
+  /// What of act()'s velocity is sent.
+  virtual void sent(const Eigen::Vector4d &, const FrameReport &) {}
+  const Surroundings &around() const { return m_around; }
   void enter(TaskPhase phase) { m_phase = phase; }
 
 private:
   SafetyOptions m_safety;
+  Surroundings m_around;
+  std::string m_failure; ///< of a sensor
   TaskPhase m_phase = TaskPhase::searching;
   bool m_is_lost = false;
   int m_seen = 0, m_unseen = 0;

@@ -22,8 +22,7 @@ constexpr double kMisreadJump = 0.12;    ///< a jump of log r/d that no motion e
 constexpr int kBelieved = 15;            ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks behind [m/s]
 constexpr int kPatience = 10;            ///< frames that the way round is blocked before it goes round the other way
-constexpr double kClearRange = 3;        ///< of trunks to keep clear of, or that stand in the way round [m]
-constexpr double kSureTrunk = 0;         ///< log odds from which on a trunk is kept clear of
+constexpr double kWayRange = 3;          ///< of trunks that may stand in the way round [m]
 constexpr double kLargestTurnRate = 0.8; ///< [rad/s]
 } // namespace
 
@@ -41,7 +40,6 @@ void TrunkTaskOptions::validate() const
   requireRange("sway", sway, 0, 2);
   requireRange("sway_climb", sway_climb, 0, 1);
   requireRange("sway_period", sway_period, 1, 60);
-  requireRange("body_radius", body_radius, 0.05, 2);
   requireRange("free_way", free_way, 0, 5);
   requireRange("choice_evidence", choice_evidence, -20, 20);
   requireRange("choice_angle", choice_angle, 0.02, 0.6);
@@ -188,14 +186,10 @@ TaskCommand TrunkTask::act(const FrameReport &report)
   if (m_target >= 0 && !knownTrunk(report, m_target))
     m_target = successor(report);
   const KnownTrunk *trunk = knownTrunk(report, m_target);
-  const std::vector<Obstacle> around = obstacles(report, kClearRange, 1);
   if (!trunk) {
     if (phase() == TaskPhase::servoing)
       giveUpTarget();
-    TaskCommand command = search(report, time_s);
-    keepClear(command, around, report.wMb);
-    m_response.send(time_s, command.velocity);
-    return command;
+    return search(report, time_s);
   }
   m_place = trunk->trunk.xy;
   const RelativeTrunk seen = look(report, *trunk);
@@ -205,7 +199,7 @@ TaskCommand TrunkTask::act(const FrameReport &report)
   feature.buildFrom(seen, trunk->trunk.radius());
   const double sway = swayNow(time_s);
   const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
-  const bool is_free = isFree(trunk->id, around, report.wMb, wanted);
+  const bool is_free = isFree(trunk->id, obstacles(report, kWayRange, 1), report.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
   if (m_blocked > kPatience) {
     m_turned_back = -m_turned_back;
@@ -214,8 +208,6 @@ TaskCommand TrunkTask::act(const FrameReport &report)
   const double round = is_free ? wanted : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
   command.velocity.z() = m_options.sway_climb * sway;
-  if (keepClear(command, around, report.wMb))
-    m_response.send(time_s, command.velocity);
   if (sway != 0)
     command.reason = "holds, swaying";
   else if (m_options.speed != 0)
@@ -233,14 +225,10 @@ double TrunkTask::swayNow(double time_s)
   return std::cos(2 * M_PI * (time_s - m_sway_start_s) / m_options.sway_period);
 }
 
-/// Cuts what leads to a trunk: the camera looks neither behind nor aside, the map does. True where it had to.
-bool TrunkTask::keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const
+/// Sent anew where it was cut: of two sent at one time the later counts.
+void TrunkTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
 {
-  const Eigen::Rotation2Dd heading(yawOf(wMb));
-  const Eigen::Vector2d wanted = heading * Eigen::Vector2d(command.velocity.head<2>());
-  const Eigen::Vector2d velocity = keptClear(wanted, wMb.t.head<2>(), around, m_options.body_radius, kSureTrunk);
-  command.velocity.head<2>() = heading.inverse() * velocity;
-  return velocity != wanted;
+  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), velocity);
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).

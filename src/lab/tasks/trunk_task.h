@@ -25,7 +25,6 @@
 
 #include "lab/tasks/drone_response.h"
 #include "lab/tasks/feature_filter.h"
-#include "lab/tasks/obstacles.h"
 #include "lab/tasks/servo_task.h"
 #include <bole/vpFeatureTrunk.h>
 
@@ -47,7 +46,6 @@ struct TrunkTaskOptions
   double sway = 0.8;          ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
   double sway_climb = 0.4;    ///< largest rate of climb meanwhile [m/s], 0 to 1
   double sway_period = 6;     ///< [s], 1 to 60
-  double body_radius = 0.28;  ///< of the drone with its hull [m], 0.05 to 2
   double free_way = 0.5;      ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
   double choice_angle = 0.35; ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
   double choice_range = 7;    ///< nor those beyond this [m], 1 to 20
@@ -81,6 +79,7 @@ protected:
   bool sees(const FrameReport &report) const override;
   void giveUpTarget() override;
   TaskCommand act(const FrameReport &report) override;
+  void sent(const Eigen::Vector4d &velocity, const FrameReport &report) override;
 
 private:
   TaskCommand search(const FrameReport &report, double time_s);
@@ -89,7 +88,6 @@ private:
   RelativeTrunk look(const FrameReport &report, const KnownTrunk &trunk);
   void desire(double radius);
   double swayNow(double time_s);
-  bool keepClear(TaskCommand &command, const std::vector<Obstacle> &around, const Pose &wMb) const;
   bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);

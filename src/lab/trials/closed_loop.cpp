@@ -3,7 +3,6 @@
 
 #include "geometry/median.h"
 #include "geometry/require_range.h"
-#include "input/frame_health.h"
 
 #include <algorithm>
 #include <ctime>
@@ -15,6 +14,7 @@ namespace
 {
 constexpr double kTakeOff_s = 4; ///< until the height is reached and the body at rest
 constexpr double kRest_s = 2;    ///< flown on after the task is done
+constexpr double kMapKept = 8;   ///< of the record [m]
 
 /// Processor time of all threads of this process: what the loop costs, however busy the machine is.
 double processMs()
@@ -75,12 +75,11 @@ double LoopRecord::leastClearance() const
 double LoopRecord::medianLoop_ms() const { return loopQuantile_ms(samples, 0.5); }
 double LoopRecord::percentile95Loop_ms() const { return loopQuantile_ms(samples, 0.95); }
 
-LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, ServoTask &task, const LoopOptions &options,
                          const Judge &judge, const LoopWatcher &watcher)
 {
   options.validate();
   LoopRecord record;
-  FrameHealth health(robot.camera(), robot.bMc());
   FaultInjector injector(options.fault);
   takeOff(robot, options);
   const double begin_s = robot.time();
@@ -97,8 +96,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
     sample.is_spoilt = injector.apply(frame, servoing_s);
 
     const double start_ms = processMs();
-    health.judge(frame);
-    const FrameReport report = pipeline.process(frame);
+    const FrameReport report = perception.process(frame, sample.truth);
     const TaskCommand command = task.step(report);
     sample.loop_ms = processMs() - start_ms;
     give(robot, command);
@@ -115,6 +113,9 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTas
     sample.clearance = robot.leastClearance(); // least so far, of every 5 ms
     sample.believed = task.errors();
     sample.reason = command.reason;
+    for (const KnownTrunk &trunk : report.map)
+      if ((trunk.trunk.axisAt(report.wMb.t.z()) - report.wMb.t).head<2>().norm() < kMapKept)
+        sample.map.push_back(trunk);
     if (judge)
       sample.real = judge(sample.truth, report);
     record.samples.push_back(sample);

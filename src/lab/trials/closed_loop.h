@@ -3,13 +3,13 @@
 /// \file
 /// One flight of a task in the simulated forest: camera, tracker, task, drone; and its record.
 ///
-/// Idea: the task gets what the pipeline makes of rendered images and nothing else. The truth goes into the record
-/// only, through a judge that is asked after the command has been given.
+/// Idea: the task gets what the perception makes of a frame and nothing else. The truth goes into the record only,
+/// through a judge that is asked after the command has been given.
 
 #include "lab/simulation/vpSimulatorArDrone.h"
 #include "lab/tasks/servo_task.h"
 #include "lab/trials/injected_fault.h"
-#include <bole/pipeline.h>
+#include "lab/trials/perception.h"
 
 #include <functional>
 
@@ -26,8 +26,9 @@ struct LoopSample
   Eigen::Vector4d command = Eigen::Vector4d::Zero(); ///< of the body
   double speed = 0;                                  ///< true, horizontal [m/s]
   double clearance = 0;                              ///< true, body's origin to bark [m]
-  double loop_ms = 0;                                ///< of processor time: tracker, health of the image and task
+  double loop_ms = 0;                                ///< of processor time: perception and task
   ServoTask::Values believed, real;                  ///< errors by the task, by the truth
+  std::vector<KnownTrunk> map;                       ///< as believed, near the drone
   std::string reason;
 };
 
@@ -55,14 +56,13 @@ struct LoopRecord
   double percentile95Loop_ms() const;
 };
 
-/// The truth about a task's errors: \p truth of the body at the frame and what the pipeline knows after it. The task is
-/// asked for what it chose, not told anything.
+/// The truth about a task's errors: \p truth of the body at the frame and what the perception knows after it. The task
+/// is asked for what it chose, not told anything.
 using Judge = std::function<ServoTask::Values(const Pose &truth, const FrameReport &report)>;
 /// Called after each frame; false ends the flight.
 using LoopWatcher = std::function<bool(const Frame &, const FrameReport &, const LoopSample &)>;
 
-/// Takes off and flies. \p robot stands on the ground. Frames whose pixels cannot be believed (FrameHealth) reach the
-/// pipeline as corrupt or stale, as those of a live source do.
-LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Pipeline &pipeline, ServoTask &task, const LoopOptions &options,
+/// Takes off and flies. \p robot stands on the ground.
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, ServoTask &task, const LoopOptions &options,
                          const Judge &judge = {}, const LoopWatcher &watcher = {});
 } // namespace bole

@@ -5,6 +5,37 @@
 
 namespace bole
 {
+const char *toString(SensorFault fault)
+{
+  switch (fault) {
+  case SensorFault::none:
+    return "none";
+  case SensorFault::odometry_freeze:
+    return "odometry-freeze";
+  case SensorFault::odometry_jump:
+    return "odometry-jump";
+  case SensorFault::odometry_gone:
+    return "odometry-gone";
+  case SensorFault::gyro_gone:
+    return "gyro-gone";
+  case SensorFault::gyro_bias:
+    return "gyro-bias";
+  }
+  return "?";
+}
+
+FaultOptions faultFromString(const std::string &word)
+{
+  FaultOptions options;
+  for (const SensorFault fault : {SensorFault::odometry_freeze, SensorFault::odometry_jump, SensorFault::odometry_gone,
+                                  SensorFault::gyro_gone, SensorFault::gyro_bias})
+    if (word == toString(fault))
+      options.sensor = fault;
+  if (options.sensor == SensorFault::none)
+    options.kind = faultKindFromString(word);
+  return options;
+}
+
 void FaultOptions::validate() const
 {
   requireRange("fault start_s", start_s, 0, 3600);
@@ -18,13 +49,42 @@ FaultInjector::FaultInjector(const FaultOptions &options, std::uint64_t seed) : 
 
 bool FaultInjector::apply(Frame &frame, double servoing_s)
 {
-  const bool is_now = m_options.kind != FaultKind::none && servoing_s >= m_options.start_s &&
-                      servoing_s < m_options.start_s + m_options.duration_s;
+  const bool is_any = m_options.kind != FaultKind::none || m_options.sensor != SensorFault::none;
+  const bool is_now =
+      is_any && servoing_s >= m_options.start_s && servoing_s < m_options.start_s + m_options.duration_s;
   if (!is_now) {
     m_last = frame.image;
+    m_last_odometry = frame.wMb_odometry;
     return false;
   }
-  spoil(frame.image, m_options.kind, m_last, unsigned(m_random.next() >> 32));
+  if (m_options.kind != FaultKind::none)
+    spoil(frame.image, m_options.kind, m_last, unsigned(m_random.next() >> 32));
+  spoilSensor(frame);
   return true;
+}
+
+void FaultInjector::spoilSensor(Frame &frame) const
+{
+  switch (m_options.sensor) {
+  case SensorFault::none:
+    break;
+  case SensorFault::odometry_freeze:
+    frame.wMb_odometry = m_last_odometry;
+    break;
+  case SensorFault::odometry_jump:
+    if (frame.wMb_odometry)
+      frame.wMb_odometry->t.y() += 1;
+    break;
+  case SensorFault::odometry_gone:
+    frame.wMb_odometry.reset();
+    break;
+  case SensorFault::gyro_gone:
+    frame.gyro.clear();
+    break;
+  case SensorFault::gyro_bias:
+    for (GyroSample &sample : frame.gyro)
+      sample.rate.z() += 0.2;
+    break;
+  }
 }
 } // namespace bole

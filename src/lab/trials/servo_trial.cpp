@@ -141,9 +141,19 @@ Moments finalError(const LoopRecord &record, const char *name)
   return {sum / count, std::sqrt(squares / count)};
 }
 
+/// What a task is told of the drone: a command acts when the frame has come, half a step of the robot's loop and half
+/// of the tilt's settling after it was heard.
+ResponseOptions responseOf(const vpSimulatorArDrone::Options &robot)
+{
+  ResponseOptions response;
+  response.delay = robot.video_delay_s + robot.body.command_delay + 0.03;
+  return response;
+}
+
 TrunkTaskOptions trunkOptions(const ServoTrialOptions &options)
 {
   TrunkTaskOptions task;
+  task.response = responseOf(options.robot);
   task.distance = options.distance;
   task.ratio = options.ratio;
   task.search_s = options.loop.search_most_s;
@@ -159,18 +169,30 @@ std::unique_ptr<ServoTask> makeTask(const ServoTrialOptions &options, const Pose
   if (options.scenario.kind == ServoKind::gap) {
     GapTaskOptions gap;
     gap.search_s = options.loop.search_most_s;
+    gap.response = responseOf(options.robot);
     if (options.speed > 0)
-      gap.speed = options.speed;
+      gap.way.speed = options.speed;
     return std::make_unique<GapTask>(gap);
   }
   if (options.scenario.kind == ServoKind::slalom) {
     SlalomTaskOptions slalom;
     slalom.length = options.scenario.length;
+    slalom.response = responseOf(options.robot);
     if (options.speed > 0)
-      slalom.speed = options.speed;
+      slalom.way.speed = options.speed;
     return std::make_unique<SlalomTask>(slalom);
   }
   return std::make_unique<TrunkTask>(bMc, trunkOptions(options));
+}
+
+std::unique_ptr<Perception> makePerception(const ServoTrialOptions &options, const vpSimulatorArDrone &robot,
+                                           const Forest &forest)
+{
+  if (options.perception == PerceptionKind::truth)
+    return truthPerception(robot.camera(), robot.bMc(), forest);
+  if (options.perception == PerceptionKind::truth_map)
+    return truthMapPerception(robot.camera(), robot.bMc(), forest);
+  return realPerception(robot.camera(), robot.bMc(), options.pipeline);
 }
 
 /// How far round the trunk the drone went while it servoed [deg].
@@ -313,11 +335,11 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   settings.start = scenario.start;
   settings.heading = scenario.heading;
   vpSimulatorArDrone robot(scenario.forest, settings);
-  Pipeline pipeline(robot.camera(), robot.bMc(), options.pipeline);
+  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario.forest);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
 
   const auto fly = [&](const Judge &judge) {
-    result.record = runClosedLoop(robot, pipeline, *task, options.loop, judge, watcher);
+    result.record = runClosedLoop(robot, *perception, *task, options.loop, judge, watcher);
     result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
   };
   if (auto *trunk_task = dynamic_cast<TrunkTask *>(task.get())) {
@@ -343,6 +365,7 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   result.median_loop_ms = result.record.medianLoop_ms();
   result.p95_loop_ms = result.record.percentile95Loop_ms();
   judgeFault(result);
+  result.trunks = scenario.forest.trunks;
   return result;
 }
 } // namespace bole

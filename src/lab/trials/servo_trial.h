@@ -16,7 +16,8 @@ struct ServoTrialOptions
   double distance = 3;      ///< hold [m], 0.5 to 20
   double ratio = 0;         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
   double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
-  Options pipeline = defaultPipeline();
+  PerceptionKind perception = PerceptionKind::real;
+  Options pipeline = defaultPipeline(); ///< of real perception
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
 
@@ -49,6 +50,7 @@ struct ServoTrialResult
   double hover_after_s = kNotMeasured; ///< fault: until it hovered [s]
   double drift = kNotMeasured;         ///< fault: how far it moved while it lasted [m]
   LoopRecord record;
+  std::vector<SimulatedTrunk> trunks; ///< it flew among
 };
 
 /// Flies it. Success: hold and circle: right trunk, rms of the true bearing within 0.5 degrees and of the distance

@@ -116,6 +116,49 @@ TEST(SimulatorArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
   EXPECT_FALSE(robot.isInAir());
 }
 
+TEST(SimulatorArDrone, LandsByTheLawsAsTheRealOneDoes)
+{
+  auto options = calm();
+  options.battery_s = 20;
+  vpSimulatorArDrone tired(clearing(), options);
+  takeOff(tired); // 5 s
+  command(tired, velocity(0.2, 0, 0, 0), 12);
+  EXPECT_TRUE(tired.isInAir());
+  command(tired, velocity(0.2, 0, 0, 0), 1.2);
+  EXPECT_FALSE(tired.watchdog() == vpSimulatorArDrone::Watchdog::content);
+  tired.advance(5);
+  EXPECT_FALSE(tired.isInAir());
+
+  vpSimulatorArDrone blind(clearing(), calm());
+  takeOff(blind);
+  command(blind, velocity(0.8, 0, 0, 0), 2);
+  blind.loseNavdata(true);
+  command(blind, velocity(0.8, 0, 0, 0), 2);
+  EXPECT_EQ(blind.brokenLaw(), "no navdata");
+  EXPECT_LT(blind.body().velocity().norm(), 0.1);
+  EXPECT_TRUE(blind.isInAir());
+  command(blind, velocity(0.8, 0, 0, 0), 6);
+  EXPECT_FALSE(blind.isInAir());
+}
+
+TEST(SimulatorArDrone, StaysWithinItsFenceAndItsBandOfHeightsInWind)
+{
+  auto options = calm();
+  options.body.gust = 0.4;
+  options.body.velocity_noise = 0.03;
+  options.laws.fence = 3;
+  options.laws.highest = 2;
+  vpSimulatorArDrone robot(clearing(), options);
+  takeOff(robot);
+  for (const double heading : {0.0, 1.5, 3.0, 4.5}) {
+    command(robot, velocity(std::cos(heading), std::sin(heading), 0.5, 0), 8);
+    const Eigen::Vector3d p = robot.body().pose().t;
+    EXPECT_LT(p.head<2>().norm(), 3.4); // what it reckons by its own velocity drifts
+    EXPECT_GT(p.head<2>().norm(), 2);
+    EXPECT_NEAR(p.z(), 2, 0.2);
+  }
+}
+
 TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
 {
   vpSimulatorArDrone robot(clearing(), calm());

@@ -89,45 +89,6 @@ TEST(SeenSpace, RaysToTheGroundTellOfTheHeightOfTheDroneOnly)
   EXPECT_FALSE(space.isSeen({1.7, 0})); // the ray is 0.85 m below it there
 }
 
-TEST(KeptClear, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
-{
-  const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.05, 0.2)};
-  Eigen::Vector2d p(0, 0), v(0, 0);
-  for (int k = 0; k < 1000; ++k) { // obeys with a lag of 0.5 s
-    v += 0.02 / 0.5 * (keptClear({0.6, 0}, p, trunks, 0.28, 0) - v);
-    p += 0.02 * v;
-    ASSERT_GT((trunks[0].xy - p).norm(), 0.2 + 0.28) << "after " << k << " steps";
-  }
-}
-
-TEST(KeptClear, AWayThatLeadsPastOrAwayOrToWhatIsNoTrunkYetStaysAsItIs)
-{
-  std::vector<Obstacle> trunks{trunkAt(0, 2, 1.5, 0.2)};
-  EXPECT_NEAR((keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0) - Eigen::Vector2d(0.6, 0)).norm(), 0, 1e-12);
-  EXPECT_NEAR((keptClear({0, -0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, -0.6)).norm(), 0, 1e-12);
-  trunks[0].is_confirmed = false;
-  EXPECT_NEAR((keptClear({0, 0.6}, {2, 1.0}, trunks, 0.28, 0) - Eigen::Vector2d(0, 0.6)).norm(), 0, 1e-12);
-}
-
-TEST(KeptClear, NeitherADoubtfulNorANearTrunkPushesTheDroneAway)
-{
-  std::vector<Obstacle> trunks{trunkAt(0, 2, 0.4, 0.2)}; // nearer than the hull allows
-  EXPECT_NEAR(keptClear({0.6, 0}, {2, 0}, trunks, 0.28, 0).y(), 0, 1e-12);
-  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).norm(), 0, 1e-12);
-  trunks[0].evidence = -0.5;
-  EXPECT_NEAR(keptClear({0, 0.3}, {2, 0}, trunks, 0.28, 0).y(), 0.3, 1e-12);
-}
-
-TEST(KeptClear, TheMiddleOfAGapOfTheLeastWidthIsPassedAtFullSpeed)
-{
-  const std::vector<Obstacle> trunks{trunkAt(0, 3, 0.75), trunkAt(1, 3, -0.75)}; // 1.2 m free
-  for (double x = 0; x < 5; x += 0.05) {
-    const Eigen::Vector2d v = keptClear({0.6, 0}, {x, 0}, trunks, 0.28, 0);
-    EXPECT_GT(v.x(), 0.4) << x;
-    EXPECT_NEAR(v.y(), 0, 0.05) << x;
-  }
-}
-
 TEST(Gap, MiddleIsThatOfTheFreeWidth)
 {
   const Gap gap = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {0, 0});
@@ -177,87 +138,6 @@ TEST(Gap, IsNotChosenWhereItIsNarrowUnconfirmedOrBlocked)
   EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
 }
 
-/// Least distance hull to bark of a drone that follows chooseWay() with its lag.
-double slalom(const std::vector<Obstacle> &trunks, double length, double *seconds = nullptr)
-{
-  const SlalomTaskOptions options;
-  SlalomState state;
-  double least = 1e9, last = 0, vx = 0, t = 0;
-  for (; state.x < length && t < 120; t += 0.1) {
-    const SlalomWay way = chooseWay(trunks, state, last, options);
-    last = way.offset;
-    for (int k = 0; k < 10; ++k) {
-      const double wanted = std::clamp(way.offset - state.y, -options.sideways, options.sideways);
-      state.vy += 0.01 / options.lag * (wanted - state.vy);
-      vx += 0.01 / options.lag * (way.speed - vx);
-      state.y += 0.01 * state.vy;
-      state.x += 0.01 * vx;
-      for (const Obstacle &trunk : trunks)
-        least = std::min(least, trunk.clearance({state.x, state.y}, 0) - options.body_radius);
-    }
-  }
-  if (seconds)
-    *seconds = t;
-  return least;
-}
-
-TEST(Slalom, PassesTrunksThatStandOnTheLine)
-{
-  std::vector<Obstacle> trunks;
-  for (int k = 0; k < 8; ++k)
-    trunks.push_back(trunkAt(k, 5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
-  double seconds = 0;
-  EXPECT_GT(slalom(trunks, 38, &seconds), 0.2);
-  EXPECT_LT(seconds, 50); // at 1 m/s, not by creeping
-}
-
-TEST(Slalom, FindsTheOpeningInAWall)
-{
-  std::vector<Obstacle> trunks;
-  for (int k = -12; k <= 12; ++k)
-    if (k != 5 && k != 6 && k != 7)
-      trunks.push_back(trunkAt(k + 12, 6, 0.5 * k, 0.15));
-  EXPECT_GT(slalom(trunks, 9), 0.05);
-}
-
-TEST(Slalom, KeepsFartherFromWhatIsLessWellKnown)
-{
-  Obstacle sure = trunkAt(0, 4, 0.1), vague = sure;
-  vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
-  const SlalomState state;
-  EXPECT_GT(std::abs(chooseWay({vague}, state, 0, {}).offset), std::abs(chooseWay({sure}, state, 0, {}).offset));
-}
-
-TEST(Slalom, GoesRoundWhatWasNotSeenThrough)
-{
-  SlalomTaskOptions straight;
-  straight.swing = 0;
-  const IsSeen but_ahead_left = [](double x, double y) { return x < 1 || y < -0.2; };
-  EXPECT_NEAR(chooseWay({}, {}, 0, straight).offset, 0, 1e-9);
-  EXPECT_LT(chooseWay({}, {}, 0, straight, but_ahead_left).offset, -0.4);
-  EXPECT_EQ(chooseWay({}, {}, 0, straight, [](double, double) { return true; }).offset, 0);
-  const SlalomWay blind = chooseWay({}, {}, 0, straight, [](double x, double) { return x < 0.5; });
-  EXPECT_LT(blind.speed, straight.speed); // and does not fly where nothing is known
-}
-
-TEST(Slalom, LeavesATrunkBesideItThoughNoWayLeadsNearer)
-{
-  const Obstacle beside = trunkAt(0, 0.1, -0.6, 0.2); // 12 cm from the hull
-  SlalomTaskOptions straight;
-  straight.swing = 0;
-  EXPECT_EQ(chooseWay({}, {}, 0, straight).offset, 0);
-  EXPECT_GE(chooseWay({beside}, {}, 0, straight).offset, 0.25);
-}
-
-TEST(Slalom, LeavesWhatItStandsInByTheMap)
-{
-  Obstacle ghost = trunkAt(0, 0.3, -0.2, 0.1); // there is no free way but away from it
-  const SlalomWay way = chooseWay({ghost}, {}, 0, {});
-  EXPECT_LT(way.clearance, 0);
-  EXPECT_GT(way.offset, 0.2);
-  EXPECT_LT(way.cost, 100); // which no contact costs
-}
-
 TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
 {
   SlalomTaskOptions options;
@@ -278,14 +158,6 @@ TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
   }
   EXPECT_GT(left, 0.4);
   EXPECT_LT(right, -0.4);
-}
-
-TEST(Slalom, StopsBeforeAWallWithoutOpening)
-{
-  std::vector<Obstacle> trunks;
-  for (int k = -30; k <= 30; ++k)
-    trunks.push_back(trunkAt(k + 30, 4, 0.4 * k, 0.2));
-  EXPECT_GT(slalom(trunks, 9), 0);
 }
 } // namespace
 } // namespace bole

@@ -97,6 +97,39 @@ TEST_F(Safety, GoesOnOnlyAfterSureFramesInARow)
   EXPECT_FALSE(hovers(task));
 }
 
+TEST_F(Safety, AnOdometryThatIsContradictedEndsTheTaskAndAGyroDoesNot)
+{
+  Ahead task;
+  FrameReport report;
+  report.verdicts = {{"gyro", "bias", 1, "gyro: biased since 1.0 s"}};
+  EXPECT_FALSE(task.step(report).is_hovering);
+  report.verdicts.push_back({"odometry", "stuck", 2, "odometry: frozen since 2.0 s"});
+  EXPECT_EQ(task.step(report).reason, "odometry: frozen since 2.0 s: hovers");
+  EXPECT_EQ(task.phase(), TaskPhase::failed);
+  EXPECT_EQ(task.step({}).reason, "odometry: frozen since 2.0 s: hovers");
+}
+
+TEST_F(Safety, NoTaskFliesIntoWhatIsBelieved)
+{
+  for (const bool is_confirmed : {true, false}) {
+    Ahead task; // at 1 m/s
+    FrameReport report;
+    KnownTrunk trunk;
+    trunk.status = is_confirmed ? TrunkStatus::confirmed : TrunkStatus::candidate;
+    trunk.trunk.xy = {3, 0};
+    trunk.log_odds = 3;
+    trunk.observations = 20;
+    report.map = {trunk};
+    for (int k = 0; k < 200; ++k) {
+      report.stamp_ns = k * 100000000LL;
+      report.wMb.t.x() += 0.1 * task.step(report).velocity.x();
+    }
+    const SafetyOptions options;
+    const double bark = 3 - trunk.trunk.radius() - options.hull;
+    EXPECT_EQ(report.wMb.t.x() < bark, is_confirmed) << report.wMb.t.x(); // a candidate is for the planner to avoid
+  }
+}
+
 TEST(SafetyOptions, RefusesCountsOutOfRange)
 {
   SafetyOptions options;

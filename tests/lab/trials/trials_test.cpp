@@ -101,6 +101,75 @@ TEST(Fault, SpoilsFramesInItsTimeAndNoOthers)
   EXPECT_THROW(faultKindFromString("smoke"), vpException);
 }
 
+TEST(Fault, SpoilsASensorInItsTimeAndLeavesTheImage)
+{
+  for (const char *word : {"odometry-freeze", "odometry-jump", "odometry-gone", "gyro-gone", "gyro-bias"}) {
+    FaultOptions options = faultFromString(word);
+    EXPECT_STREQ(toString(options.sensor), word);
+    options.start_s = 1;
+    FaultInjector injector(options);
+    for (int k = 0; k < 20; ++k) {
+      Frame frame;
+      frame.image.resize(4, 4, 50);
+      frame.wMb_odometry = Pose(Eigen::Matrix3d::Identity(), {0.1 * k, 0, 1});
+      frame.gyro = {{0, {0, 0, 0.01}}};
+      Frame before = frame;
+      const bool is_spoilt = injector.apply(frame, 0.1 * k);
+      EXPECT_EQ(is_spoilt, k >= 10);
+      EXPECT_TRUE(frame.image == before.image);
+      const bool has_odometry = frame.wMb_odometry && frame.wMb_odometry->t == before.wMb_odometry->t;
+      const bool has_gyro = !frame.gyro.empty() && frame.gyro[0].rate == before.gyro[0].rate;
+      EXPECT_EQ(has_odometry && has_gyro, k < 10) << word << k;
+    }
+  }
+  EXPECT_EQ(faultFromString("noise").kind, FaultKind::noise);
+  EXPECT_THROW(faultFromString("gyro"), vpException);
+}
+
+/// Sidesteps to map what is there, then flies straight ahead, whatever stands there.
+class Headlong : public ServoTask
+{
+protected:
+  bool sees(const FrameReport &) const override { return true; }
+  TaskCommand act(const FrameReport &report) override
+  {
+    const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+    const Eigen::Vector4d aside = m_sidestep.velocity(report.wMb, time_s);
+    if (m_sidestep.elapsed(time_s) < 6)
+      return {false, aside, "looks"};
+    enter(TaskPhase::servoing);
+    return {false, {1, 0, 0, 0}, "headlong"};
+  }
+
+private:
+  Sidestep m_sidestep{0.6, 6};
+};
+
+TEST(ClosedLoop, ADroneThatFliesHeadlongAtATrunkTouchesNoneWhateverSensorFails)
+{
+  ForestOptions wood;
+  wood.density = 0.02;
+  SimulatedTrunk ahead;
+  ahead.foot = {5, 0, 0};
+  ahead.radius = 0.2;
+  const Forest forest = Forest::plant(wood, {{0, -1, 1}, {0, 1, 1}, {4, 0, 1}}, {ahead});
+  for (const char *word : {"none", "odometry-freeze", "odometry-jump", "odometry-gone", "gyro-gone", "gyro-bias"}) {
+    vpSimulatorArDrone::Options settings = ServoTrialOptions::defaultRobot();
+    settings.renderer.samples_per_pixel = 1;
+    vpSimulatorArDrone robot(forest, settings);
+    const auto perception = realPerception(robot.camera(), robot.bMc(), ServoTrialOptions::defaultPipeline());
+    Headlong task;
+    LoopOptions options;
+    options.duration_s = 7;
+    options.fault = faultFromString(word);
+    options.fault.start_s = 1;
+    options.fault.duration_s = 10;
+    const LoopRecord record = runClosedLoop(robot, *perception, task, options);
+    EXPECT_FALSE(record.is_contact) << word;
+    EXPECT_GT(record.samples.back().truth.t.x(), 0.5) << word << ": it did fly";
+  }
+}
+
 TEST(Scenario, SameSeedSameForestAndAnotherSeedAnother)
 {
   ScenarioOptions options;
@@ -179,12 +248,14 @@ TEST(ClosedLoop, HoversInTheFrameOfEachFaultAndFliesOnAfterIt)
     vpSimulatorArDrone::Options settings = ServoTrialOptions::defaultRobot();
     settings.renderer.samples_per_pixel = 1;
     vpSimulatorArDrone robot(clearing, settings);
-    Pipeline pipeline(robot.camera(), robot.bMc());
+    const auto perception = realPerception(robot.camera(), robot.bMc(), {});
     Leftward task;
     LoopOptions options;
     options.duration_s = 4;
-    options.fault = {fault, 1, 1.5};
-    const LoopRecord record = runClosedLoop(robot, pipeline, task, options);
+    options.fault.kind = fault;
+    options.fault.start_s = 1;
+    options.fault.duration_s = 1.5;
+    const LoopRecord record = runClosedLoop(robot, *perception, task, options);
     int spoilt = 0, after = 0;
     double speed_at_end_of_fault = 1;
     for (const LoopSample &sample : record.samples) {

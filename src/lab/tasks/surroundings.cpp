@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/surroundings.h"
+
+#include "geometry/require_range.h"
+
+#include <algorithm>
+
+namespace bole
+{
+void SafetyOptions::validate() const
+{
+  requireRange("lost_frames", lost_frames, 1, 100);
+  requireRange("sure_frames", sure_frames, 1, 100);
+  requireRange("patience_frames", patience_frames, 1, 10000);
+  requireRange("hull", hull, 0.05, 2);
+  requireRange("least_free", least_free, 0, 2);
+  requireRange("stopping_s", stopping_s, 0.1, 5);
+  requireRange("unseen_speed", unseen_speed, 0.02, 3);
+}
+
+void Surroundings::see(const FrameReport &report)
+{
+  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  m_near_points.see(placedPoints(report, kNearRange), report.wMb, time_s);
+  m_seen.see(report.points, report.wMc.t, time_s);
+  m_seen.stand(report.wMb.t.head<2>());
+}
+
+std::vector<Obstacle> Surroundings::surfaces(const FrameReport &report, double range, int observations) const
+{
+  std::vector<Obstacle> surfaces = obstacles(report, range, observations);
+  m_near_points.addTo(surfaces, report.wMb, std::min(range, kNearRange));
+  return surfaces;
+}
+
+Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p,
+                             const std::vector<Obstacle> &surfaces, const Surroundings &around,
+                             const SafetyOptions &options)
+{
+  constexpr double kLook = 0.1; // between the places asked [m]
+  Eigen::Vector2d safe = velocity;
+  for (const Obstacle &surface : surfaces) {
+    const Eigen::Vector2d w = surface.xy - p;
+    const double distance = w.norm();
+    if (!surface.is_confirmed || surface.evidence < 0 || distance < 1e-6)
+      continue;
+    const Eigen::Vector2d u = w / distance;
+    const double way = distance - surface.radius - options.hull - options.least_free;
+    safe -= std::max(0.0, safe.dot(u) - std::max(0.0, way / options.stopping_s)) * u;
+  }
+  const double speed = safe.norm();
+  if (speed <= options.unseen_speed)
+    return safe;
+  double free = options.hull; // where it is, it is
+  while (free < speed * options.stopping_s && around.isSeen(p + free / speed * safe))
+    free += kLook;
+  return safe * (std::clamp(free / options.stopping_s, options.unseen_speed, speed) / speed);
+}
+} // namespace bole

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What a task is told of a frame: by the pipeline, or by the truth. The same seeds flown by each tell what control,
+/// tracking and mapping cost.
+
+#include "lab/simulation/forest.h"
+#include <bole/options.h>
+#include <bole/report.h>
+
+#include <memory>
+#include <string>
+
+namespace bole
+{
+enum class PerceptionKind
+{
+  truth,     ///< true poses, and of each trunk that has been in view the true cylinder; no image is looked at
+  truth_map, ///< poses from images tracked against the true cylinders, the odometry between; the map is the truth's
+  real       ///< the pipeline
+};
+const char *toString(PerceptionKind kind);
+/// \throw vpException for another word.
+PerceptionKind perceptionFromString(const std::string &word);
+
+class Perception
+{
+public:
+  virtual ~Perception() = default;
+  /// \p frame as the drone sent it; its status may become worse here. \p truth of the body at the frame.
+  virtual FrameReport process(Frame &frame, const Pose &truth) = 0;
+};
+
+std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options);
+std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+/// \p sensors: the noise of the odometry, which is the prior of the tracking.
+std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+
+/// What an eye that makes no mistake knows of a wood: it keeps what has come into view.
+///
+/// A trunk is in view where both its borders are in the image at the height of the camera, wider than kLeastWidth_px
+/// and no farther than kReach, and where nearer bark hides less than half of it. It is confirmed at once, without
+/// variance, and counts its views. Rays, a grid over the image, end at bark or ground or beyond kReach.
+class TrueSight
+{
+public:
+  TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+  /// Fills poses, trunks, map and points of \p report. \p truth: from where it looks; \p estimate: where it believes to
+  /// be, in the world of the truth; \p is_tracked: trunks in view were measured.
+  void look(const Pose &truth, const Pose &estimate, bool is_tracked, FrameReport &report);
+
+private:
+  struct Known
+  {
+    Trunk cylinder;
+    int views = 0;
+  };
+  void cast(const Pose &wMc, FrameReport &report) const;
+
+  PinholeCamera m_camera;
+  Pose m_bMc;
+  const Forest &m_forest;
+  std::vector<Known> m_known; ///< of the trunks of the forest, in their order
+};
+} // namespace bole

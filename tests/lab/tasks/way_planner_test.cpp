@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/tasks/plane_response.h"
+#include "lab/tasks/way_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+Obstacle trunkAt(double x, double y, double radius = 0.15)
+{
+  Obstacle trunk;
+  trunk.is_confirmed = true;
+  trunk.xy = {x, y};
+  trunk.radius = radius;
+  return trunk;
+}
+
+struct Flown
+{
+  double least = 1e9; ///< hull to bark [m]
+  double seconds = 0, x = 0;
+};
+
+/// A drone that is late, slow, and obeys by a share, along planned ways.
+Flown fly(const std::vector<Obstacle> &trunks, double length, double obeyed = 1, const IsSeen &is_seen = {})
+{
+  const WayOptions options;
+  const ResponseOptions response;
+  PlaneResponse believed(response);
+  DroneResponse drone(response);
+  Eigen::Vector2d p(0, 0);
+  Way way;
+  Flown flown;
+  for (double t = 0; p.x() < length && t < 120; t += 0.1) {
+    believed.see(p, t);
+    WayGoal goal;
+    goal.x_end = p.x() + 7;
+    goal.y_low = -4;
+    goal.y_high = 4;
+    goal.detour = [](double, double y) { return 0.4 * std::abs(y); };
+    way = planWay(trunks, believed.rest(), goal, options, way, is_seen);
+    const Eigen::Vector2d v = way.speed / believed.obeyed() * way.ahead;
+    believed.send(v);
+    drone.advance(t);
+    drone.send(t, {obeyed * v.x(), obeyed * v.y(), 0, 0});
+    for (int k = 1; k <= 10; ++k) {
+      p += drone.advance(t + 0.01 * k).head<2>();
+      for (const Obstacle &trunk : trunks)
+        flown.least = std::min(flown.least, trunk.clearance(p, 0) - options.hull);
+    }
+    flown.seconds = t;
+    flown.x = p.x();
+  }
+  return flown;
+}
+
+TEST(WayPlanner, FliesStraightAndAtItsSpeedWhereNothingStands)
+{
+  const Flown flown = fly({}, 20);
+  EXPECT_NEAR(flown.seconds, 20, 2);
+}
+
+TEST(WayPlanner, FliesTheSpeedItMeansThoughTheDroneObeysByASharePart)
+{
+  const Flown flown = fly({}, 30, 0.85);
+  EXPECT_NEAR(flown.seconds, 30, 2.5);
+}
+
+TEST(WayPlanner, PassesTrunksThatStandOnTheLine)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = 0; k < 8; ++k)
+    trunks.push_back(trunkAt(5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
+  const Flown flown = fly(trunks, 38);
+  EXPECT_GT(flown.least, 0.08);
+  EXPECT_LT(flown.seconds, 50); // at 1 m/s, not by creeping
+}
+
+TEST(WayPlanner, ATrunkStraightAheadIsPassedOnOneSideAndNotPonderedOn)
+{
+  const Flown flown = fly({trunkAt(4, 0, 0.2)}, 8);
+  EXPECT_GT(flown.least, 0.08);
+  EXPECT_LT(flown.seconds, 11);
+}
+
+TEST(WayPlanner, FindsTheOpeningInAWall)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -12; k <= 12; ++k)
+    if (k != 5 && k != 6 && k != 7)
+      trunks.push_back(trunkAt(6, 0.5 * k, 0.15));
+  const Flown flown = fly(trunks, 9);
+  EXPECT_GT(flown.least, 0.05);
+  EXPECT_GE(flown.x, 9);
+}
+
+TEST(WayPlanner, StopsBeforeAWallWithoutOpening)
+{
+  std::vector<Obstacle> trunks;
+  for (int k = -30; k <= 30; ++k)
+    trunks.push_back(trunkAt(4, 0.4 * k, 0.2));
+  const Flown flown = fly(trunks, 9);
+  EXPECT_GT(flown.least, 0);
+  EXPECT_LT(flown.x, 4);
+}
+
+Way planned(const std::vector<Obstacle> &trunks, const IsSeen &is_seen = {}, const Way &last = {})
+{
+  WayGoal goal;
+  goal.x_end = 7;
+  goal.y_low = -4;
+  goal.y_high = 4;
+  goal.detour = [](double, double y) { return 0.4 * std::abs(y); };
+  return planWay(trunks, {0, 0}, goal, {}, last, is_seen);
+}
+
+double widest(const Way &way)
+{
+  double y = 0;
+  for (const Eigen::Vector2d &place : way.places)
+    y = std::max(y, std::abs(place.y()));
+  return y;
+}
+
+TEST(WayPlanner, KeepsFartherFromWhatIsLessWellKnown)
+{
+  Obstacle sure = trunkAt(4, 0.1), vague = sure;
+  vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
+  EXPECT_GT(widest(planned({vague})), widest(planned({sure})) + 0.3);
+}
+
+TEST(WayPlanner, GoesRoundWhatWasNotSeenThrough)
+{
+  const Way way = planned({}, [](double x, double y) { return x < 1 || y < -0.2; });
+  EXPECT_LT(way.lookedAt({0, 0}, 1.5).y(), -0.2);
+  EXPECT_NEAR(planned({}, [](double, double) { return true; }).ahead.y(), 0, 1e-9);
+}
+
+TEST(WayPlanner, DoesNotFlyFastWhereNothingIsKnown)
+{
+  const WayOptions options;
+  EXPECT_NEAR(planned({}, [](double, double) { return false; }).speed, options.unseen_speed, 0.25);
+  EXPECT_NEAR(planned({}, [](double x, double) { return x < 0.6; }).speed, options.unseen_speed + 0.6, 0.2);
+  EXPECT_EQ(planned({}).speed, options.speed);
+}
+
+TEST(WayPlanner, KeepsItsSideWhereTheOtherIsHardlyQuicker)
+{
+  const Way left = planned({trunkAt(4, -0.05, 0.3)});
+  EXPECT_GT(left.lookedAt({0, 0}, 3.5).y(), 0);
+  EXPECT_GT(planned({trunkAt(4, 0.05, 0.3)}, {}, left).lookedAt({0, 0}, 3.5).y(), 0); // it moved in the map
+  EXPECT_LT(planned({trunkAt(4, 0.05, 0.3)}).lookedAt({0, 0}, 3.5).y(), 0);
+}
+
+TEST(WayPlanner, LeavesWhatItStandsInByTheMap)
+{
+  const Way way = planned({trunkAt(0.3, -0.2, 0.1)});
+  EXPECT_LT(way.clearance, 0);
+  EXPECT_GT(way.ahead.y(), 0.3);
+  EXPECT_GT(way.speed, 0.1);
+}
+
+TEST(WayPlanner, AWallIsNeverCrossed)
+{
+  WayGoal goal;
+  goal.x_end = 4;
+  goal.y_low = -3;
+  goal.y_high = 3;
+  goal.is_wall = [](double x, double y) { return std::abs(x - 2) < 0.3 && std::abs(y - 1) > 0.4; };
+  const Way way = planWay({}, {0, -1}, goal, {}, {});
+  EXPECT_TRUE(way.is_open);
+  for (const Eigen::Vector2d &place : way.places)
+    EXPECT_FALSE(goal.is_wall(place.x(), place.y()));
+  goal.is_wall = [](double x, double) { return std::abs(x - 2) < 0.3; };
+  EXPECT_FALSE(planWay({}, {0, -1}, goal, {}, {}).is_open);
+}
+
+TEST(WayPlanner, RefusesOptionsOutOfRange)
+{
+  WayOptions options;
+  options.stopping_s = 0;
+  EXPECT_THROW(options.validate(), vpException);
+}
+} // namespace
+} // namespace bole

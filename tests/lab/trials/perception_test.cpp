@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "lab/trials/perception.h"
+#include "lab/trials/servo_trial.h"
+#include <bole/open_source.h>
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+SimulatedTrunk standing(double x, double y, double radius)
+{
+  SimulatedTrunk trunk;
+  trunk.foot = {x, y, 0};
+  trunk.radius = radius;
+  trunk.taper = trunk.flare = 0;
+  return trunk;
+}
+
+/// Ahead one at 3 m, behind it one that is hidden, aside one at 5 m, one far and one behind the drone.
+Forest wood()
+{
+  Forest forest;
+  forest.trunks = {standing(3, 0, 0.2), standing(6, 0, 0.2), standing(5, 2, 0.15), standing(30, 1, 0.3),
+                   standing(-3, 0, 0.2)};
+  return forest;
+}
+
+const Pose kHere{Eigen::Matrix3d::Identity(), {0, 0, 1.2}};
+
+TEST(TrueSight, KnowsWhatIsInViewAndNeitherWhatIsHiddenNorFarNorBehind)
+{
+  const Forest forest = wood();
+  TrueSight sight({}, forwardCamera(), forest);
+  FrameReport report;
+  sight.look(kHere, kHere, true, report);
+  ASSERT_EQ(report.map.size(), 2u);
+  EXPECT_EQ(report.map[0].id, 0);
+  EXPECT_EQ(report.map[1].id, 2);
+  EXPECT_NEAR(trackedTrunk(report, 0)->relative.ratio(), 0.2 / 3, 1e-9);
+  EXPECT_NEAR(knownTrunk(report, 2)->trunk.radius(), 0.15, 1e-9);
+}
+
+TEST(TrueSight, KeepsWhatHasBeenInViewAndCountsItsViews)
+{
+  const Forest forest = wood();
+  TrueSight sight({}, forwardCamera(), forest);
+  FrameReport report;
+  for (int k = 0; k < 3; ++k)
+    sight.look(kHere, kHere, true, report = {});
+  const Pose aside{kHere.R, {0, 5, 1.2}};
+  sight.look(aside, aside, true, report = {});
+  ASSERT_TRUE(knownTrunk(report, 0));
+  EXPECT_EQ(knownTrunk(report, 0)->observations, 3);
+  EXPECT_FALSE(trackedTrunk(report, 0));
+}
+
+TEST(TrueSight, RaysEndAtBarkAndPassBesideIt)
+{
+  const Forest forest = wood();
+  TrueSight sight({}, forwardCamera(), forest);
+  FrameReport report;
+  sight.look(kHere, kHere, true, report);
+  int on_bark = 0;
+  for (const TriangulatedRay &ray : report.points) {
+    const double range = ray.ray.head<2>().norm() / ray.inverse_distance;
+    const double bearing = std::abs(std::atan2(ray.ray.y(), ray.ray.x()));
+    if (std::abs(ray.ray.z()) > 0.2)
+      continue;
+    if (bearing < 0.05) {
+      EXPECT_NEAR(range, 2.8, 0.08);
+      ++on_bark;
+    }
+    else if (bearing < 0.3) {
+      EXPECT_GT(range, 3);
+    }
+  }
+  EXPECT_GT(on_bark, 5);
+}
+
+TEST(Perception, RefusesAnotherWord) { EXPECT_THROW(perceptionFromString("guess"), vpException); }
+
+ServoTrialOptions holdBy(PerceptionKind perception)
+{
+  ServoTrialOptions options;
+  options.scenario.seed = 300;
+  options.perception = perception;
+  options.robot.has_images = perception != PerceptionKind::truth;
+  options.robot.renderer.samples_per_pixel = 1;
+  return options;
+}
+
+TEST(Perception, ByTruthADroneHoldsWithoutAnImage)
+{
+  int frames = 0, pixels = 0;
+  const ServoTrialResult result =
+      runServoTrial(holdBy(PerceptionKind::truth), [&](const Frame &frame, const FrameReport &, const LoopSample &) {
+        ++frames;
+        pixels += static_cast<int>(frame.image.getSize());
+        return true;
+      });
+  EXPECT_TRUE(result.is_success) << result.outcome;
+  EXPECT_GT(frames, 300);
+  EXPECT_EQ(pixels, 0);
+}
+
+TEST(Perception, ByTheTrueMapTheImagesSayWhereTheDroneIs)
+{
+  double worst = 0, odometry = 0;
+  int tracked = 0, frames = 0;
+  ServoTrialOptions options = holdBy(PerceptionKind::truth_map);
+  options.loop.duration_s = 10;
+  runServoTrial(options, [&](const Frame &frame, const FrameReport &report, const LoopSample &sample) {
+    worst = std::max(worst, (report.wMb.t - sample.truth.t).norm());
+    odometry = std::max(odometry, (frame.wMb_odometry->t - sample.truth.t).norm());
+    tracked += trackedTrunk(report, 0) != nullptr;
+    return ++frames < 150;
+  });
+  EXPECT_GT(tracked, 100);
+  EXPECT_LT(worst, 0.15);
+  EXPECT_GT(worst, 1e-4); // measured, not told
+  EXPECT_GT(odometry, worst);
+}
+} // namespace
+} // namespace bole
