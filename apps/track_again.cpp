@@ -35,6 +35,7 @@ Json summaryOf(const fs::path &run)
       throw vpException(vpException::badValue, "%s: command: must be one of `bole track`", path.c_str());
     json.at("input").at("source").get<std::string>();
     json.at("frames").at("all").get<std::size_t>();
+    json.at("working_folder");
   }
   catch (const Json::exception &error) {
     throw vpException(vpException::badValue, "%s: %s", path.c_str(), error.what());
@@ -92,7 +93,9 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
   const fs::path run = fs::absolute(given.again);
   const Json summary = summaryOf(run);
   const fs::path repeated = given.run.empty() ? run / "again" : fs::absolute(given.run);
-  if (const std::string folder = summary.value("working_folder", ""); !folder.empty()) {
+  if (const std::string folder =
+          summary["working_folder"].is_string() ? summary["working_folder"].get<std::string>() : "";
+      !folder.empty()) {
     std::error_code error;
     fs::current_path(folder, error);
     if (error)

@@ -13,8 +13,8 @@ namespace
 {
 constexpr double kDegree = M_PI / 180;
 
-/// To 0.1 mm and no farther: what lies behind is noise.
-double rounded(double value, double step) { return std::round(value / step) * step; }
+/// To one part of \p parts and no farther: what lies behind is noise.
+double rounded(double value, double parts) { return std::round(value * parts) / parts; }
 } // namespace
 
 GeoOrigin parseOrigin(const std::string &text)
@@ -49,9 +49,9 @@ std::string toGeoJson(const MapOfRun &map, const std::optional<GeoOrigin> &origi
   using Json = nlohmann::ordered_json;
   const auto place = [&origin](const Eigen::Vector2d &xy) -> Json {
     if (!origin)
-      return {rounded(xy.x(), 1e-4), rounded(xy.y(), 1e-4)};
+      return {rounded(xy.x(), 1e4), rounded(xy.y(), 1e4)};
     const Eigen::Vector2d degrees = toEarth(*origin, xy);
-    return {rounded(degrees.x(), 1e-9), rounded(degrees.y(), 1e-9)};
+    return {rounded(degrees.x(), 1e9), rounded(degrees.y(), 1e9)};
   };
   Json json = {{"type", "FeatureCollection"},
                {"name", map.name},
@@ -64,10 +64,10 @@ std::string toGeoJson(const MapOfRun &map, const std::optional<GeoOrigin> &origi
                                 {"geometry", {{"type", "Point"}, {"coordinates", place(trunk.xy)}}},
                                 {"properties",
                                  {{"tree", trunk.id},
-                                  {"dbh_cm", rounded(200 * trunk.radius, 1e-2)},
-                                  {"dbh_sigma_cm", rounded(200 * trunk.radiusSigma(), 1e-2)},
-                                  {"position_sigma_m", rounded(trunk.positionSigma(), 1e-4)},
-                                  {"probability", rounded(trunk.probability, 1e-4)},
+                                  {"dbh_cm", rounded(200 * trunk.radius, 1e2)},
+                                  {"dbh_sigma_cm", rounded(200 * trunk.radiusSigma(), 1e2)},
+                                  {"position_sigma_m", rounded(trunk.positionSigma(), 1e4)},
+                                  {"probability", rounded(trunk.probability, 1e4)},
                                   {"views", trunk.observations}}}});
   Json line = Json::array();
   for (const StampedPose &pose : map.trajectory)

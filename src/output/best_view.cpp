@@ -54,7 +54,7 @@ std::string BestViews::jpeg(int id) const
   const View &view = found->second;
   constexpr int kHeight = 240, kShift = 4; // [px]; fraction of OpenCV's coordinates
   const cv::Mat grey(static_cast<int>(view.crop.getHeight()), static_cast<int>(view.crop.getWidth()), CV_8UC1,
-                     const_cast<unsigned char *>(view.crop.bitmap));
+                     view.crop.bitmap);
   const double factor = std::min(double(kHeight) / grey.rows, 1.5 * kHeight / grey.cols);
   cv::Mat picture;
   cv::resize(grey, picture, {}, factor, factor, factor < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);

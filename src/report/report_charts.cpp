@@ -195,7 +195,6 @@ std::string timeLine(const RunRecord &run)
     row += kRow;
   };
   label("frames");
-  std::vector<FrameStatus> seen;
   boxes([&](std::size_t i) { return frames[i].status; }, [](FrameStatus status) { return colourOf(status); });
   double x = kLabels;
   for (int i = 0; i <= static_cast<int>(FrameStatus::doubtful); ++i) {

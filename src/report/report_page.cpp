@@ -10,7 +10,7 @@
 #include "report/report_map.h"
 #include "report/report_script.h"
 
-#include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
