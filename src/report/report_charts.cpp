@@ -131,8 +131,8 @@ const char *colourOf(FrameStatus status)
 
 std::string trunkCharts(const RunRecord &run, const TrunkRecord &trunk, const TruthTrunk *truth)
 {
-  Curve range{"range", palette::kBlue, {}, {}}, radius{"radius", palette::kBlue, {}, {}},
-      x{"x", palette::kBlue, {}, {}}, y{"y", palette::kVermilion, {}, {}};
+  Curve range{"", palette::kBlue, {}, {}}, radius{"", palette::kBlue, {}, {}}, x{"x", palette::kBlue, {}, {}},
+      y{"y", palette::kVermilion, {}, {}};
   std::vector<const TrunkTrace *> views;
   for (const TrunkTrace &view : run.trace.views)
     if (view.id == trunk.id)
@@ -149,7 +149,7 @@ std::string trunkCharts(const RunRecord &run, const TrunkRecord &trunk, const Tr
     add(x, t, 100 * (view.xy.x() - trunk.xy.x()), 100 * view.xy_sigma.x());
     add(y, t, 100 * (view.xy.y() - trunk.xy.y()), 100 * view.xy_sigma.y());
   }
-  Panels panels(400, 3, duration(run));
+  Panels panels(344, 3, duration(run));
   panels.add("range [m], one sigma", {range});
   std::vector<Curve> radii = {level("final", 100 * trunk.radius, palette::kBlack)};
   if (truth != nullptr && truth->radius > 0)
@@ -226,7 +226,7 @@ std::string timeLine(const RunRecord &run)
 
 std::string trajectoryCharts(const RunRecord &run)
 {
-  Curve sx{"x", palette::kBlue, {}, {}}, sy{"y", palette::kVermilion, {}, {}}, height{"online", palette::kBlue, {}, {}};
+  Curve sx{"x", palette::kBlue, {}, {}}, sy{"y", palette::kVermilion, {}, {}}, height{"", palette::kBlue, {}, {}};
   const auto &frames = run.trace.frames;
   for (std::size_t i = 0; i < frames.size(); i += frames.size() / kMostPoints + 1) {
     const double t = secondsSince(run, frames[i].stamp_ns);
@@ -234,7 +234,7 @@ std::string trajectoryCharts(const RunRecord &run)
     sy.points.emplace_back(t, 100 * std::sqrt(std::max(0.0, frames[i].covariance_xy(1, 1))));
     height.points.emplace_back(t, frames[i].place.z());
   }
-  Curve error{"smoothed", palette::kBlue, {}, {}};
+  Curve error{"", palette::kBlue, {}, {}};
   for (std::size_t i = 0, k = 0; i < run.truth.size(); i += run.truth.size() / kMostPoints + 1) {
     while (k < run.smoothed.size() && run.smoothed[k].stamp_ns < run.truth[i].stamp_ns)
       ++k;
@@ -244,15 +244,15 @@ std::string trajectoryCharts(const RunRecord &run)
   }
   Panels panels(640, run.truth.empty() ? 2 : 3, duration(run));
   panels.add("sigma of the online place [cm]", {sx, sy});
-  panels.add("height in the world [m]", {height});
+  panels.add("height of the online place [m]", {height});
   if (!run.truth.empty())
-    panels.add("horizontal error after alignment [cm]", {error});
+    panels.add("horizontal error of the smoothed place, aligned [cm]", {error});
   return panels.finish();
 }
 
 std::string timingChart(const RunRecord &run)
 {
-  Curve total{"total", palette::kBlue, {}, {}};
+  Curve total{"", palette::kBlue, {}, {}};
   const auto &frames = run.timing.frames;
   for (std::size_t i = 0; i < frames.size(); i += frames.size() / kMostPoints + 1)
     total.points.emplace_back(i < run.trace.frames.size() ? secondsSince(run, run.trace.frames[i].stamp_ns) : double(i),
