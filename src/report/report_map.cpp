@@ -62,8 +62,10 @@ std::string circle(const Eigen::Vector2d &at, double radius, const std::string &
 
 std::string label(const Eigen::Vector2d &at, double radius, int id)
 {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" dx=\".25em\" dy=\"-.15em\">{}</text>\n",
-                     kUnits * (at.x() + 0.7 * radius), -kUnits * (at.y() + 0.7 * radius), id);
+  const double x = kUnits * at.x(), y = -kUnits * at.y(), r = 0.7 * kUnits * radius; // beside the circle
+  return fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" data-x=\"{:.1f}\" data-y=\"{:.1f}\" data-r=\"{:.1f}\">{}</text>\n", x + r, y - r,
+      x, y, r, id);
 }
 
 std::string evidence(const GroundEvidence &evidence)

@@ -9,7 +9,7 @@ constexpr const char *kReportStyle = R"(<style>
 #board{display:grid;grid-template-columns:minmax(0,3fr) minmax(0,2fr);gap:1em}
 @media(max-width:900px){#board{grid-template-columns:minmax(0,1fr)}}
 #mapbox{position:relative;border:1px solid #ccc}
-#map{display:block;width:100%;height:min(70vh,640px);touch-action:none;cursor:grab;background:#fff}
+#map{display:block;width:100%;height:min(70vh,640px,100vw);touch-action:none;cursor:grab;background:#fff}
 #map *{vector-effect:non-scaling-stroke}
 #map text{paint-order:stroke;stroke:#fff;stroke-width:3px;fill:#222;pointer-events:none}
 #map .reach{fill:transparent}
@@ -45,6 +45,7 @@ if (first) choose(first.dataset.id);
 if (!map) return;
 const home = map.viewBox.baseVal, box = {x: home.x, y: home.y, w: home.width, h: home.height};
 const whole = {...box}, scale = document.getElementById('scale'), labels = [...map.querySelectorAll('text')];
+const circles = [...map.querySelectorAll('.trunk circle:not(.reach)')];
 const perPixel = () => Math.max(box.w / map.clientWidth, box.h / map.clientHeight);
 const show = () => {
   map.setAttribute('viewBox', [box.x, box.y, box.w, box.h].join(' '));
@@ -55,12 +56,23 @@ const show = () => {
   const metres = base * (raw / base >= 5 ? 5 : raw / base >= 2 ? 2 : 1);
   scale.style.width = metres * 100 / unit + 'px';
   scale.textContent = +metres.toPrecision(3) + ' m';
-  const taken = [];
-  for (const t of labels) {
+  const halfW = map.clientWidth * unit / 2, halfH = map.clientHeight * unit / 2; // of what is to be seen
+  const left = box.x + box.w / 2 - halfW, right = left + 2 * halfW, top = box.y + box.h / 2 - halfH, low = top + 2 * halfH;
+  const taken = circles.map(c => c.getBBox());
+  taken.push({x: right - 50 * unit, y: top, width: 50 * unit, height: 120 * unit}); // the buttons
+  for (const t of labels) { // at the first corner of its trunk that is free, or not at all
+    const [x, y, r] = ['x', 'y', 'r'].map(k => +t.dataset[k]);
     t.style.display = '';
-    const b = t.getBBox();
-    const hit = taken.some(o => b.x < o.x + o.width && o.x < b.x + b.width && b.y < o.y + o.height && o.y < b.y + b.height);
-    if (hit) t.style.display = 'none'; else taken.push(b);
+    const is_free = [[1, -1], [1, 1], [-1, -1], [-1, 1]].some(([side, down]) => {
+      t.setAttribute('x', x + side * (r + 3 * unit));
+      t.setAttribute('y', y + down * r + (down > 0 ? 10 * unit : 0));
+      t.setAttribute('text-anchor', side > 0 ? 'start' : 'end');
+      const b = t.getBBox();
+      const hit = o => b.x < o.x + o.width && o.x < b.x + b.width && b.y < o.y + o.height && o.y < b.y + b.height;
+      const is_cut = (x < right && b.x + b.width > right) || (x > left && b.x < left) || (y < low && b.y + b.height > low);
+      return is_cut || taken.some(hit) ? false : taken.push(b);
+    });
+    if (!is_free) t.style.display = 'none';
   }
 };
 const zoom = (factor, x, y) => {
