@@ -58,7 +58,8 @@ const show = () => {
   scale.textContent = +metres.toPrecision(3) + ' m';
   const halfW = map.clientWidth * unit / 2, halfH = map.clientHeight * unit / 2; // of what is to be seen
   const left = box.x + box.w / 2 - halfW, right = left + 2 * halfW, top = box.y + box.h / 2 - halfH, low = top + 2 * halfH;
-  const taken = circles.map(c => c.getBBox());
+  const taken = circles.map(c => c.getBBox()).map(b => // the square in the circle
+    ({x: b.x + .15 * b.width, y: b.y + .15 * b.height, width: .7 * b.width, height: .7 * b.height}));
   taken.push({x: right - 50 * unit, y: top, width: 50 * unit, height: 120 * unit}); // the buttons
   for (const t of labels) { // at the first corner of its trunk that is free, or not at all
     const [x, y, r] = ['x', 'y', 'r'].map(k => +t.dataset[k]);
@@ -111,7 +112,7 @@ map.addEventListener('pointermove', e => {
 });
 for (const c of document.querySelectorAll('#legend input'))
   c.addEventListener('change', () => document.getElementById(c.dataset.layer).style.display = c.checked ? '' : 'none');
-addEventListener('resize', show);
+new ResizeObserver(show).observe(map);
 show();
 })();
 )";
