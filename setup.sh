@@ -57,7 +57,7 @@ demo)
   say "mapping the demonstration flight"
   ./bole track data/park-forward -o run
   ./bole evaluate run data/park-forward
-  say "done. Look at run/overlay.mp4 and run/map.svg."
+  say "done. Look at run/report.html."
   echo "Here the command is ./bole; ./setup.sh install makes it \`bole\` in every folder."
   ;;
 test)

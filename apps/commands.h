@@ -42,6 +42,8 @@ inline std::vector<std::string> g_command_line;
 
 void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
+void addReport(CLI::App &app);   ///< the page about a run
+void addExport(CLI::App &app);   ///< maps for other tools
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
 void addServo(CLI::App &app);             ///< tasks in the closed loop

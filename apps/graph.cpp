@@ -35,18 +35,12 @@ void addGraph(CLI::App &app)
 {
   struct GraphArguments
   {
-    std::string run, output;
+    std::string run;
   };
   const auto arguments = std::make_shared<GraphArguments>();
-  CLI::App *command = app.add_subcommand("graph", "Statistics and export of the graph of a run");
+  CLI::App *command = app.add_subcommand("graph", "Statistics of the graph of a run");
   command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")->required();
-  command->add_option("--export", arguments->output, "write the graph here, in g2o text");
-  command->footer("Example:\n  bole graph run --export forest.g2o");
-  command->callback([arguments] {
-    const Graph graph = readG2o(arguments->run + "/graph.g2o");
-    printStatistics(graph);
-    if (!arguments->output.empty())
-      writeG2o(arguments->output, graph);
-  });
+  command->footer("`bole export RUN g2o` writes it.\nExample:\n  bole graph run");
+  command->callback([arguments] { printStatistics(readG2o(arguments->run + "/graph.g2o")); });
 }
 } // namespace bole::apps

@@ -26,6 +26,8 @@ void addCommands(CLI::App &app)
 {
   addTrack(app);
   addEvaluate(app);
+  addReport(app);
+  addExport(app);
   addOptions(app);
   addRecord(app);
   addGraph(app);

@@ -5,6 +5,7 @@
 
 #include "ardrone/flight_folder.h"
 #include "ardrone/recording.h"
+#include "output/progress.h"
 #include <bole/ardrone_source.h>
 
 #include <fmt/format.h>
@@ -26,14 +27,14 @@ struct RecordArguments
 
 using StatusCounts = std::map<FrameStatus, std::size_t>;
 
-void report(const StatusCounts &counts, const LinkCounters &link, std::size_t bytes, const std::string &end)
+std::string textOf(const StatusCounts &counts, const LinkCounters &link, std::size_t bytes)
 {
   std::string frames;
   for (const auto &[status, count] : counts)
     frames += fmt::format("{}{} {}", frames.empty() ? "" : ", ", count, toString(status));
-  fmt::print(stderr, "\r{}; {} dropped; {} navdata, {} refused, {} late; {} connections; {:.1f} MB{}", frames,
-             link.dropped, link.navdata_packets, link.navdata_refused, link.navdata_late, link.connections,
-             static_cast<double>(bytes) * 1e-6, end);
+  return fmt::format("{}; {} dropped; {} navdata, {} refused, {} late; {} connections; {:.1f} MB", frames, link.dropped,
+                     link.navdata_packets, link.navdata_refused, link.navdata_late, link.connections,
+                     static_cast<double>(bytes) * 1e-6);
 }
 
 void run(const RecordArguments &arguments)
@@ -48,21 +49,23 @@ void run(const RecordArguments &arguments)
   endAtInterrupt();
   std::int64_t first_ns = -1;
   StatusCounts counts;
+  Progress progress(0, stderr);
   for (Frame frame; !interrupted() && source.next(frame);) {
     if (first_ns < 0)
       first_ns = frame.stamp_ns;
     ++counts[frame.status];
     if (folder && frame.status != FrameStatus::missing)
       folder->write(source.liveFrame());
-    if (!arguments.quiet && frame.index % 10 == 0)
-      report(counts, source.counters(), raw.bytes(), "");
+    if (!arguments.quiet)
+      progress.update(frame.index + 1, textOf(counts, source.counters(), raw.bytes()));
     if (!raw.error().empty())
       throw vpException(vpException::ioError, raw.error());
     if (arguments.seconds > 0 && static_cast<double>(frame.stamp_ns - first_ns) * 1e-9 >= arguments.seconds)
       break;
   }
+  progress.finish();
   if (!arguments.quiet)
-    report(counts, source.counters(), raw.bytes(), fmt::format(" in {}\n", arguments.folder));
+    fmt::print(stderr, "{} in {}\n", textOf(counts, source.counters(), raw.bytes()), arguments.folder);
   if (interrupted()) // what was received is complete: Ctrl-C is how a recording without --seconds ends
     fmt::print(stderr, "bole: interrupted\n");
 }

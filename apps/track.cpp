@@ -5,12 +5,13 @@
 #include "field_of_view.h"
 #include "interrupt.h"
 #include "overlay_window.h"
+#include "track_arguments.h"
 #include "track_output.h"
 
 #include "output/progress.h"
+#include "report/report_page.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>
-#include <bole/open_source.h>
 
 #include <algorithm>
 #include <chrono>
@@ -25,18 +26,6 @@ namespace bole::apps
 {
 namespace
 {
-struct TrackArguments
-{
-  std::string input, run, config;
-  std::vector<std::string> settings;
-  SourceOptions source;
-  bool is_shown = false, has_video = true, is_quiet = false, is_without_odometry = false, is_without_gyro = false;
-  std::size_t frames_most = 0;
-  double give_up_s = ArDroneSource::Options().give_up_s;
-  double camera_height = 0;
-  bool is_field_of_view_given = false;
-};
-
 /// A video without a camera file is looked through for a pan that tells its field of view.
 std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSummary &made)
 {
@@ -137,8 +126,7 @@ void report(const TrackArguments &arguments, const TrackOutput &output, const Ve
         fmt::format("  age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, "
                     "most {:.1f} ms\n",
                     *median, *output.timing().age_ms(0.99), *output.timing().age_ms(1));
-  text += fmt::format("Look at {}{}/map.svg\n", output.hasVideo() ? arguments.run + "/overlay.mp4 and " : "",
-                      arguments.run);
+  text += fmt::format("Look at {}/report.html\n", arguments.run);
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
 }
@@ -182,6 +170,8 @@ std::size_t fly(const TrackArguments &arguments, FrameSource &source, Pipeline &
   return count;
 }
 
+} // namespace
+
 void track(const TrackArguments &arguments)
 {
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
@@ -212,6 +202,12 @@ void track(const TrackArguments &arguments)
     output.setLink(live->counters());
   output.write(pipeline, !interrupted());
   output.finish();
+  try {
+    writeReport(arguments.run, output.hasTruth() ? arguments.input : "");
+  }
+  catch (const vpException &error) { // a picture of what is there already
+    std::fprintf(stderr, "bole: no page: %s\n", error.what());
+  }
   const Verdict verdict = output.verdict();
   if (!arguments.is_quiet)
     report(arguments, output, verdict);
@@ -222,73 +218,17 @@ void track(const TrackArguments &arguments)
   if (!verdict.is_trusted)
     endWith(ExitCode::doubtful);
 }
-} // namespace
-
 void addTrack(CLI::App &app)
 {
   const auto arguments = std::make_shared<TrackArguments>();
   CLI::App *command = app.add_subcommand("track", "Map the trunks of a flight and smooth its trajectory");
-  command
-      ->add_option("INPUT", arguments->input,
-                   "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
-      ->transform(findSequence)
-      ->required();
-  command->add_option("-o,--output", arguments->run, "Folder for the results")->required();
-  command->add_option("--config", arguments->config,
-                      "YAML file of options, or a preset by its name (paper: the paper's method); `bole options` lists "
-                      "them. Videos and live drones start with camera.compressed=true");
-  command->add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
-  command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
-  command->add_option("--odometry", arguments->source.odometry_path,
-                      "Poses for a video: TUM or ASL csv; `none` withholds odometry and gyro");
-  command
-      ->add_option("--odometry-offset", arguments->source.odometry_offset_s,
-                   "Added to the stamps of --odometry so that they count as the video's do [s]")
-      ->capture_default_str()
-      ->check(within(-1e10, 1e10));
-  CLI::Option *view =
-      command->add_option("--field-of-view", arguments->source.field_of_view_deg,
-                          "Horizontal, where there is no camera file [degrees]; else a pan in the video "
-                          "tells it, or 65 is assumed");
-  command
-      ->add_option("--camera-height", arguments->camera_height,
-                   "Height of the camera over the ground [m], which gives a video without odometry its scale")
-      ->check(within(0.1, 100));
-  const auto without = std::make_shared<std::vector<std::string>>();
-  command->add_option("--without", *without, "Withhold one sensor: gyro or odometry (may be given twice)")
-      ->check(CLI::IsMember({"gyro", "odometry"}));
-  command->add_option("--rate", arguments->source.frame_rate_hz, "Frames a second of numbered images")
-      ->capture_default_str();
-  command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
-      ->capture_default_str();
-  command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)")->check(within(0, 1e9));
-  command->add_option("--give-up", arguments->give_up_s, "Silence of a live drone that ends its flight [s]")
-      ->capture_default_str()
-      ->check(within(0.1, 86400));
-  command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
-  command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
-  command->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors; the exit status tells how it went");
-  command->footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, hypotheses.csv, graph.g2o, overlay.mp4, "
-                  "saliency.mp4,\n"
-                  "map.svg, timing.csv, options.yaml and summary.json to the folder; Ctrl-C ends the flight and keeps "
-                  "what is known.\n"
-                  "Exit status: 0 good; 1 error; 2 unknown option; 3 not to be trusted (the camera never moved, only "
-                  "rotated, or saw\n"
-                  "nothing: summary.json tells); 130 interrupted.\n"
-                  "Examples:\n"
-                  "  bole track data/park-forward -o run\n"
-                  "  bole track walk.mp4 -o run --camera phone.yaml --show\n"
-                  "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
-                  "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
-                  "  bole track ardrone://192.168.1.1 -o run --show");
-  command->callback([arguments, view, without] {
-    for (const std::string &sensor : *without)
-      (sensor == "gyro" ? arguments->is_without_gyro : arguments->is_without_odometry) = true;
-    arguments->is_field_of_view_given = view->count() > 0;
-    if (arguments->source.odometry_path == "none") {
-      arguments->is_without_odometry = arguments->is_without_gyro = true;
-      arguments->source.odometry_path.clear();
+  addTrackOptions(*command, arguments);
+  command->callback([arguments, command] {
+    if (!arguments->again.empty()) {
+      trackAgain(*command, *arguments);
+      return;
     }
+    settle(*command, *arguments);
     track(*arguments);
   });
 }

@@ -6,12 +6,14 @@
 #include "input/asl_source.h"
 #include "input/truth.h"
 #include <bole/graph.h>
+#include "output/atomic_file.h"
 #include <bole/overlay.h>
 
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fmt/format.h>
+#include <set>
 #include <visp3/core/vpException.h>
 
 namespace bole::apps
@@ -88,9 +90,48 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
       static_cast<std::size_t>(std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
         return trunk.is_tracked && trunk.status == TrunkStatus::confirmed;
       }));
+  trace(frame, report);
   const bool has_image =
       frame.image.getSize() > 0 && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width;
   return has_image && (m_overlay || m_has_pictures) ? draw(frame, report) : vpImage<vpRGBa>();
+}
+
+void TrackOutput::trace(const Frame &frame, const FrameReport &report)
+{
+  constexpr double kFar = 15; // points beyond are no evidence of a trunk of the map [m]
+  const Eigen::Matrix3d wRb = report.wMb.R;
+  const Eigen::Matrix3d place_covariance = wRb * report.pose_covariance.topLeftCorner<3, 3>() * wRb.transpose();
+  m_trace.frames.push_back(
+      {frame.index, frame.stamp_ns, frame.status, report.wMb.t, place_covariance.topLeftCorner<2, 2>()});
+  for (const Eigen::Vector3d &point : placedPoints(report, kFar))
+    m_trace.evidence.add(point);
+  for (const TrunkInView &view : report.trunks) {
+    const KnownTrunk *known = knownTrunk(report, view.id);
+    if (!view.is_tracked || known == nullptr)
+      continue;
+    const double radius = known->trunk.radius(), relative_sigma = std::sqrt(std::max(0.0, known->log_radius_variance));
+    const Eigen::Vector2d line = known->trunk.xy - report.wMc.t.head<2>(), along = line.normalized();
+    const double across = line.norm() * std::sqrt(std::max(0.0, known->bearing_variance));
+    const Eigen::Array2d variance = along.array().square() * std::pow(line.norm() * relative_sigma, 2) +
+                                    along.reverse().array().square() * across * across;
+    m_trace.views.push_back({frame.index, frame.stamp_ns, view.id, view.distance, view.distance * relative_sigma,
+                             radius, radius * relative_sigma, known->trunk.xy, variance.sqrt()});
+    if (view.relative.isFinite() && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width &&
+        static_cast<int>(frame.image.getHeight()) == m_summary.camera.height)
+      m_best_views.add(view.id, frame.image, m_summary.camera, view.relative, view.tan_low, view.tan_high);
+  }
+}
+
+/// views/ID.jpg of each trunk.
+void TrackOutput::writeBestViews() const
+{
+  const std::string folder = m_folder.file("views");
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  for (const TrunkRecord &trunk : m_summary.trunks)
+    if (trunk.status == TrunkStatus::confirmed)
+      if (const std::string jpeg = m_best_views.jpeg(trunk.id); !jpeg.empty())
+        writeAtomically(fmt::format("{}/{}.jpg", folder, trunk.id), jpeg);
 }
 
 vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
@@ -214,6 +255,18 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
     m_folder.write(m_picture, m_summary, m_camera_place);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
+  std::set<int> confirmed;
+  for (const TrunkRecord &trunk : m_summary.trunks)
+    if (trunk.status == TrunkStatus::confirmed)
+      confirmed.insert(trunk.id);
+  const auto isOther = [&confirmed](const TrunkTrace &view) { return confirmed.count(view.id) == 0; };
+  m_trace.views.erase(std::remove_if(m_trace.views.begin(), m_trace.views.end(), isOther), m_trace.views.end());
+  if (!m_summary.reference.has_ranges) { // no lengths
+    m_trace.views.clear();
+    m_trace.evidence = {};
+  }
+  writeTrace(m_folder.path(), m_trace);
+  writeBestViews();
 }
 
 void TrackOutput::finish()

@@ -4,6 +4,8 @@
 /// What `bole track` gathers while it runs and writes into the folder of the run.
 
 #include "ardrone/drone_link.h"
+#include "output/best_view.h"
+#include "output/flight_trace.h"
 #include "output/run_folder.h"
 #include "output/verdict.h"
 #include "output/video_writer.h"
@@ -40,11 +42,13 @@ public:
   void finish();
 
   std::size_t trunksInView() const { return m_in_view; }
-  bool hasVideo() const { return m_overlay != nullptr; }
+  bool hasTruth() const { return !m_picture.truth_trunks.empty(); }
   Verdict verdict() const { return judge(m_summary); }
   const TimingTable &timing() const { return m_summary.timing; }
 
 private:
+  void trace(const Frame &frame, const FrameReport &report);
+  void writeBestViews() const;
   vpImage<vpRGBa> draw(const Frame &frame, const FrameReport &report);
   template <typename Action> void film(const Action &action);
   void loseVideos(const std::string &why);
@@ -54,6 +58,8 @@ private:
   RunFolder m_folder;
   RunSummary m_summary;
   MapPicture m_picture;
+  FlightTrace m_trace; ///< of all hypotheses until the end
+  BestViews m_best_views;
   Eigen::Vector2d m_camera_place = Eigen::Vector2d::Zero(); ///< of the first frame [m]
   Pose m_bMc;
   bool m_has_pictures;

@@ -32,7 +32,8 @@ struct BenchmarkArguments
   std::vector<Light> lights{Light::sun, Light::overcast};
   PathKind path = PathKind::forward;
   Bark bark = Bark::mixed;
-  std::string folder, config;
+  std::string folder, config, json;
+  bool is_quiet = false;
   std::vector<std::string> settings;
   double h264_kbps = 0;
 };
@@ -113,7 +114,9 @@ std::string csvOf(const std::vector<BenchmarkFlight> &flights)
 }
 
 /// Sums over the flights as well as medians: a flight with two trunks counts as two.
-nlohmann::json summarise(const std::string &name, const std::vector<const BenchmarkFlight *> &flights)
+/// \p text is what people read of it.
+nlohmann::json summarise(const std::string &name, const std::vector<const BenchmarkFlight *> &flights,
+                         std::string &text)
 {
   nlohmann::json json{{"name", name}, {"flights", flights.size()}};
   std::size_t expected = 0, found = 0, confirmed = 0, matched = 0;
@@ -129,8 +132,9 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Benchm
     return fmt::format("{} [{}, {}] ({} of {})", percent(interval.share), percent(interval.low), percent(interval.high),
                        part, whole);
   };
-  fmt::print("\n{}: {} flight{}; of all trunks recall {}, precision {}\n", name, flights.size(),
-             flights.size() == 1 ? "" : "s", told(recall, found, expected), told(precision, matched, confirmed));
+  text +=
+      fmt::format("\n{}: {} flight{}; of all trunks recall {}, precision {}\n", name, flights.size(),
+                  flights.size() == 1 ? "" : "s", told(recall, found, expected), told(precision, matched, confirmed));
   json["recall"] = {
       {"share", recall.share}, {"low", recall.low}, {"high", recall.high}, {"found", found}, {"expected", expected}};
   json["precision"] = {{"share", precision.share},
@@ -143,8 +147,8 @@ nlohmann::json summarise(const std::string &name, const std::vector<const Benchm
     for (const BenchmarkFlight *flight : flights)
       values.push_back(factorOf(measure) * measure.of(flight->result));
     const MedianInterval median = bootstrapMedian(values);
-    fmt::print("  {:26} median {}   [{}, {}]   of {}\n", titleOf(measure), figure(median.median, 8, 3),
-               figure(median.low, 0, 3), figure(median.high, 0, 3), median.count);
+    text += fmt::format("  {:26} median {}   [{}, {}]   of {}\n", titleOf(measure), figure(median.median, 8, 3),
+                        figure(median.low, 0, 3), figure(median.high, 0, 3), median.count);
     json["medians"][titleOf(measure)] = {
         {"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
   }
@@ -156,13 +160,14 @@ void report(const BenchmarkArguments &arguments, const std::vector<BenchmarkFlig
   nlohmann::json json{{"version", BOLE_VERSION},        {"frames", arguments.frames},
                       {"samples", arguments.samples},   {"path", wordOf(arguments.path)},
                       {"bark", wordOf(arguments.bark)}, {"first_seed", arguments.first_seed}};
+  std::string text;
   const auto group = [&](const std::string &name, const auto &belongs) {
     std::vector<const BenchmarkFlight *> members;
     for (const BenchmarkFlight &flight : flights)
       if (belongs(flight))
         members.push_back(&flight);
     if (!members.empty())
-      json["groups"].push_back(summarise(name, members));
+      json["groups"].push_back(summarise(name, members, text));
   };
   if (arguments.densities.size() > 1)
     for (const double density : arguments.densities)
@@ -172,10 +177,13 @@ void report(const BenchmarkArguments &arguments, const std::vector<BenchmarkFlig
     for (const Light light : arguments.lights)
       group(wordOf(light), [light](const BenchmarkFlight &f) { return f.light == light; });
   group("all", [](const BenchmarkFlight &) { return true; });
-  if (arguments.folder.empty())
-    return;
-  writeAtomically(arguments.folder + "/flights.csv", csvOf(flights));
-  writeAtomically(arguments.folder + "/benchmark.json", json.dump(1) + "\n");
+  if (!arguments.is_quiet)
+    std::fputs(text.c_str(), stdout);
+  if (!arguments.folder.empty())
+    writeAtomically(arguments.folder + "/flights.csv", csvOf(flights));
+  if (!arguments.folder.empty() || !arguments.json.empty())
+    writeAtomically(arguments.json.empty() ? arguments.folder + "/benchmark.json" : arguments.json,
+                    json.dump(1) + "\n");
 }
 
 void run(const BenchmarkArguments &arguments)
@@ -215,7 +223,8 @@ void run(const BenchmarkArguments &arguments)
         }
         confirmed += flight.result.trunks.confirmed;
         flights.push_back(std::move(flight));
-        progress.update(flights.size(), fmt::format("{} trunks", confirmed));
+        if (!arguments.is_quiet)
+          progress.update(flights.size(), fmt::format("{} trunks", confirmed));
       }
   progress.finish();
   report(arguments, flights);
@@ -246,6 +255,8 @@ void addBenchmark(CLI::App &app)
   command->add_option("--h264", arguments->h264_kbps, "Pass the pictures through H.264 at this bit rate [kbit/s]");
   command->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   command->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
+  command->add_flag("-q,--quiet", arguments->is_quiet, "No table and no progress");
+  command->add_option("--json", arguments->json, "File for all figures (default OUT/benchmark.json)");
   command->footer("95 % intervals: of medians by bootstrap over the flights, of shares by Wilson; none of one flight. "
                   "\"-\" and null:\n"
                   "there was nothing to measure. Ctrl-C reports the flights finished; the exit status is then 130.\n"

@@ -4,6 +4,7 @@
 #include "saliency_run.h"
 
 #include "output/atomic_file.h"
+#include "output/progress.h"
 #include "saliency/noise_learner.h"
 
 #include <cstdio>
@@ -27,14 +28,14 @@ void calibrate(const CalibrateArguments &arguments)
   const SaliencyOptions start;
   SaliencyRun run(*source, start);
   SaliencyNoiseLearner learner(source->camera(), start);
+  Progress progress(source->size(), stderr);
   std::size_t frames = 0;
   while (run.next()) {
     if (frames > 0)
       learner.add(run.previous_image, run.frame.image, run.saliency);
-    if (++frames % 20 == 0)
-      std::fprintf(stderr, "\r%zu frames", frames);
+    progress.update(++frames);
   }
-  std::fprintf(stderr, "\n");
+  progress.finish();
   if (learner.count() == 0)
     throw vpException(vpException::badValue,
                       fmt::format("{}: no pair of images with texture to learn from", arguments.sequence).c_str());

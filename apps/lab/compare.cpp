@@ -6,10 +6,12 @@
 #include "lab/baseline/comparison_report.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
+#include "output/progress.h"
 
 #include <cstdio>
 #include <filesystem>
 #include <fmt/format.h>
+#include <iterator>
 #include <memory>
 #include <visp3/core/vpException.h>
 
@@ -21,8 +23,8 @@ namespace fs = std::filesystem;
 
 struct CompareArguments
 {
-  std::string sequence, out, settings;
-  bool has_basin = false, has_faults = false, is_quick = false;
+  std::string sequence, out, settings, json;
+  bool has_basin = false, has_faults = false, is_quick = false, is_quiet = false;
   double range_m = 25, far_m = 25;
 };
 
@@ -36,7 +38,31 @@ TestFlight readFlight(const std::string &path)
   return readAslFlight(path);
 }
 
-void say(const std::string &what) { std::fprintf(stderr, "bole: %s\n", what.c_str()); }
+/// The steps of a comparison, for the bar.
+class Steps
+{
+public:
+  explicit Steps(const CompareArguments &arguments)
+      : m_is_quiet(arguments.is_quiet), m_progress(countOf(arguments), stderr, "step")
+  {
+  }
+  void begin(const std::string &what)
+  {
+    if (!m_is_quiet)
+      m_progress.update(m_begun, what);
+    ++m_begun;
+  }
+
+private:
+  static std::size_t countOf(const CompareArguments &arguments)
+  {
+    const std::size_t sweeps = arguments.is_quick ? 0 : 3 * std::size(kVisp);
+    return sweeps + 1 + (arguments.has_basin ? 2 * (std::size(kVisp) + 1) : 0) + (arguments.has_faults ? 1 : 0);
+  }
+  bool m_is_quiet;
+  std::size_t m_begun = 0;
+  Progress m_progress;
+};
 
 EdgeSettings bestOf(const std::vector<SweepResult> &sweeps, TrackerKind kind, Help help)
 {
@@ -53,7 +79,7 @@ EdgeSettings ourSettings(const CompareArguments &arguments)
   return settings;
 }
 
-void compareAll(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
+void compareAll(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
                 ComparisonReport &report)
 {
   std::vector<Contender> contenders;
@@ -62,14 +88,14 @@ void compareAll(const CompareArguments &arguments, const TestFlight &flight, con
       if (interrupted())
         return;
       if (!arguments.is_quick) {
-        say(fmt::format("settings of {}, {}", toString(kind), toString(help)));
+        steps.begin(fmt::format("settings of {}, {}", toString(kind), toString(help)));
         report.sweeps.push_back(sweep(flight, cao, kind, help, report.limits));
       }
       contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
     }
   for (const Help help : {Help::alone, Help::prior})
     contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
-  say(fmt::format("{} trackers over {} frames", contenders.size(), flight.frames.size()));
+  steps.begin(fmt::format("{} trackers over {} frames", contenders.size(), flight.frames.size()));
   report.scores = compare(flight, cao, contenders, report.limits);
 
   std::vector<Contender> timed;
@@ -80,7 +106,7 @@ void compareAll(const CompareArguments &arguments, const TestFlight &flight, con
   report.timing = compare(flight, cao, timed, report.limits);
 }
 
-void measureBasin(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
+void measureBasin(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
                   ComparisonReport &report)
 {
   BasinOptions options;
@@ -90,7 +116,7 @@ void measureBasin(const CompareArguments &arguments, const TestFlight &flight, c
     for (const TrackerKind kind : kVisp) {
       if (interrupted())
         return;
-      say(fmt::format("basin of {}{}", toString(kind), has_clutter ? "" : ", without clutter"));
+      steps.begin(fmt::format("basin of {}{}", toString(kind), has_clutter ? "" : ", without clutter"));
       BasinRow best;
       double best_sum = -1;
       for (const int range : {8, 16, 32}) { // the range that answers most steps right
@@ -106,13 +132,13 @@ void measureBasin(const CompareArguments &arguments, const TestFlight &flight, c
       }
       report.basin.push_back(best);
     }
-    say(fmt::format("basin of {}{}", toString(TrackerKind::trunk), has_clutter ? "" : ", without clutter"));
+    steps.begin(fmt::format("basin of {}{}", toString(TrackerKind::trunk), has_clutter ? "" : ", without clutter"));
     Contender ours(TrackerKind::trunk, Help::alone, ourSettings(arguments), arguments.settings);
     report.basin.push_back(basin(flight, cao, ours, has_clutter, options));
   }
 }
 
-void measureFaults(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao,
+void measureFaults(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
                    ComparisonReport &report)
 {
   std::vector<Contender> contenders;
@@ -121,7 +147,7 @@ void measureFaults(const CompareArguments &arguments, const TestFlight &flight, 
       contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
   for (const Help help : {Help::alone, Help::prior})
     contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
-  say("faults");
+  steps.begin("faults");
   report.faults = faults(flight, cao, contenders, {}, report.limits);
 }
 
@@ -146,17 +172,21 @@ void run(const CompareArguments &arguments)
   report.trunks = int(model.size());
   report.limits = flight.limits;
   endAtInterrupt();
-  compareAll(arguments, flight, cao, report);
-  if (arguments.has_basin && !interrupted())
-    measureBasin(arguments, flight, cao, report);
-  if (arguments.has_faults && !interrupted())
-    measureFaults(arguments, flight, cao, report);
-  std::fputs(toTable(report).c_str(), stdout);
-  writeAtomically((fs::path(arguments.out) / "compare.json").string(), toJson(report));
+  {
+    Steps steps(arguments);
+    compareAll(arguments, flight, cao, steps, report);
+    if (arguments.has_basin && !interrupted())
+      measureBasin(arguments, flight, cao, steps, report);
+    if (arguments.has_faults && !interrupted())
+      measureFaults(arguments, flight, cao, steps, report);
+  }
+  if (!arguments.is_quiet)
+    std::fputs(toTable(report).c_str(), stdout);
+  writeAtomically(arguments.json.empty() ? arguments.out + "/compare.json" : arguments.json, toJson(report));
   writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
   writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
   if (interrupted()) {
-    say("interrupted: what was compared until then is in " + arguments.out);
+    fmt::print(stderr, "bole: interrupted: what was compared until then is in {}\n", arguments.out);
     endWith(ExitCode::interrupted);
   }
 }
@@ -181,6 +211,8 @@ void addCompare(CLI::App &app)
   command->add_option("--far", arguments->far_m, "Range up to which our tracker uses trunks [m]")
       ->check(CLI::Range(0.5, 100.0))
       ->capture_default_str();
+  command->add_flag("-q,--quiet", arguments->is_quiet, "No table and no progress");
+  command->add_option("--json", arguments->json, "File for all figures (default OUT/compare.json)");
   command->footer(
       "Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
       "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are "

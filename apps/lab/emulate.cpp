@@ -4,6 +4,7 @@
 #include "interrupt.h"
 
 #include "lab/emulator/emulator.h"
+#include "output/progress.h"
 #include <bole/open_source.h>
 
 #include <fmt/format.h>
@@ -35,16 +36,18 @@ void serve(ArDroneEmulator &emulator, bool quiet)
 {
   endAtInterrupt();
   emulator.start();
+  Progress progress(0, stderr);
   while (!emulator.wait(0.25) && !interrupted())
     if (!quiet) {
       const auto counters = emulator.counters();
-      fmt::print(stderr, "\r{:.1f} s, {} frames, {} navdata ", counters.flight_s, counters.frames, counters.navdata);
+      progress.update(counters.frames, fmt::format("{:.1f} s, {} navdata", counters.flight_s, counters.navdata));
     }
+  progress.finish();
   emulator.stop();
   const auto c = emulator.counters();
   if (!quiet)
     fmt::print(stderr,
-               "\r{:.1f} s flown; sent {} frames, {} navdata; faults: {} lost, {} frames and {} "
+               "{:.1f} s flown; sent {} frames, {} navdata; faults: {} lost, {} frames and {} "
                "navdata corrupted, {} frozen, {} stalled, {} reboots; {} frames not read\n",
                c.flight_s, c.frames, c.navdata, c.lost, c.corrupted_frames, c.corrupted_navdata, c.frozen, c.stalled,
                c.reboots, c.refused);

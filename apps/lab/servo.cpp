@@ -11,6 +11,7 @@
 #include "lab/trials/servo_trial.h"
 #include "output/atomic_file.h"
 #include "output/figure.h"
+#include "output/progress.h"
 #include "output/video_writer.h"
 #include <bole/config.h>
 #include <bole/overlay.h>
@@ -35,7 +36,7 @@ struct ServoArguments
   std::string folder, fault = "none", perception = "real", config;
   std::vector<std::string> settings;
   int runs = 1;
-  bool is_shown = false, has_video = true, is_ungated = false;
+  bool is_shown = false, has_video = true, is_ungated = false, is_quiet = false;
 };
 
 /// A figure of a run, for tables.
@@ -275,20 +276,22 @@ void run(ServoArguments &arguments)
   OverlayWindow window(arguments.is_shown, "bole servo");
   endAtInterrupt();
   std::vector<ServoTrialResult> results;
+  Progress progress(static_cast<std::size_t>(arguments.runs), stderr, "run");
   const std::uint64_t first = arguments.trial.scenario.seed;
   for (int k = 0; k < arguments.runs && !interrupted(); ++k) {
     ServoTrialResult result = fly(arguments, arguments.trial, first + static_cast<std::uint64_t>(k), window);
     if (interrupted())
       break; // half a run is neither a success nor a failure
-    std::fprintf(stderr, "run %d of %d, seed %llu: %s\n", k + 1, arguments.runs,
-                 static_cast<unsigned long long>(result.seed),
-                 result.is_success ? "succeeded" : result.outcome.c_str());
+    if (!arguments.is_quiet)
+      progress.update(results.size() + 1,
+                      fmt::format("seed {}: {}", result.seed, result.is_success ? "succeeded" : result.outcome));
     result.record.samples.clear(); // written already; a hundred of them would fill the memory
     result.trunks.clear();
     results.push_back(std::move(result));
     writeTables(arguments, results);
   }
-  if (!results.empty())
+  progress.finish();
+  if (!results.empty() && !arguments.is_quiet)
     print(arguments, results);
   if (interrupted()) {
     std::fprintf(stderr, "bole: interrupted after %zu of %d runs\n", results.size(), arguments.runs);
@@ -345,6 +348,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   task->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   task->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
   task->add_flag("--ungated", arguments->is_ungated, "Without saliency: nothing says what is foreground");
+  task->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors");
   task->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   task->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4");
   task->footer(fmt::format("Example: {}", example));

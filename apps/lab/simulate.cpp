@@ -4,6 +4,7 @@
 
 #include "lab/simulation/simulated_flight.h"
 #include "lab/simulation/words.h"
+#include "output/progress.h"
 
 #include <fmt/format.h>
 #include <memory>
@@ -51,11 +52,12 @@ void run(const CLI::App &command, const SimulateArguments &arguments)
     scene.renderer.camera = {
         {569.9, 568.0, 331.4, 135.9, 640, 360}, Distortion::radial_tangential, {{-0.527, 0.274, 0.0211, -0.0064}}};
   }
-  const int frames = arguments.record.frames;
+  Progress progress(static_cast<std::size_t>(arguments.record.frames), stderr);
   recordFlight(scene, arguments.record, [&](int done) {
-    if (!arguments.quiet && (done % 10 == 0 || done == frames))
-      fmt::print(stderr, "\rframe {} of {}{}", done, frames, done == frames ? "\n" : "");
+    if (!arguments.quiet)
+      progress.update(static_cast<std::size_t>(done));
   });
+  progress.finish();
   fmt::print("{}\n", arguments.record.folder);
 }
 } // namespace

@@ -22,6 +22,16 @@ Cylinder cylinderOf(const Trunk &trunk, double foot_z, double top_z, const std::
   return {trunk.axisAt(foot_z), trunk.axisAt(top_z), trunk.radius(), name};
 }
 
+Cylinder cylinderOf(const TrunkRecord &trunk)
+{
+  constexpr double kLow = 0.1, kHigh = 2.6; // over the ground [m]
+  const auto axisAt = [&trunk](double height) {
+    const Eigen::Vector2d xy = trunk.xy + (height - kBreastHeight) * trunk.lean;
+    return Vector3d(xy.x(), xy.y(), trunk.ground_z + height);
+  };
+  return {axisAt(kLow), axisAt(kHigh), trunk.radius, "trunk_" + std::to_string(trunk.id)};
+}
+
 RelativeTrunk relativeTrunk(const Cylinder &c)
 {
   const Vector3d axis = c.axis();

@@ -8,6 +8,7 @@
 /// the camera centre to the nearest point of the axis, z along the axis from `foot` to `top`.
 
 #include <bole/trunk.h>
+#include <bole/trunk_record.h>
 
 #include <string>
 
@@ -31,6 +32,9 @@ Cylinder operator*(const Pose &aMb, const Cylinder &b);
 /// The part of the trunk \p trunk between the heights \p foot_z and \p top_z [m] of the world: one cylinder of a `.cao`
 /// model in the world frame.
 Cylinder cylinderOf(const Trunk &trunk, double foot_z, double top_z, const std::string &name = "");
+
+/// The part of a mapped trunk from just over the ground to what a flight sees of it, named trunk_ID.
+Cylinder cylinderOf(const TrunkRecord &trunk);
 
 /// Relative trunk of the cylinder \p c given in the camera frame. Not isFinite() when the camera centre is
 /// inside the (endless) cylinder or on its axis.

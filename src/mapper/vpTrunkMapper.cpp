@@ -37,22 +37,6 @@ MountedCamera mountedCamera(const vpCameraParameters &cam, const Pose &bMc)
   return camera;
 }
 
-/// The part of the trunk from just over the ground to what a flight sees of it.
-Cylinder cylinderOf(const TrunkRecord &trunk)
-{
-  constexpr double kLow = 0.1, kHigh = 2.6; // over the ground [m]
-  const auto axisAt = [&trunk](double height) {
-    const Eigen::Vector2d xy = trunk.xy + (height - kBreastHeight) * trunk.lean;
-    return Eigen::Vector3d(xy.x(), xy.y(), trunk.ground_z + height);
-  };
-  Cylinder cylinder;
-  cylinder.foot = axisAt(kLow);
-  cylinder.top = axisAt(kHigh);
-  cylinder.radius = trunk.radius;
-  cylinder.name = fmt::format("trunk_{}", trunk.id);
-  return cylinder;
-}
-
 vpColor colorOf(int id)
 {
   const char *hex = palette::kLines[static_cast<std::size_t>(id) % palette::kLines.size()];

@@ -17,14 +17,53 @@ namespace
 {
 constexpr double kPixelsPerMetre = 40, kMargin = 1.5; // [m]
 
-/// x to the right is the world's x, up is the world's y.
+/// x to the right is the world's x, up is the world's y; the legend stands above.
 struct Sheet
 {
   Eigen::AlignedBox2d box;
+  double top = 0; ///< of the map [px]
   double x(double wx) const { return (wx - box.min().x()) * kPixelsPerMetre; }
-  double y(double wy) const { return (box.max().y() - wy) * kPixelsPerMetre; }
+  double y(double wy) const { return top + (box.max().y() - wy) * kPixelsPerMetre; }
   double width() const { return box.sizes().x() * kPixelsPerMetre; }
-  double height() const { return box.sizes().y() * kPixelsPerMetre; }
+  double height() const { return top + box.sizes().y() * kPixelsPerMetre; }
+};
+
+/// Labels beside their trunks, at the first of some places that no other label and no trunk takes.
+class Labels
+{
+public:
+  explicit Labels(const Sheet &sheet) : m_sheet(sheet) {}
+
+  void avoid(double x, double y, double radius)
+  {
+    m_taken.push_back(boxOf(x - radius, y - radius, x + radius, y + radius));
+  }
+  void add(SvgDrawing &drawing, double x, double y, double radius, const std::string &text)
+  {
+    const double width = 6.5 * static_cast<double>(text.size()), height = 11, off = 0.75 * radius + 2;
+    const Eigen::AlignedBox2d sheet = boxOf(0, m_sheet.top, m_sheet.width(), m_sheet.height());
+    for (const double far : {1.0, 2.0, 3.0})
+      for (const auto &[right, down] : {std::pair(1, -1), {1, 1}, {-1, -1}, {-1, 1}}) {
+        const double left = right > 0 ? x + far * off : x - far * off - width;
+        const double base = down > 0 ? y + far * off + height : y - far * off;
+        const Eigen::AlignedBox2d box = boxOf(left, base - height, left + width, base);
+        if (!sheet.contains(box) || std::any_of(m_taken.begin(), m_taken.end(), [&](const Eigen::AlignedBox2d &taken) {
+              return !taken.intersection(box).isEmpty();
+            }))
+          continue;
+        m_taken.push_back(box);
+        drawing.text(left, base - 1, text);
+        return;
+      }
+  }
+
+private:
+  static Eigen::AlignedBox2d boxOf(double x0, double y0, double x1, double y1)
+  {
+    return {Eigen::Vector2d(x0, y0), Eigen::Vector2d(x1, y1)};
+  }
+  const Sheet &m_sheet;
+  std::vector<Eigen::AlignedBox2d> m_taken;
 };
 
 Sheet sheetFor(const MapPicture &picture)
@@ -38,8 +77,10 @@ Sheet sheetFor(const MapPicture &picture)
       sheet.box.extend(trunk.xy);
   if (sheet.box.isEmpty())
     sheet.box.extend(Eigen::Vector2d::Zero());
-  sheet.box.extend(Eigen::Vector2d(sheet.box.min() - Eigen::Vector2d::Constant(kMargin)));
-  sheet.box.extend(Eigen::Vector2d(sheet.box.max() + Eigen::Vector2d::Constant(kMargin)));
+  constexpr double kLeast = 13; // [m] on the sheet: the legend's longest line
+  const double wider = std::max(kMargin, (kLeast - sheet.box.sizes().x()) / 2);
+  sheet.box.extend(Eigen::Vector2d(sheet.box.min() - Eigen::Vector2d(wider, kMargin)));
+  sheet.box.extend(Eigen::Vector2d(sheet.box.max() + Eigen::Vector2d(wider, kMargin)));
   return sheet;
 }
 
@@ -55,7 +96,7 @@ void drawGrid(SvgDrawing &drawing, const Sheet &sheet)
 {
   constexpr const char *kLine = "#e4e4e4", *kLabel = "style=\"fill:#999\"";
   for (double m = std::ceil(sheet.box.min().x()); m <= sheet.box.max().x(); ++m) {
-    drawing.line(sheet.x(m), 0, sheet.x(m), sheet.height(), kLine);
+    drawing.line(sheet.x(m), sheet.top, sheet.x(m), sheet.height(), kLine);
     if (std::fmod(m, 2) == 0)
       drawing.text(sheet.x(m) + 2, sheet.height() - 4, fmt::format("{:g} m", m), kLabel);
   }
@@ -86,10 +127,10 @@ void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &recor
     return;
   drawing.add(ellipse(sheet, record));
   drawing.circle(x, y, r, palette::kVermilion, "fill-opacity=\".75\"");
-  drawing.text(x + r + 3, y - r - 1, fmt::format("{}", record.id));
 }
 
-void drawLegend(SvgDrawing &drawing, const MapPicture &picture)
+/// Returns where it ends [px].
+double drawLegend(SvgDrawing &drawing, const MapPicture &picture)
 {
   drawing.text(10, 20, picture.title, "font-size=\"15\"");
   double y = 40;
@@ -109,7 +150,7 @@ void drawLegend(SvgDrawing &drawing, const MapPicture &picture)
   });
   if (!picture.has_ranges) {
     entry(true, palette::kVermilion, "trunks: bearing and width, at no known distance");
-    return;
+    return y;
   }
   entry(true, palette::kVermilion, "trunks, two sigma");
   entry(has_candidates, palette::kOrange, "candidates, not confirmed");
@@ -118,6 +159,7 @@ void drawLegend(SvgDrawing &drawing, const MapPicture &picture)
   entry(!picture.online.empty(), palette::kSkyBlue, "trajectory, online");
   entry(!picture.odometry.empty(), palette::kGrey, "pose filter");
   entry(!picture.truth.empty(), palette::kGreen, "trajectory, truth");
+  return y;
 }
 
 /// What a camera that only rotated knows: a wedge for each trunk, from bearing to bearing of its borders.
@@ -148,7 +190,9 @@ std::string toSvg(const MapPicture &picture)
 {
   if (!picture.has_ranges)
     return bearingsSvg(picture);
-  const Sheet sheet = sheetFor(picture);
+  Sheet sheet = sheetFor(picture);
+  SvgDrawing only_legend(1, 1);
+  sheet.top = drawLegend(only_legend, picture);
   SvgDrawing drawing(sheet.width(), sheet.height());
   drawGrid(drawing, sheet);
   for (const TruthTrunk &truth : picture.truth_trunks)
@@ -159,8 +203,16 @@ std::string toSvg(const MapPicture &picture)
   drawing.polyline(path(sheet, picture.odometry), palette::kGrey, "stroke-dasharray=\"2 3\"");
   drawing.polyline(path(sheet, picture.online), palette::kSkyBlue);
   drawing.polyline(path(sheet, picture.smoothed), palette::kBlue, "stroke-width=\"2\"");
-  for (const TrunkRecord &record : picture.trunks)
+  Labels labels(sheet);
+  for (const TrunkRecord &record : picture.trunks) {
     drawTrunk(drawing, sheet, record);
+    if (record.status == TrunkStatus::confirmed)
+      labels.avoid(sheet.x(record.xy.x()), sheet.y(record.xy.y()), 0.7 * record.radius * kPixelsPerMetre);
+  }
+  for (const TrunkRecord &record : picture.trunks)
+    if (record.status == TrunkStatus::confirmed)
+      labels.add(drawing, sheet.x(record.xy.x()), sheet.y(record.xy.y()), record.radius * kPixelsPerMetre,
+                 fmt::format("{}", record.id));
   drawLegend(drawing, picture);
   return drawing.finish();
 }

@@ -153,14 +153,20 @@ double numberOrZero(const Json &json, const char *key)
 {
   return json.contains(key) && json[key].is_number() ? json[key].get<double>() : 0;
 }
+
+Json readObject(const std::string &path)
+{
+  std::ifstream file(path);
+  Json json = Json::parse(file, nullptr, false);
+  if (!json.is_object())
+    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+  return json;
+}
 } // namespace
 
 WorldReference readReference(const std::string &path)
 {
-  std::ifstream file(path);
-  const Json json = Json::parse(file, nullptr, false);
-  if (!json.is_object())
-    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+  const Json json = readObject(path);
   WorldReference reference;
   reference.scale = sourceOf<ScaleSource>(path, json, "scale", 3);
   reference.scale_sigma = numberOrZero(json, "scale_sigma");
@@ -168,6 +174,19 @@ WorldReference readReference(const std::string &path)
   reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
   reference.has_ranges = json.value("ranges", true);
   return reference;
+}
+
+PinholeCamera readCamera(const std::string &path)
+{
+  const Json json = readObject(path);
+  try {
+    const Json &camera = json.at("camera");
+    return {camera.at("fx_px"), camera.at("fy_px"),    camera.at("cx_px"),
+            camera.at("cy_px"), camera.at("width_px"), camera.at("height_px")};
+  }
+  catch (const Json::exception &error) {
+    throw vpException(vpException::badValue, "%s: camera: %s", path.c_str(), error.what());
+  }
 }
 
 void writeSummary(const std::string &path, const RunSummary &summary) { writeAtomically(path, toJson(summary)); }

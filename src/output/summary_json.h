@@ -50,6 +50,8 @@ struct RunSummary
 std::string toJson(const RunSummary &summary);
 /// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
 WorldReference readReference(const std::string &path);
+/// The camera of a summary.json, likewise.
+PinholeCamera readCamera(const std::string &path);
 /// toJson(), written atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
 } // namespace bole

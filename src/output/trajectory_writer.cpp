@@ -10,6 +10,12 @@
 
 namespace bole
 {
+std::string secondsText(std::int64_t stamp_ns)
+{
+  const auto parts = std::lldiv(stamp_ns, 1'000'000'000);
+  return fmt::format("{}{}.{:09d}", stamp_ns < 0 ? "-" : "", std::llabs(parts.quot), std::llabs(parts.rem));
+}
+
 void writeTrajectory(const std::string &path, const Trajectory &trajectory)
 {
   std::string text = "# t [s] tx ty tz [m] qx qy qz qw, body in world\n";
@@ -18,10 +24,8 @@ void writeTrajectory(const std::string &path, const Trajectory &trajectory)
     if (q.w() < 0)
       q.coeffs() = -q.coeffs();
     const Eigen::Vector3d &t = pose.wMb.t;
-    const auto stamp = std::lldiv(pose.stamp_ns, 1'000'000'000);
-    const char *sign = pose.stamp_ns < 0 ? "-" : "";
-    fmt::format_to(std::back_inserter(text), "{}{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", sign,
-                   std::llabs(stamp.quot), std::llabs(stamp.rem), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    fmt::format_to(std::back_inserter(text), "{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                   secondsText(pose.stamp_ns), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   writeAtomically(path, text);
 }

@@ -240,9 +240,43 @@ TEST(MapSvg, DrawsTrunksToScaleWithTheirTwoSigmaEllipse)
   EXPECT_NEAR(numberIn(svg, "circle", "r"), 40 * 0.2, 0.06);
   EXPECT_NEAR(numberIn(svg, "ellipse", "rx"), 40 * 2 * 0.2, 0.06);
   EXPECT_NEAR(numberIn(svg, "ellipse", "ry"), 40 * 2 * 0.1, 0.06);
-  // the sheet begins 1.5 m left of the path and ends 1.5 m above the trunk
-  EXPECT_NEAR(numberIn(svg, "circle", "cx"), 40 * 3.5, 0.06);
-  EXPECT_NEAR(numberIn(svg, "circle", "cy"), 40 * 1.5, 0.06);
+  // the path begins 2 m left of the trunk and 1 m below it
+  std::smatch begin;
+  ASSERT_TRUE(std::regex_search(svg, begin, std::regex("<polyline points=\"([-0-9.]+),([-0-9.]+) ")));
+  EXPECT_NEAR(numberIn(svg, "circle", "cx") - std::stod(begin[1]), 40 * 2, 0.11);
+  EXPECT_NEAR(numberIn(svg, "circle", "cy") - std::stod(begin[2]), -40 * 1, 0.11);
+}
+
+double yOfText(const std::string &svg, const std::string &text)
+{
+  std::smatch match;
+  const bool is_there = std::regex_search(svg, match, std::regex("y=\"([-0-9.]+)\"[^>]*>" + text + "</text>"));
+  return is_there ? std::stod(match[1]) : NAN;
+}
+
+TEST(MapSvg, LabelsNeitherCollideNorLieUnderTheLegendOrBeyondTheSheet)
+{
+  MapPicture picture = smallMap();
+  picture.trunks[0].id = 101;
+  for (int i = 1; i < 6; ++i) {
+    picture.trunks.push_back(picture.trunks[0]);
+    picture.trunks.back().id = 101 + i;
+    picture.trunks.back().xy += Eigen::Vector2d(0.05 * i, 0.02 * i);
+  }
+  const std::string svg = toSvg(picture);
+  const double legend_ends = yOfText(svg, "trajectory, smoothed"), height = numberIn(svg, "svg", "height");
+  std::vector<std::pair<double, double>> places;
+  const std::regex label("<text x=\"([-0-9.]+)\" y=\"([-0-9.]+)\"[^>]*>10[0-9]</text>");
+  for (std::sregex_iterator at(svg.begin(), svg.end(), label); at != std::sregex_iterator(); ++at)
+    places.emplace_back(std::stod((*at)[1]), std::stod((*at)[2]));
+  EXPECT_GE(places.size(), 4u); // one that finds no room is left out
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    EXPECT_GT(places[i].second - 10, legend_ends);
+    EXPECT_LT(places[i].second, height);
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_TRUE(std::abs(places[i].first - places[k].first) >= 19 ||
+                  std::abs(places[i].second - places[k].second) >= 10);
+  }
 }
 
 TEST(MapSvg, LeavesOutWhatIsLostOrMergedAndOutlinesCandidates)

@@ -47,9 +47,9 @@ struct GraphCommand : testing::Test
     fs::remove_all(folder);
     ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --frames 40").status, 0);
     file = folder + "/exported.g2o";
-    const Outcome exported = run("graph " + folder + " --export " + file);
+    const Outcome exported = run("export " + folder + " g2o -o " + file);
     ASSERT_EQ(exported.status, 0) << exported.text;
-    ASSERT_THAT(exported.text, HasSubstr("poses      40"));
+    ASSERT_THAT(run("graph " + folder).text, HasSubstr("poses      40"));
   }
   static void TearDownTestSuite() { fs::remove_all(folder); }
   /// The exported graph with its first line of \p tag changed by \p edit, and the place of that

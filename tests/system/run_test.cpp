@@ -103,12 +103,55 @@ TEST(Run, HoldsItsCommandItsOptionsAndItsInput)
   EXPECT_GT(summary.at("input").at("bytes"), 100000);
   EXPECT_EQ(summary.at("options"), textOf(folder + "/options.yaml"));
   EXPECT_THAT(textOf(folder + "/options.yaml"), HasSubstr("map:"));
-  // what the folder holds makes the same run again
-  const std::string again = freshFolder("again");
-  ASSERT_EQ(run("track " + kFlight + " -o " + again + " --frames 15 --no-video -q --config " + folder + "/options.yaml")
-                .status,
-            0);
-  EXPECT_EQ(textOf(again + "/trajectory.tum"), textOf(folder + "/trajectory.tum"));
+}
+
+TEST(Run, IsRepeatedFromItsFolderToTheSameBytes)
+{
+  const std::string folder = freshFolder("repeated");
+  ASSERT_EQ(run("track park-forward -o " + folder + " --frames 15 -q --set map.lag=4 --without gyro").status, 0);
+  const Outcome same = run("track --again " + folder, "cd / && ");
+  EXPECT_EQ(same.status, 0) << same.text;
+  EXPECT_THAT(same.text, HasSubstr("trunks.csv: the same bytes\ntrajectory.tum: the same bytes"));
+  EXPECT_FALSE(fs::exists(folder + "/again"));
+
+  std::ofstream(folder + "/trajectory.tum", std::ios::app) << "# changed\n";
+  const Outcome changed = run("track --again " + folder);
+  EXPECT_EQ(changed.status, 3);
+  EXPECT_THAT(changed.text, HasSubstr("trajectory.tum: DIFFERS"));
+  EXPECT_TRUE(fs::exists(folder + "/again/trajectory.tum"));
+  EXPECT_EQ(run("track --again " + folder + " --frames 3").status, 1);
+  EXPECT_THAT(run("track --again " + testing::TempDir()).text, HasSubstr("summary.json: cannot be read"));
+}
+
+TEST(Run, TellsOnAPageWhatItIsWorth)
+{
+  const std::string folder = freshFolder("page");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 60 -q --no-video").status, 0);
+  const std::string page = textOf(folder + "/report.html");
+  EXPECT_THAT(page, HasSubstr("data:image/jpeg;base64,"));
+  EXPECT_THAT(page, HasSubstr("Against the truth"));
+  EXPECT_THAT(page, testing::Not(testing::ContainsRegex("src=\"[^d]"))); // nothing but data
+  EXPECT_EQ(run("report " + folder).status, 0);
+  EXPECT_THAT(textOf(folder + "/report.html"), testing::Not(HasSubstr("Against the truth")));
+
+  if (bole::test::runShell("command -v chromium").status != 0)
+    GTEST_SKIP() << "chromium is not installed: the page was not opened";
+  for (const char *width : {"400", "1600"}) {
+    const Outcome browser = bole::test::runShell(
+        std::string("chromium --headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=2000 "
+                    "--window-size=") +
+        width + ",2000 --dump-dom file://" + folder + "/report.html");
+    EXPECT_THAT(browser.text, HasSubstr("class=\"panel chosen\"")); // the script ran
+    EXPECT_THAT(browser.text, testing::Not(HasSubstr("CONSOLE")));
+  }
+}
+
+TEST(Run, PutsNoProgressIntoALog)
+{
+  const std::string folder = freshFolder("log");
+  const Outcome outcome = run("simulate --frames 12 --samples 1 --seed 3 -o " + folder);
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.text, folder + "\n");
 }
 
 TEST(Run, OfACameraThatNeverMovedSaysSoAndHasNoLengths)

@@ -7,12 +7,15 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
+#include <tuple>
 
 namespace bole
 {
 namespace
 {
-constexpr double kLeft = 62, kWidth = 560, kHeight = 130, kGap = 36, kTop = 42;
+constexpr double kLeft = 62, kWidth = 560, kHeight = 130, kGap = 36, kTop = 62;
+
+constexpr const char *kSearching = "#ececec", *kLost = "#f6cfae";
 
 using Points = SvgPoints;
 
@@ -59,7 +62,6 @@ void fit(SvgAxes &axes, const Points &one, const Points &other)
 /// Bands behind the curves: searching, hovering in doubt.
 void drawBands(SvgDrawing &drawing, const SvgAxes &axes, const LoopRecord &record)
 {
-  constexpr const char *kSearching = "#ececec", *kLost = "#f6cfae";
   const auto &samples = record.samples;
   for (std::size_t k = 0; k + 1 < samples.size(); ++k)
     if (samples[k].is_lost || samples[k].phase == TaskPhase::searching)
@@ -73,7 +75,14 @@ std::string errorCurves(const LoopRecord &record, const std::string &title)
   const std::vector<std::string> names = namesIn(record);
   SvgDrawing drawing(650, kTop + static_cast<double>(names.size()) * (kHeight + kGap) + 10);
   drawing.text(kLeft, 18, title, "font-size=\"14\"");
-  drawing.text(kLeft + kWidth, 18, "thick: true, thin: believed", "text-anchor=\"end\"");
+  double x = kLeft;
+  for (const auto &[colour, height, name] :
+       {std::tuple(palette::kVermilion, 3, "true"), std::tuple(palette::kBlue, 1, "believed"),
+        std::tuple(kSearching, 10, "searching"), std::tuple(kLost, 10, "hovering in doubt")}) {
+    drawing.box(x, 32 - 0.5 * height, 18, height, colour);
+    drawing.text(x + 22, 36, name);
+    x += 100;
+  }
   SvgAxes axes;
   axes.left = kLeft;
   axes.top = kTop;

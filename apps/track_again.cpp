@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// bole track --again: a run is repeated from what its folder holds.
+#include "track_arguments.h"
+
+#include "output/versions.h"
+
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <visp3/core/vpException.h>
+
+namespace bole::apps
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::string bytesOf(const fs::path &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw vpException(vpException::ioError, "%s: cannot be read", path.c_str());
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+Json summaryOf(const fs::path &run)
+{
+  const fs::path path = run / "summary.json";
+  Json json = Json::parse(bytesOf(path), nullptr, false);
+  try {
+    if (json.at("command").size() < 2 || json["command"][1] != "track")
+      throw vpException(vpException::badValue, "%s: command: must be one of `bole track`", path.c_str());
+    json.at("input").at("source").get<std::string>();
+    json.at("frames").at("all").get<std::size_t>();
+    json.at("working_folder");
+  }
+  catch (const Json::exception &error) {
+    throw vpException(vpException::badValue, "%s: %s", path.c_str(), error.what());
+  }
+  return json;
+}
+
+/// The recorded command line with the options that were in effect, whatever the defaults and presets are now.
+TrackArguments argumentsOf(const Json &summary, const fs::path &run)
+{
+  const std::vector<std::string> command = summary["command"];
+  const auto arguments = std::make_shared<TrackArguments>();
+  CLI::App app;
+  CLI::App *track = app.add_subcommand("track");
+  addTrackOptions(*track, arguments);
+  try {
+    app.parse(std::vector<std::string>(command.rbegin(), command.rend() - 1)); // CLI11 wants the last word first
+    settle(*track, *arguments);
+  }
+  catch (const CLI::ParseError &error) {
+    throw vpException(vpException::badValue, "%s/summary.json: command: %s", run.c_str(), error.what());
+  }
+  if (ArDroneSource::accepts(arguments->input))
+    throw vpException(vpException::badValue, "%s: a live flight cannot be repeated; `bole record` keeps one",
+                      arguments->input.c_str());
+  arguments->config = (run / "options.yaml").string();
+  arguments->settings.clear();
+  arguments->camera_height = 0; // among the options
+  arguments->has_video = arguments->is_shown = false;
+  arguments->is_quiet = true;
+  if (!summary.value("complete", true))
+    arguments->frames_most = summary["frames"]["all"];
+  return *arguments;
+}
+
+void sayChanges(const Json &before, const Json &now)
+{
+  for (const char *key : {"bole", "commit", "opencv", "visp", "libav"}) {
+    const std::string was = before["versions"].value(key, "unknown"), is = now["versions"].value(key, "unknown");
+    if (was != is)
+      fmt::print("  {} was {}, is {}\n", key, was, is);
+  }
+  if (before["input"].value("sha256", Json()) != now["input"].value("sha256", Json()))
+    fmt::print("  the input is not the same: its SHA-256 differs\n");
+}
+} // namespace
+
+void trackAgain(const CLI::App &command, const TrackArguments &given)
+{
+  for (const CLI::Option *option : command.get_options())
+    if (option->count() > 0 && !option->check_lname("again") && !option->check_lname("output") &&
+        !option->check_lname("quiet"))
+      throw vpException(vpException::badValue, "--again repeats a run as it was made: %s does not go with it",
+                        option->get_name().c_str());
+  const fs::path run = fs::absolute(given.again);
+  const Json summary = summaryOf(run);
+  const fs::path repeated = given.run.empty() ? run / "again" : fs::absolute(given.run);
+  if (const std::string folder =
+          summary["working_folder"].is_string() ? summary["working_folder"].get<std::string>() : "";
+      !folder.empty()) {
+    std::error_code error;
+    fs::current_path(folder, error);
+    if (error)
+      throw vpException(vpException::ioError, "%s: the run was made in this folder, which cannot be entered: %s",
+                        folder.c_str(), error.message().c_str());
+  }
+  TrackArguments arguments = argumentsOf(summary, run);
+  arguments.run = repeated.string();
+  g_command_line = summary["command"].get<std::vector<std::string>>();
+  try {
+    track(arguments);
+  }
+  catch (const CLI::RuntimeError &end) { // a run that is not to be trusted is repeated as such
+    if (end.get_exit_code() != static_cast<int>(ExitCode::doubtful))
+      throw;
+  }
+  bool is_same = true;
+  for (const char *name : {"trunks.csv", "trajectory.tum"}) {
+    const bool is_equal = bytesOf(run / name) == bytesOf(repeated / name);
+    is_same = is_same && is_equal;
+    if (!given.is_quiet)
+      fmt::print("{}: {}\n", name, is_equal ? "the same bytes" : "DIFFERS");
+  }
+  if (!is_same) {
+    if (!given.is_quiet)
+      sayChanges(summary, summaryOf(repeated));
+    fmt::print(stderr, "bole: {} does not come out as it was; the repetition is in {}\n", run.string(),
+               repeated.string());
+    endWith(ExitCode::doubtful);
+  }
+  if (given.run.empty())
+    fs::remove_all(repeated);
+}
+} // namespace bole::apps

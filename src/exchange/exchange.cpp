@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "exchange/exchange.h"
+
+#include "geometry/cylinder.h"
+#include "mbt/cao_reader.h"
+#include "output/atomic_file.h"
+#include "output/summary_json.h"
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
+#include "smoothing/g2o.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+const std::vector<ExportFormat> kExportFormats = {
+    {"cao", "map.cao", "model for vpMbTrunkTracker and ViSP's own trackers"},
+    {"ply", "map.ply", "mesh of the trunks, trajectory as points"},
+    {"geojson", "map.geojson", "points with their figures; in degrees with --origin, else in metres"},
+    {"dxf", "map.dxf", "circles and labels for CAD (release 12)"},
+    {"csv", "trees.csv", "diameters at breast height as foresters list them"},
+    {"tum", "smoothed.tum", "trajectory of the body"},
+    {"colmap", "colmap", "folder of cameras.txt, images.txt and points3D.txt"},
+    {"g2o", "map.g2o", "factor graph"}};
+
+MapOfRun readMapOfRun(const std::string &run)
+{
+  MapOfRun map;
+  map.reference = readReference(run + "/summary.json");
+  if (!map.reference.has_ranges)
+    throw vpException(vpException::badValue, "%s: the camera only rotated, so that there is no map to be exported",
+                      run.c_str());
+  map.name = std::filesystem::path(run).lexically_normal().filename().string();
+  map.camera = readCamera(run + "/summary.json");
+  map.trunks = readTrunks(run + "/trunks.csv");
+  map.trajectory = readTumTrajectory(run + "/trajectory.tum");
+  map.bMc = readG2o(run + "/graph.g2o").bMc;
+  return map;
+}
+
+void exportRun(const std::string &run, const std::string &format, const std::string &file,
+               const std::optional<GeoOrigin> &origin)
+{
+  if (format == "g2o") {
+    writeG2o(file, readG2o(run + "/graph.g2o"));
+    return;
+  }
+  const MapOfRun map = readMapOfRun(run);
+  if (format == "tum")
+    writeTrajectory(file, map.trajectory);
+  else if (format == "colmap") {
+    std::error_code error;
+    std::filesystem::create_directories(file, error);
+    if (error)
+      throw vpException(vpException::ioError, "%s: cannot be made: %s", file.c_str(), error.message().c_str());
+    writeAtomically(file + "/cameras.txt", toColmapCameras(map));
+    writeAtomically(file + "/images.txt", toColmapImages(map));
+    writeAtomically(file + "/points3D.txt", toColmapPoints(map));
+  }
+  else if (map.trunks.empty())
+    throw vpException(vpException::badValue, "%s/trunks.csv: no trunk, so that there is no map to be exported",
+                      run.c_str());
+  else if (format == "cao") {
+    std::vector<Cylinder> cylinders;
+    for (const TrunkRecord &trunk : map.trunks)
+      cylinders.push_back(cylinderOf(trunk));
+    writeCao(file, cylinders, "map of trunks; " + describe(map.reference));
+  }
+  else
+    writeAtomically(file, format == "ply"       ? toPly(map)
+                          : format == "geojson" ? toGeoJson(map, origin)
+                          : format == "dxf"     ? toDxf(map)
+                                                : toInventory(map));
+}
+} // namespace bole

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The picture of each trunk where it is seen best.
+
+#include <bole/camera.h>
+#include <bole/trunk.h>
+
+#include <map>
+#include <string>
+#include <visp3/core/vpImage.h>
+
+namespace bole
+{
+/// Keeps, for each trunk, the part of the image that shows it where it covers most pixels with both borders inside.
+class BestViews
+{
+public:
+  /// The trunk \p id as measured in \p image; its borders from \p tan_low to \p tan_high (tangents of elevation).
+  void add(int id, const vpImage<unsigned char> &image, const PinholeCamera &camera, const RelativeTrunk &trunk,
+           double tan_low, double tan_high);
+  /// JPEG with the borders drawn; empty for an id that was never seen whole.
+  std::string jpeg(int id) const;
+
+private:
+  struct View
+  {
+    double area_px = 0;
+    vpImage<unsigned char> crop;
+    Eigen::Matrix<double, 2, 4> ends; ///< of the left and the right border in the crop [px]
+  };
+  std::map<int, View> m_views;
+};
+} // namespace bole

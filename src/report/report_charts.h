@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The charts of the page, as SVG.
+
+#include "report/run_record.h"
+
+#include <string>
+
+namespace bole
+{
+/// Range, radius and place of a trunk over time, each with its sigma; \p truth may be nullptr.
+std::string trunkCharts(const RunRecord &run, const TrunkRecord &trunk, const TruthTrunk *truth);
+/// A row each for frames, sensors that contradict the others, and trunks, over time.
+std::string timeLine(const RunRecord &run);
+/// Standard deviation of the online place and its height over time, with the error where there is a truth.
+std::string trajectoryCharts(const RunRecord &run);
+/// Cost of each frame.
+std::string timingChart(const RunRecord &run);
+} // namespace bole

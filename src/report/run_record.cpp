@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "report/run_record.h"
+
+#include "evaluation/trajectory_metrics.h"
+#include "input/asl_source.h"
+#include "input/csv_reader.h"
+#include "output/summary_json.h"
+#include "output/trunks_csv.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <visp3/core/vpException.h>
+
+namespace bole
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::string bytesOf(const std::string &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::string textOf(const Json &json, const char *key)
+{
+  return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
+}
+
+void readSummaryInto(RunRecord &run, const std::string &path)
+{
+  const Json json = Json::parse(bytesOf(path), nullptr, false);
+  if (!json.is_object() || !json.contains("input") || !json.contains("facts"))
+    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+  try {
+    run.input = textOf(json["input"], "source");
+    run.sha256 = textOf(json["input"], "sha256");
+    run.note = textOf(json["input"], "note");
+    run.preset = textOf(json, "preset");
+    run.working_folder = textOf(json, "working_folder");
+    run.command = json.value("command", run.command);
+    run.facts = json.value("facts", run.facts);
+    run.doubts = json.value("doubts", run.doubts);
+    run.versions = json.value("versions", run.versions);
+    run.is_trusted = json.value("trusted", true);
+    run.is_complete = json.value("complete", true);
+    run.has_ranges = json.value("ranges", true);
+    for (const Json &sensor : json.value("sensors", Json::array()))
+      run.sensors.push_back(
+          {textOf(sensor, "sensor"), textOf(sensor, "kind"), sensor.value("since_s", 0.0), textOf(sensor, "text")});
+  }
+  catch (const Json::exception &error) {
+    throw vpException(vpException::badValue, "%s: %s", path.c_str(), error.what());
+  }
+}
+
+/// timing.csv: frame, timestamp, the stages, total, and the age of live frames.
+TimingTable readTiming(const std::string &path)
+{
+  TimingTable timing;
+  std::ifstream file(path);
+  std::string header, name;
+  std::getline(file, header);
+  std::istringstream names(header);
+  std::size_t columns = 0, total = 0;
+  for (; std::getline(names, name, ','); ++columns) {
+    name = name.substr(0, name.find(" ["));
+    if (name == "total")
+      total = columns;
+    else if (columns > 1 && total == 0)
+      timing.stages.push_back(name);
+  }
+  if (total == 0)
+    throw vpException(vpException::badValue, "%s: has no column \"total [ms]\"", path.c_str());
+  CsvReader csv(path, {columns, ',', header});
+  while (csv.next()) {
+    FrameTiming frame;
+    frame.index = static_cast<std::size_t>(csv.integer(0, "frame"));
+    for (std::size_t i = 2; i < total; ++i)
+      frame.stages_ms.push_back(csv.number(i, "stage"));
+    frame.total_ms = csv.number(total, "total");
+    timing.frames.push_back(frame);
+  }
+  return timing;
+}
+
+/// Moves the truth into the world of the run, as pictures of both want it.
+void readTruthInto(RunRecord &run, const std::string &sequence)
+{
+  const AslSource source(sequence);
+  if (source.truth().empty())
+    return;
+  run.evaluation = evaluate(run.folder, sequence);
+  std::vector<PosePair> pairs = pairPoses(run.smoothed, source.truth());
+  for (PosePair &pair : pairs)
+    std::swap(pair.estimate, pair.truth);
+  const WorldReference reference = readReference(run.folder + "/summary.json");
+  const bool is_scaled = reference.scale != ScaleSource::odometry;
+  const PlanarTransform to_run = align(pairs, is_scaled ? Alignment::xy_yaw_scale : Alignment::xy_yaw);
+  for (const PosePair &pair : pairs)
+    run.truth.push_back({pair.stamp_ns, to_run * pair.estimate});
+  run.truth_trunks = readTruthTrunks(sequence);
+  for (TruthTrunk &trunk : run.truth_trunks) {
+    trunk.xy = to_run * trunk.xy;
+    trunk.radius *= to_run.scale;
+  }
+}
+} // namespace
+
+RunRecord readRun(const std::string &folder, const std::string &sequence)
+{
+  RunRecord run;
+  run.folder = folder;
+  readSummaryInto(run, folder + "/summary.json");
+  run.has_video = fs::exists(folder + "/overlay.mp4");
+  run.trunks = readTrunks(folder + "/trunks.csv");
+  for (const TrunkRecord &hypothesis : readTrunks(folder + "/hypotheses.csv"))
+    run.trunks.push_back(hypothesis);
+  for (const TrunkRecord &trunk : run.trunks)
+    if (const std::string path = folder + "/views/" + std::to_string(trunk.id) + ".jpg"; fs::exists(path))
+      run.views_jpeg[trunk.id] = bytesOf(path);
+  run.smoothed = readTumTrajectory(folder + "/trajectory.tum");
+  run.online = readTumTrajectory(folder + "/trajectory_online.tum");
+  run.trace = readTrace(folder);
+  run.timing = readTiming(folder + "/timing.csv");
+  if (!run.has_ranges)
+    run.map_svg = bytesOf(folder + "/map.svg");
+  else if (!sequence.empty())
+    readTruthInto(run, sequence);
+  return run;
+}
+} // namespace bole

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// All that the folder of a run holds, read back for the page about it.
+
+#include "input/trajectory.h"
+#include "input/truth.h"
+#include "output/flight_trace.h"
+#include "output/timing_csv.h"
+#include <bole/evaluation.h>
+#include <bole/trunk_record.h>
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace bole
+{
+struct RunRecord
+{
+  std::string folder, input, working_folder, note, sha256, preset;
+  std::vector<std::string> command, facts, doubts;
+  std::map<std::string, std::string> versions;
+  std::vector<SensorVerdict> sensors;
+  bool is_trusted = true, is_complete = true, has_ranges = true, has_video = false;
+  std::string map_svg;             ///< the picture of a run without ranges
+  std::vector<TrunkRecord> trunks; ///< and hypotheses
+  std::map<int, std::string> views_jpeg;
+  Trajectory smoothed, online;
+  FlightTrace trace;
+  TimingTable timing;
+
+  // where there is a truth, in the world of the run
+  Trajectory truth;
+  std::vector<TruthTrunk> truth_trunks;
+  std::optional<Evaluation> evaluation;
+};
+
+/// Reads the folder \p run; \p sequence: ASL folder with its truth, or empty.
+/// \throw vpException naming the file that is missing or faulty.
+RunRecord readRun(const std::string &run, const std::string &sequence);
+} // namespace bole
