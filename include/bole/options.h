@@ -9,6 +9,13 @@
 
 namespace bole
 {
+/// Who becomes a trunk of the map, and how the map is made.
+enum class MapPolicy
+{
+  earned, ///< a candidate becomes a trunk once enough speaks for it
+  paper   ///< the method of the paper as printed, all of it: see src/doc/paper.md
+};
+
 struct Options
 {
   struct Camera
@@ -21,11 +28,9 @@ struct Options
 
   struct Stages
   {
-    bool points = true;          ///< relative poses from point features
-    bool saliency = true;        ///< motion saliency: off leaves detection ungated
-    bool window_detector = true; ///< new trunks from a window of frames
-    bool line_detector = false;  ///< new trunks from one frame; always on where no range is known
-    bool servoing = false;       ///< the camera is steered by what is tracked, and may rest or circle a trunk
+    bool points = true;    ///< relative poses from point features
+    bool saliency = true;  ///< motion saliency: off leaves detection ungated
+    bool servoing = false; ///< the camera is steered by what is tracked, and may rest or circle a trunk
   } stages;
 
   struct Trunks
@@ -57,6 +62,7 @@ struct Options
 
   struct Map
   {
+    MapPolicy policy = MapPolicy::earned;
     double confirm_probability = 0.6225; ///< that a candidate is a trunk, at which it is confirmed
     double confirm_sigma = 0.4;          ///< standard deviation of its place at which it may be confirmed [m]
     double merge_distance = 0.3;         ///< trunks with less than this between their bark are one [m]
@@ -80,11 +86,9 @@ struct Options
     double bias = 0.008; ///< standard deviation of the bias at the start [rad/s]
   } gyro;
 
-  struct Paper ///< the method as printed in the paper, for comparison
+  struct Paper ///< of MapPolicy::paper
   {
-    bool energy = false;   ///< Eq. 3: dark trunks, blurred parts, minimised from the prediction
-    double alpha = 1000;   ///< its weight
-    bool saliency = false; ///< Eq. 10 to 17
+    double alpha = 1000; ///< weight of Eq. 3, for gradients in full scale a pixel
   } paper;
 
   void validate() const; ///< \throw vpException "key = value, must be ..."
