@@ -2,6 +2,7 @@
 // The comparison as one HTML page: tables, and plots as inline SVG.
 #include "lab/baseline/comparison_report.h"
 #include "output/figure.h"
+#include "output/page.h"
 #include "output/palette.h"
 #include "output/svg.h"
 
@@ -78,59 +79,57 @@ std::string basinPlot(const std::vector<BasinRow> &rows)
 
 void addBasin(std::string &html, const std::vector<BasinRow> &rows)
 {
-  html += "<h2>Basin</h2><table><tr><th>tracker, help: share of right answers (silent failures) after a yaw step of";
+  std::vector<std::string> head = {"tracker, help: share of right answers (silent failures) after a yaw step of"};
   for (const double step : rows[0].steps_px)
-    html += fmt::format("<th>{:g} px", step);
-  html += "<th>pairs<th>settings</tr>\n";
+    head.push_back(fmt::format("{:g} px", step));
+  head.insert(head.end(), {"pairs", "settings"});
+  std::vector<std::vector<std::string>> cells;
   for (const BasinRow &row : rows) {
-    html += fmt::format("<tr><td>{}, {}", escaped(row.name), row.has_clutter ? "forest" : "plain");
+    cells.push_back({fmt::format("{}, {}", escaped(row.name), row.has_clutter ? "forest" : "plain")});
     for (std::size_t s = 0; s < row.success.size(); ++s)
-      html += fmt::format("<td>{} ({})", row.pairs > 0 ? percent(row.success[s], 0) : "-",
-                          row.pairs > 0 ? percent(row.silent[s], 0) : "-");
-    html += fmt::format("<td>{}<td>{}</tr>\n", row.pairs, escaped(row.settings));
+      cells.back().push_back(fmt::format("{} ({})", row.pairs > 0 ? percent(row.success[s], 0) : "-",
+                                         row.pairs > 0 ? percent(row.silent[s], 0) : "-"));
+    cells.back().insert(cells.back().end(), {std::to_string(row.pairs), escaped(row.settings)});
   }
-  html += "</table>\n" + basinPlot(rows);
+  html += "<h2>Basin</h2>\n" + htmlTable(head, cells) + chartBox(basinPlot(rows));
 }
 
 void addScores(std::string &html, const std::vector<Score> &scores)
 {
-  html += "<table><tr><th>tracker, help<th>frames until loss<th>frames right<th>position RMSE until loss "
-          "[m]<th>rotation [deg]"
-          "<th>position RMSE, all frames [m]<th>rotation [deg]<th>silent failures<th>started again<th>ms median<th>ms "
-          "p95<th>settings</tr>\n";
+  std::vector<std::vector<std::string>> cells;
   for (const Score &s : scores)
-    html += fmt::format("<tr><td>{}<td>{} of "
-                        "{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
-                        escaped(s.name), s.until_loss, s.frames, s.tracked, figure(s.position_rmse_m, 0, 3),
-                        figure(s.rotation_rmse_deg, 0, 2), figure(s.all_position_rmse_m, 0, 3),
-                        figure(s.all_rotation_rmse_deg, 0, 2), s.silent_failures, s.reinitialisations,
-                        figure(s.median_ms, 0, 2), figure(s.p95_ms, 0, 2), escaped(s.settings));
-  html += "</table>\n";
+    cells.push_back({escaped(s.name), fmt::format("{} of {}", s.until_loss, s.frames), std::to_string(s.tracked),
+                     figure(s.position_rmse_m, 0, 3), figure(s.rotation_rmse_deg, 0, 2),
+                     figure(s.all_position_rmse_m, 0, 3), figure(s.all_rotation_rmse_deg, 0, 2),
+                     std::to_string(s.silent_failures), std::to_string(s.reinitialisations), figure(s.median_ms, 0, 2),
+                     figure(s.p95_ms, 0, 2), escaped(s.settings)});
+  html += htmlTable({"tracker, help", "frames until loss", "frames right", "position RMSE until loss [m]",
+                     "rotation [deg]", "position RMSE, all frames [m]", "rotation [deg]", "silent failures",
+                     "started again", "ms median", "ms p95", "settings"},
+                    cells);
 }
 
 void addFaults(std::string &html, const std::vector<FaultRow> &rows)
 {
-  html += "<h2>Faults</h2><table><tr><th>tracker, help<th>fault<th>noticed<th>silent failures<th>recovered<th>slowest "
-          "[frames]</tr>\n";
+  std::vector<std::vector<std::string>> cells;
   for (const FaultRow &row : rows)
-    html += fmt::format("<tr><td>{}<td>{}<td>{} of {}<td>{}<td>{} of {}<td>{}</tr>\n", escaped(row.name),
-                        row.fault.text(), row.noticed, row.fault_frames, row.silent_failures, row.recovered, row.runs,
-                        row.recovered > 0 ? std::to_string(row.slowest) : "-");
-  html += "</table>\n";
+    cells.push_back({escaped(row.name), row.fault.text(), fmt::format("{} of {}", row.noticed, row.fault_frames),
+                     std::to_string(row.silent_failures), fmt::format("{} of {}", row.recovered, row.runs),
+                     row.recovered > 0 ? std::to_string(row.slowest) : "-"});
+  html += "<h2>Faults</h2>\n" +
+          htmlTable({"tracker, help", "fault", "noticed", "silent failures", "recovered", "slowest [frames]"}, cells);
 }
 
 void addSweeps(std::string &html, const std::vector<SweepResult> &sweeps)
 {
   html += "<h2>Settings tried</h2>\n";
   for (const SweepResult &sweep : sweeps) {
-    html += fmt::format(
-        "<details><summary>{}, {}: best of {} is {}</summary><table><tr><th>settings<th>frames right<th>position RMSE, "
-        "all frames [m]</tr>\n",
-        toString(sweep.kind), toString(sweep.help), sweep.tried.size(), sweep.best.text());
+    std::vector<std::vector<std::string>> cells;
     for (const auto &[settings, score] : sweep.tried)
-      html +=
-          fmt::format("<tr><td>{}<td>{}<td>{:.3f}</tr>\n", settings.text(), score.tracked, score.all_position_rmse_m);
-    html += "</table></details>\n";
+      cells.push_back({settings.text(), std::to_string(score.tracked), figure(score.all_position_rmse_m, 0, 3)});
+    html += fmt::format("<details><summary>{}, {}: best of {} is {}</summary>\n{}</details>\n", toString(sweep.kind),
+                        toString(sweep.help), sweep.tried.size(), sweep.best.text(),
+                        htmlTable({"settings", "frames right", "position RMSE, all frames [m]"}, cells));
   }
 }
 } // namespace
@@ -139,17 +138,12 @@ std::string toSvg(const ComparisonReport &report) { return errorPlot(report); }
 
 std::string toHtml(const ComparisonReport &report)
 {
-  std::string html =
-      "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><style>body{font-family:sans-serif;margin:2em}"
-      "td,th{padding:2px 8px;text-align:right}td:first-child,th:first-child{text-align:left}"
-      "tr:nth-child(even){background:#f4f4f4}</style>\n";
-  html += fmt::format(
-      "<title>{0}</title><h1>{0}</h1><p>{1} frames, {2} trunks in the model; wrong is more than {3:g} m or {4:g} "
-      "degrees. <code>{5}</code></p>\n",
-      escaped(report.sequence), report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg,
-      escaped(report.command));
+  std::string html = fmt::format("<p>{} frames, {} trunks in the model; wrong is more than {:g} m or {:g} degrees. "
+                                 "<code>{}</code></p>\n",
+                                 report.frames, report.trunks, report.limits.position_m, report.limits.rotation_deg,
+                                 escaped(report.command));
   addScores(html, report.scores);
-  html += errorPlot(report);
+  html += chartBox(errorPlot(report));
   if (!report.timing.empty()) {
     html += "<h2>Cost on the same trunks, at the true pose</h2>\n";
     addScores(html, report.timing);
@@ -160,6 +154,6 @@ std::string toHtml(const ComparisonReport &report)
     addFaults(html, report.faults);
   if (!report.sweeps.empty())
     addSweeps(html, report.sweeps);
-  return html + "</html>\n";
+  return htmlPage(report.sequence, html);
 }
 } // namespace bole

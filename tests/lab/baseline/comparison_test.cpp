@@ -234,8 +234,8 @@ TEST_F(Comparison, TheReportTellsTheSameInAllThreeForms)
   EXPECT_THAT(toTable(report), HasSubstr("vpMbTrunkTracker, prior"));
   const std::string html = toHtml(report);
   EXPECT_THAT(html, HasSubstr("a &lt;drawn&gt; flight"));
-  EXPECT_THAT(html, HasSubstr("<td>1 of 2<td>"));
-  EXPECT_THAT(html, HasSubstr("<td>100 % (0 %)<td>50 % (50 %)<td>4"));
+  EXPECT_THAT(html, HasSubstr("<td>1 of 2</td><td>"));
+  EXPECT_THAT(html, HasSubstr("<td>100 % (0 %)</td><td>50 % (50 %)</td><td>4"));
   EXPECT_THAT(html, HasSubstr("<polyline"));
   EXPECT_THAT(html, HasSubstr(toSvg(report)));
 }
