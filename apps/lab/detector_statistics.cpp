@@ -84,7 +84,9 @@ DetectorStatistics detectorStatistics(const std::string &sequence, double range)
       saliency.p_background.bitmap[i] = 1 - saliency.p_background.bitmap[i];
     const Gradient gradient = computeGradient(frame.image, options.gradient);
     const Pose wMc = *frame.wMb_odometry * source.bMc();
-    const auto profileOf = [&](const vpImage<float> &field) { return computeLevelProfile(field, camera, wMc.R, lines); };
+    const auto profileOf = [&](const vpImage<float> &field) {
+      return computeLevelProfile(field, camera, wMc.R, lines);
+    };
     const LevelProfile falling = profileOf(gradient.negative), rising = profileOf(gradient.positive);
     const LevelProfile foreground = profileOf(saliency.p_background);
     addAll(falling, -1, statistics.gradient.of_all);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What the paper's detector reads along the lines of a flight (Eq. 19 and 20): its thresholds are set "by inspection of
-/// the statistics of the data" (Section 6).
+/// What the paper's detector reads along the lines of a flight (Eq. 19 and 20): its thresholds are set "by inspection
+/// of the statistics of the data" (Section 6).
 
 #include <string>
 #include <vector>

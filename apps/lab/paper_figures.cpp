@@ -21,7 +21,7 @@ namespace bole::apps
 {
 namespace
 {
-constexpr int kLarger = 2; ///< drawn pixels for one of the camera
+constexpr int kLarger = 2;                  ///< drawn pixels for one of the camera
 constexpr double kNear = 6, kFarthest = 10; ///< [m]
 const cv::Scalar kCyan(255, 255, 0), kRed(60, 60, 230);
 
@@ -117,7 +117,6 @@ struct TrueView
   double ahead = 0; ///< its bearing less the camera's heading [rad]
   double range = 0; ///< [m]
   double half_angle = 0;
-  double distance_at_birth = 0;
 };
 
 std::vector<TrueView> trueViews(const SeenFlight &flight, std::size_t at)
@@ -133,7 +132,7 @@ std::vector<TrueView> trueViews(const SeenFlight &flight, std::size_t at)
     const HorizontalView seen = horizontalView(wMc, trunk);
     const double ahead = std::remainder(seen.bearing - heading, 2 * M_PI);
     if (truth.radius > 0 && std::abs(ahead) < widest && seen.range < 3 * kFarthest)
-      views.push_back({ahead, seen.range, seen.half_angle, 0});
+      views.push_back({ahead, seen.range, seen.half_angle});
   }
   return views;
 }
@@ -228,14 +227,14 @@ Panel figure6(const SeenFlight &flight)
     tree.covariance.topLeftCorner<2, 2>() = aligned.linear() * tree.covarianceXy() * aligned.linear().transpose();
     picture.trunks.push_back(tree);
   }
-  const auto trees = std::count_if(flight.map.begin(), flight.map.end(), [](const TrunkRecord &tree) {
-    return tree.status == TrunkStatus::confirmed;
-  });
-  return {{{"figure-6.svg", toSvg(picture)}},
-          fmt::format("The paper shows true trees (green) and mapped ones (red) with the trajectory, the map moved onto "
-                      "the truth by hand. Here the map is moved by least squares over the trajectory, in x, y and yaw. "
-                      "All {} trees are drawn, those that stand twice too; {} of them stand for a trunk of their own.",
-                      trees, flight.right.size())};
+  const auto trees = std::count_if(flight.map.begin(), flight.map.end(),
+                                   [](const TrunkRecord &tree) { return tree.status == TrunkStatus::confirmed; });
+  return {
+      {{"figure-6.svg", toSvg(picture)}},
+      fmt::format("The paper shows true trees (green) and mapped ones (red) with the trajectory, the map moved onto "
+                  "the truth by hand. Here the map is moved by least squares over the trajectory, in x, y and yaw. "
+                  "All {} trees are drawn, those that stand twice too; {} of them stand for a trunk of their own.",
+                  trees, flight.right.size())};
 }
 
 std::vector<Panel> figure7(const SeenFlight &flight)
@@ -303,13 +302,14 @@ std::vector<Panel> figure8(const SeenFlight &flight)
       if (std::find(ids.begin(), ids.end(), tree.id) != ids.end())
         for (cv::Mat *canvas : {&image, &saliency})
           drawBorders(*canvas, flight.camera, tree.relative, kWholeLine, kCyan);
-    panels.push_back({{{fmt::format("figure-8{}.png", "ab"[part]), pngOf(image)},
-                       {fmt::format("figure-8{}-saliency.png", "ab"[part]), pngOf(saliency)}},
-                      fmt::format("Frame {}. The paper shows pictures beside their saliency, near things white, with the "
-                                  "newly detected trees in cyan, and calls it a good predictor for near trees. Here {} "
-                                  "of the {} new trees prove{} to be trunks.",
-                                  at, std::count_if(ids.begin(), ids.end(), [&](int id) { return isRight(flight, id); }),
-                                  ids.size(), ids.size() == 1 ? "s" : "")});
+    panels.push_back(
+        {{{fmt::format("figure-8{}.png", "ab"[part]), pngOf(image)},
+          {fmt::format("figure-8{}-saliency.png", "ab"[part]), pngOf(saliency)}},
+         fmt::format("Frame {}. The paper shows pictures beside their saliency, near things white, with the "
+                     "newly detected trees in cyan, and calls it a good predictor for near trees. Here {} "
+                     "of the {} new trees prove{} to be trunks.",
+                     at, std::count_if(ids.begin(), ids.end(), [&](int id) { return isRight(flight, id); }), ids.size(),
+                     ids.size() == 1 ? "s" : "")});
   }
   return panels;
 }
