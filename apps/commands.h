@@ -58,4 +58,5 @@ void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
 /// Writes man pages and completions of all other commands; \p version goes into their foot.
 void addDocumentation(CLI::App &app, const std::string &version);
 void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images
+void addReproduce(CLI::App &app);    ///< the figures of the paper
 } // namespace bole::apps

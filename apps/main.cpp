@@ -41,6 +41,7 @@ void addCommands(CLI::App &app)
   addEmulate(app);
   addCalibrateSaliency(app);
   addShowSaliency(app);
+  addReproduce(app);
 #endif
   addDocumentation(app, "bole " BOLE_VERSION);
 }

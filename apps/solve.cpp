@@ -44,7 +44,7 @@ void addSolve(CLI::App &app)
   };
   const auto arguments = std::make_shared<SolveArguments>();
   CLI::App *command = app.add_subcommand("solve", "The optimum of a graph in g2o text");
-  command->add_option("FILE", arguments->file, "graph, tags as in bole/smoothing/g2o.h")->required();
+  command->add_option("FILE", arguments->file, "graph, tags as in bole/graph.h")->required();
   command->add_option("-o,--output", arguments->output, "write the solved graph here");
   command->add_option("--tolerance", arguments->tolerance, "stop when the cost falls by less, relative")
       ->check(CLI::Range(0.0, 1.0))

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole show-saliency: the basis flows (Fig. 5 of the paper) and saliency beside its images (Fig. 8).
+#include "basis_flows.h"
 #include "commands.h"
 #include "saliency_run.h"
 
 #include "output/atomic_file.h"
-#include "saliency/flow_matrix.h"
 
 #include <cstdio>
 #include <filesystem>
@@ -22,32 +22,6 @@ struct ShowArguments
   std::string sequence, output = "saliency";
   int first = 20, every = 20;
 };
-
-/// The three columns of V as arrows over the image, one panel an axis.
-std::string basisFlowsSvg(const PinholeCamera &camera)
-{
-  const char *axes[3] = {"turn about x (right)", "turn about y (down)", "turn about z (forward)"};
-  const double turn = 0.06; // [rad], for arrows of a length that can be seen
-  const int step = camera.width / 14;
-  std::string svg =
-      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" "
-                  "font-size=\"14\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-                  3 * camera.width + 40, camera.height + 40);
-  for (int axis = 0; axis < 3; ++axis) {
-    svg += fmt::format(
-        "<g transform=\"translate({},10)\"><rect width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\n",
-        10 + axis * (camera.width + 10), camera.width, camera.height);
-    for (int v = step / 2; v < camera.height; v += step)
-      for (int u = step / 2; u < camera.width; u += step) {
-        const Eigen::Vector2d flow = turn * flowMatrix(camera, {u, v}).col(axis);
-        svg += fmt::format("<line x1=\"{}\" y1=\"{}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#1a5e20\"/>"
-                           "<circle cx=\"{}\" cy=\"{}\" r=\"1.6\" fill=\"#1a5e20\"/>\n",
-                           u, v, u + flow.x(), v + flow.y(), u, v);
-      }
-    svg += fmt::format("<text x=\"0\" y=\"{}\">{}</text></g>\n", camera.height + 20, axes[axis]);
-  }
-  return svg + "</svg>\n";
-}
 
 /// Image left, saliency right: white is near, black far, grey unknown.
 vpImage<unsigned char> beside(const vpImage<unsigned char> &image, const Saliency &saliency)

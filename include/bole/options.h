@@ -9,6 +9,13 @@
 
 namespace bole
 {
+/// Who becomes a trunk of the map, and how the map is made.
+enum class MapPolicy
+{
+  earned, ///< a candidate becomes a trunk once enough speaks for it
+  paper   ///< the method of the paper as printed, all of it: see src/doc/paper.md
+};
+
 /// All options of the pipeline; `bole options` prints them with unit, range and default.
 struct Options
 {
@@ -24,12 +31,10 @@ struct Options
   /// Parts of the pipeline that can be left out, for comparisons.
   struct Stages
   {
-    bool points = true;          ///< relative poses from point features
-    bool saliency = true;        ///< motion saliency: off leaves detection ungated
-    bool window_detector = true; ///< new trunks from a window of frames
-    bool line_detector = false;  ///< new trunks from one frame; always on where no range is known
-    bool servoing = false;       ///< the camera is steered by what is tracked, and may rest or circle a trunk
-  } stages;                      ///< what is left out
+    bool points = true;    ///< relative poses from point features
+    bool saliency = true;  ///< motion saliency: off leaves detection ungated
+    bool servoing = false; ///< the camera is steered by what is tracked, and may rest or circle a trunk
+  } stages;                ///< what is left out
 
   /// What trunks look like.
   struct Trunks
@@ -63,12 +68,13 @@ struct Options
   /// How trunks are kept.
   struct Map
   {
-    double confirm_probability = 0.6225; ///< that a candidate is a trunk, at which it is confirmed
-    double confirm_sigma = 0.4;          ///< standard deviation of its place at which it may be confirmed [m]
-    double merge_distance = 0.3;         ///< trunks with less than this between their bark are one [m]
-    double candidate_memory = 5;         ///< a candidate not seen for longer is no longer looked for [s]
-    double lag = 0;                      ///< poses older than this are marginalised [s]; 0: all stay open
-  } map;                                 ///< how trunks are kept
+    MapPolicy policy = MapPolicy::earned; ///< who becomes a trunk
+    double confirm_probability = 0.6225;  ///< that a candidate is a trunk, at which it is confirmed
+    double confirm_sigma = 0.4;           ///< standard deviation of its place at which it may be confirmed [m]
+    double merge_distance = 0.3;          ///< trunks with less than this between their bark are one [m]
+    double candidate_memory = 5;          ///< a candidate not seen for longer is no longer looked for [s]
+    double lag = 0;                       ///< poses older than this are marginalised [s]; 0: all stay open
+  } map;                                  ///< how trunks are kept
 
   struct Odometry ///< noise of the pose filter, a step: between two frames
   {
@@ -87,12 +93,10 @@ struct Options
     double bias = 0.008; ///< standard deviation of the bias at the start [rad/s]
   } gyro;                ///< of the gyro
 
-  struct Paper ///< the method as printed in the paper, for comparison
+  struct Paper ///< of MapPolicy::paper
   {
-    bool energy = false;   ///< Eq. 3: dark trunks, blurred parts, minimised from the prediction
-    double alpha = 1000;   ///< its weight
-    bool saliency = false; ///< Eq. 10 to 17
-  } paper;                 ///< the paper's own choices
+    double alpha = 1000; ///< weight of Eq. 3, for gradients in full scale a pixel
+  } paper;               ///< the paper's own choices
 
   void validate() const; ///< \throw vpException "key = value, must be ..."
 };

@@ -150,6 +150,8 @@ public:
   std::size_t addTrunk(const Trunk &guess, const TrunkPrior &prior);
   /// Indefinite or non-finite summaries are not added. The energy's constant part is not kept.
   SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
+  /// Takes back what \p pose saw of \p trunk, e.g. to add it anew about a better estimate.
+  void removeObservation(std::size_t pose, std::size_t trunk);
   /// Not added where the fixed lag has marginalised one of the poses.
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
   /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one is marginalised.

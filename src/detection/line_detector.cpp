@@ -10,9 +10,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kBorderB = 4;                         ///< of Q for the mean gradient along a border (Eq. 19)
-constexpr double kForegroundA = -12, kForegroundB = 3; ///< of Q for the mean of 1 - p(background) along it (Eq. 20)
-
 double logistic(double x, double a, double b) { return 1 / (1 + std::exp(a * x + b)); }
 
 /// Eq. 21 put right; distances in the image from the column to the nearest bark.
@@ -94,11 +91,11 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
   for (std::size_t i = 0; i < falling.mean.size(); ++i) {
     const double q = falling.q_first + falling.step * static_cast<double>(i);
     const double foreground = background ? 1 - static_cast<double>(background->mean[i]) : 1;
-    const double gate = logistic(foreground, kForegroundA, kForegroundB) *        // Eq. 20
-                        notInhibited(q, known, camera.fx, options.inhibition_px); // Eq. 21
+    const double gate = logistic(foreground, options.foreground_a, options.foreground_b) * // Eq. 20
+                        notInhibited(q, known, camera.fx, options.inhibition_px);          // Eq. 21
     const double fall = -falling.mean[i], rise = rising.mean[i];
-    p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, kBorderB);
-    p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, kBorderB);
+    p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, options.border_b);
+    p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, options.border_b);
   }
 
   const auto lefts = maxima(p_left, falling, options.threshold, 6);

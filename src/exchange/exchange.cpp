@@ -7,7 +7,7 @@
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
-#include "smoothing/g2o.h"
+#include <bole/graph.h>
 
 #include <algorithm>
 #include <filesystem>

@@ -234,6 +234,8 @@ void TrunkMap::keepActive()
 MapUpdate TrunkMap::review(double now_s, bool has_ranges)
 {
   MapUpdate update;
+  if (m_options.at_once)
+    return update;
   reviewEach(update, has_ranges);
   reviewPairs(update);
   deactivate(update, now_s);
@@ -245,6 +247,8 @@ MapUpdate TrunkMap::review(double now_s, bool has_ranges)
 
 MapUpdate TrunkMap::reviewAll(bool has_ranges)
 {
+  if (m_options.at_once)
+    return {};
   for (MapTrunk &trunk : m_trunks)
     trunk.inactive = false;
   keepActive();

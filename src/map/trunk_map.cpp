@@ -63,6 +63,10 @@ int TrunkMap::add(const NewTrunk &found)
     addView(trunk, view);
   trunk.hits = 0;
   trunk.innovation2 = found.innovation2;
+  if (m_options.at_once) {
+    trunk.status = TrunkStatus::confirmed;
+    trunk.fate = TrunkFate::none;
+  }
   m_active.push_back(m_trunks.size());
   m_trunks.push_back(trunk);
   return trunk.id;
@@ -74,6 +78,14 @@ void TrunkMap::refresh(const TrunkEstimate &estimate)
   trunk.trunk = estimate.trunk;
   if (estimate.covariance)
     trunk.covariance = *estimate.covariance;
+}
+
+void TrunkMap::end(int id)
+{
+  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
+  trunk.status = TrunkStatus::lost;
+  trunk.inactive = true;
+  m_active.erase(std::remove(m_active.begin(), m_active.end(), static_cast<std::size_t>(id)), m_active.end());
 }
 
 void TrunkMap::record(const Sighting &sighting)

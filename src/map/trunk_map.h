@@ -22,6 +22,8 @@ namespace bole
 {
 struct MapOptions
 {
+  bool at_once = false; ///< what is found is confirmed and stays, as in the paper: nothing is lost, merged or doubted
+                        ///< until TrunkMap::end()
   int confirm_observations = 10;        ///< views before a candidate may be confirmed, 2 to 1000
   int confirm_predicted = 3;            ///< of them after it was found, where its place was predicted, 0 to 1000
   double confirm_parallax = 0.05;       ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
@@ -188,6 +190,8 @@ public:
   void record(const Sighting &sighting);
   void record(const PointCount &points);
   void refresh(const TrunkEstimate &estimate);
+  /// Stops looking for a trunk, which stays in the map as it is.
+  void end(int id);
 
   /// Promotes, loses and merges by what is known at \p now_s. Candidates that were not seen for long become inactive:
   /// they keep their views and their place in records(), but those of which nothing was ever seen are removed, since a

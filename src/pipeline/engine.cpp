@@ -2,6 +2,7 @@
 #include "pipeline/engine.h"
 
 #include "geometry/horizontal_view.h"
+#include "pipeline/paper_policy.h"
 #include "pipeline/scene_points.h"
 
 #include <algorithm>
@@ -97,6 +98,13 @@ FrameReport Engine::process(const Frame &frame)
     lap("gradient");
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
+    if (m_units.flow.as_paper) {
+      report.trunks = mapAsPaper(gradient, background(saliency), view, m_smoother, m_map, m_units);
+      lap("map");
+      report.saliency = fieldOf(std::move(saliency));
+      report.timing_ms = std::move(lap.times_ms);
+      return complete(std::move(report), frame, motion);
+    }
     const std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
     const std::vector<TrackedTrunk> tracked =
         trackTrunks(gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
@@ -159,6 +167,8 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
     return std::nullopt;
   std::optional<RotationPrior> rotation;
   std::optional<TranslationPrior> translation;
+  if (m_units.flow.as_paper)
+    return m_saliency.update(frame.image, gyroTurn(frame, m_online, m_bMc, m_units.points.gyro));
   if (newest() > 0) {
     const Pose pMc = cameraAt(newest() - 1).inverse() * cameraAt(newest());
     if (motion.is_rotation_seen)
@@ -189,11 +199,11 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
   if (newest() % static_cast<std::size_t>(flow.detect_every) != 0)
     return;
   const bool has_ranges = m_motion->isTranslationMeasured();
-  if (p_background && (flow.detect_lines || !has_ranges))
+  if (p_background && !has_ranges)
     for (const LineDetection &line : detectInFrame(m_window.newest(), m_map, view, p_background, m_units))
       if (const auto adoption = followInFrame(line, m_window.newest(), m_smoother, view, m_units))
         adopt(*adoption);
-  if (!flow.detect_window || !has_ranges)
+  if (!has_ranges)
     return;
   int adopted = 0;
   for (const Detection &detection : detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units))
@@ -253,7 +263,7 @@ void Engine::refreshWholeMap()
     if (trunk.removed)
       continue;
     TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
-    if (!trunk.inactive || trunk.observations >= m_units.map.confirm_observations)
+    if (!trunk.inactive || m_units.map.at_once || trunk.observations >= m_units.map.confirm_observations)
       estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
     m_map.refresh(estimate);
   }

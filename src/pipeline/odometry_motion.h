@@ -32,7 +32,7 @@ private:
   void addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const;
 
   Pose m_bMc;
-  bool m_has_odometry, m_use_points;
+  bool m_has_odometry, m_use_points, m_odometry_alone;
   double m_scale_sigma;
   MotionModel m_model;
   InertialScale m_inertial; ///< of the pose filter, by the accelerometer

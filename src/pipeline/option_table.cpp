@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/option_table.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
@@ -32,29 +34,40 @@ std::string nameOr(const OptionBound &bound)
 {
   return bound.key != nullptr ? bound.key : fmt::format("{}", bound.value);
 }
+
+/// The two words that an option other than a number may have, in the order of their values 0 and 1.
+std::array<const char *, 2> wordsOf(const OptionEntry &entry)
+{
+  if (std::holds_alternative<MapPolicy *>(entry.value))
+    return {"earned", "paper"};
+  return {"false", "true"};
+}
 } // namespace
 
 std::string OptionEntry::text() const
 {
-  return std::visit([](const auto *v) { return fmt::format("{}", *v); }, value);
+  if (isNumber())
+    return std::visit([](const auto *v) { return fmt::format("{}", static_cast<double>(*v)); }, value);
+  return wordsOf(*this)[std::visit([](const auto *v) { return static_cast<std::size_t>(*v); }, value)];
 }
 
 std::string OptionEntry::allowed() const
 {
-  if (std::holds_alternative<bool *>(value))
-    return "true or false";
+  if (!isNumber())
+    return fmt::format("{1} or {0}", wordsOf(*this)[0], wordsOf(*this)[1]);
   return fmt::format("a {}number in [{}, {}]", std::holds_alternative<int *>(value) ? "whole " : "", named(low),
                      named(high));
 }
 
 std::string OptionEntry::range() const
 {
-  return std::holds_alternative<bool *>(value) ? "true, false" : fmt::format("{} to {}", nameOr(low), nameOr(high));
+  return isNumber() ? fmt::format("{} to {}", nameOr(low), nameOr(high))
+                    : fmt::format("{1}, {0}", wordsOf(*this)[0], wordsOf(*this)[1]);
 }
 
 bool OptionEntry::isInRange() const
 {
-  if (std::holds_alternative<bool *>(value))
+  if (!isNumber())
     return true;
   const double number = std::holds_alternative<int *>(value) ? *std::get<int *>(value) : *std::get<double *>(value);
   return number >= low.value && number <= high.value;
@@ -62,9 +75,14 @@ bool OptionEntry::isInRange() const
 
 bool OptionEntry::assign(const std::string &value_text)
 {
-  if (auto *const *flag = std::get_if<bool *>(&value)) {
-    **flag = value_text == "true";
-    return value_text == "true" || value_text == "false";
+  if (!isNumber()) {
+    const auto words = wordsOf(*this);
+    const auto word = std::find(words.begin(), words.end(), value_text);
+    if (word == words.end())
+      return false;
+    const auto set = [&](auto *v) { *v = static_cast<std::remove_reference_t<decltype(*v)>>(word - words.begin()); };
+    std::visit(set, value);
+    return true;
   }
   if (auto *const *whole = std::get_if<int *>(&value))
     return parse(value_text, **whole);
@@ -83,9 +101,6 @@ std::vector<OptionEntry> optionTable(Options &o)
 
       {"stages.points", &o.stages.points, 0, 1, "", "relative poses from point features"},
       {"stages.saliency", &o.stages.saliency, 0, 1, "", "motion saliency; off: what is far may be taken for a trunk"},
-      {"stages.window_detector", &o.stages.window_detector, 0, 1, "", "new trunks from a window of frames"},
-      {"stages.line_detector", &o.stages.line_detector, 0, 1, "",
-       "new trunks from one frame; always on where no range is known"},
       {"stages.servoing", &o.stages.servoing, 0, 1, "",
        "the camera is steered by the trunks: it may rest before one or circle it"},
 
@@ -145,6 +160,8 @@ std::vector<OptionEntry> optionTable(Options &o)
        "tan",
        "upper end of it"},
 
+      {"map.policy", &o.map.policy, 0, 1, "",
+       "earned: a trunk is confirmed once enough speaks for it; paper: the paper's method as printed, all of it"},
       {"map.confirm_probability", &o.map.confirm_probability, 1e-6, 1 - 1e-6, "",
        "that a candidate is a trunk, at which it is confirmed; higher: fewer, and fewer false ones"},
       {"map.confirm_sigma", &o.map.confirm_sigma, 0.01, 10, "m",
@@ -166,10 +183,8 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"gyro.noise", &o.gyro.noise, 1e-7, 1, "rad/s/sqrt(Hz)", "white noise of the rate"},
       {"gyro.bias", &o.gyro.bias, 0, 1, "rad/s", "standard deviation of the bias at the start"},
 
-      {"paper.energy", &o.paper.energy, 0, 1, "",
-       "Eq. 3 as printed: dark trunks, blurred parts, from the prediction alone"},
-      {"paper.alpha", &o.paper.alpha, 1, 1e6, "", "weight of that energy"},
-      {"paper.saliency", &o.paper.saliency, 0, 1, "", "Eq. 10 to 17 as printed"},
+      {"paper.alpha", &o.paper.alpha, 1e-3, 1e6, "",
+       "weight of the paper's energy, Eq. 3, where map.policy = paper: 1000 as printed"},
   };
 }
 } // namespace bole

@@ -24,16 +24,17 @@ struct OptionBound
 struct OptionEntry
 {
   const char *key; ///< "section.name"
-  std::variant<double *, int *, bool *> value;
-  OptionBound low, high; ///< both belong to the range; of a bool unused
+  std::variant<double *, int *, bool *, MapPolicy *> value;
+  OptionBound low, high; ///< both belong to the range; of numbers alone
   const char *unit;      ///< "" where there is none
   const char *effect;    ///< one line
 
   std::string section() const { return std::string(key).substr(0, std::string(key).find('.')); }
   std::string name() const { return std::string(key).substr(std::string(key).find('.') + 1); }
-  std::string text() const;                   ///< its value
-  std::string allowed() const;                ///< "a number in [0, 100]"
-  std::string range() const;                  ///< "0 to 100"; "true, false"
+  std::string text() const;    ///< its value
+  std::string allowed() const; ///< "a number in [0, 100]"
+  std::string range() const;   ///< "0 to 100"; "true, false"
+  bool isNumber() const { return value.index() < 2; }
   bool isInRange() const;                     ///< also false for NaN
   bool assign(const std::string &value_text); ///< false where \p value_text is not of its kind
 };

@@ -46,6 +46,8 @@ namespace
 /// What the thresholds on the picture are held for.
 constexpr double kFocal_px = 200, kRate_hz = 10;
 
+constexpr double kUpright = 1e-4; ///< standard deviation of the lean of what does not lean [tan]
+
 int oddNear(double value, int most) { return std::min(2 * static_cast<int>(std::lround((value - 1) / 2)) + 1, most); }
 
 /// Thresholds on the picture for a camera whose focal length is \p s times 200 px.
@@ -145,6 +147,22 @@ void setServoing(StageOptions &o)
   o.flow.view_correlation = 0.05; // m: what it sees from one place counts but once
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
 }
+
+/// All that the paper has otherwise; src/doc/paper.md says equation by equation why.
+void setPaper(StageOptions &o, const Options::Paper &paper)
+{
+  o.flow.as_paper = true;
+  o.flow.use_points = false;
+  o.motion.relative_alone = true;
+  o.gradient.split = true;
+  o.saliency = SaliencyOptions::paper();
+  o.lines.either_polarity = false;
+  o.tracking.energy.form = EnergyForm::paper;
+  o.tracking.energy.paper_alpha = paper.alpha;
+  o.smoothing.prior_lean_sigma = kUpright;
+  o.smoothing.summary_loss.kind = LossKind::quadratic;
+  o.map.at_once = true;
+}
 } // namespace
 
 StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
@@ -153,31 +171,21 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   StageOptions o;
   o.flow.use_points = options.stages.points;
   o.flow.use_saliency = options.stages.saliency;
-  o.flow.detect_window = options.stages.window_detector;
-  o.flow.detect_lines = options.stages.line_detector;
   if (options.stages.servoing)
     setServoing(o);
   o.visual.camera_height = options.camera.height;
   o.visual.focal_known = options.camera.focal_known;
   if (options.camera.compressed)
     o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
-  if (options.paper.saliency)
-    o.saliency = SaliencyOptions::paper();
-  else
-    scaleToRate(o, options.camera.rate / kRate_hz);
+  scaleToRate(o, options.camera.rate / kRate_hz);
   setTrunks(o, options.trunks);
   setRange(o, options.range);
   o.detection.window = options.detection.window;
   o.detection.profile.range = {options.detection.elevation_low, options.detection.elevation_high};
   setMap(o, options);
   setSensors(o, options);
-  o.tracking.energy.paper_alpha = options.paper.alpha;
-  if (options.paper.energy) {
-    o.tracking.energy.form = EnergyForm::paper;
-    o.tracking.scan = false;
-    o.gradient.split = true;
-    o.lines.either_polarity = false;
-  }
+  if (options.map.policy == MapPolicy::paper)
+    setPaper(o, options.paper);
   constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
   scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
   o.validate();

@@ -109,7 +109,7 @@ private:
       m.gx = 0.5f * (sample(m_previous.gradient_x) + m_current.gradient_x[i][j]);
       m.gy = 0.5f * (sample(m_previous.gradient_y) + m_current.gradient_y[i][j]);
       m.r = m_current.image[i][j] - sample(m_previous.image);
-      m.zero_flow = -(m.gx * flow[0] + m.gy * flow[1]);
+      m.zero_flow = m.gx * flow[0] + m.gy * flow[1];
       for (int k = 0; k < 3; ++k)
         m.j[k] = m.gx * V[k] + m.gy * V[3 + k];
       float var_b, var_f;

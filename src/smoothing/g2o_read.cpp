@@ -160,7 +160,7 @@ private:
     else if (tag == "LOSS")
       readLoss();
     else
-      fail("tag = " + tag + ", must be one of those of <bole/smoothing/g2o.h>");
+      fail("tag = " + tag + ", must be one of those of <bole/graph.h>");
     if (m_next != m_fields.size())
       fail(fmt::format("{}: {} fields, must be {}", tag, m_fields.size(), m_next));
   }

@@ -103,6 +103,17 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, cons
   return status;
 }
 
+void Smoother::removeObservation(std::size_t pose, std::size_t trunk)
+{
+  m_state->checkPose(pose);
+  m_state->checkTrunk(trunk);
+  const int seen = m_state->trunks[trunk].variable;
+  const std::vector<int> factors = m_state->variables[m_state->poses[pose].variable].factors;
+  for (const int factor : factors)
+    if (m_state->factors[factor].kind == FactorKind::observation && m_state->factors[factor].b == seen)
+      m_state->dropFactor(factor);
+}
+
 void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement)
 {
   m_state->checkPose(a);

@@ -13,7 +13,7 @@ namespace bole
 void EnergyOptions::validate() const
 {
   requireRange("energy.alpha", alpha, 0.01, 100);
-  requireRange("energy.paper_alpha", paper_alpha, 1, 1e6);
+  requireRange("energy.paper_alpha", paper_alpha, 1e-3, 1e6);
   requireRange("energy.contrast_floor", contrast_floor, 0.001, 0.5);
   requireRange("energy.hessian_step_px", hessian_step_px, 0.1, 3);
 }
@@ -89,6 +89,19 @@ TrunkEnergy::Curvature TrunkEnergy::curvature(const RelativeTrunk &relative) con
     curvature.F += J.transpose() * H_psd * J;
   }
   return curvature;
+}
+
+/// The gradient there belongs to the tangent there; what that differs from the tangent here is antisymmetric.
+Matrix4d TrunkEnergy::hessian(const RelativeTrunk &relative, const Vector4d &step) const
+{
+  Matrix4d H;
+  for (int i = 0; i < 4; ++i) {
+    Vector4d plus, minus;
+    evaluate(relative.plus(step(i) * Vector4d::Unit(i)), &plus);
+    evaluate(relative.plus(-step(i) * Vector4d::Unit(i)), &minus);
+    H.col(i) = (plus - minus) / (2 * step(i));
+  }
+  return 0.5 * (H + H.transpose());
 }
 
 double TrunkEnergy::contrastAt(const RelativeTrunk &relative, Border border) const

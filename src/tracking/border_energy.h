@@ -32,7 +32,7 @@ struct EnergyOptions
   /// Weight of one border, absolute_mean: 1/alpha is the variance [px^2] of a border's place at contrast. 0.01 to
   /// 100. Chosen so that the normalised estimation error squared of mapped trunks is near its degrees of freedom.
   double alpha = 0.5;
-  double paper_alpha = 1000;     ///< weight of Eq. 3 in the paper form, 1 to 1e6; the paper's value
+  double paper_alpha = 1000;     ///< weight of Eq. 3 in the paper form, 1e-3 to 1e6; the paper's value
   double contrast_floor = 0.02;  ///< contrast below which a border weighs less [full scale/px], 0.001 to 0.5
   double hessian_step_px = 0.75; ///< of the central differences of the Hessian, 0.1 to 3
 
@@ -64,6 +64,8 @@ public:
   };
   /// Gauss-Newton Hessian J^T H J: H the 2x2 Hessian of each border by the displacement of its ends.
   Curvature curvature(const RelativeTrunk &relative) const;
+  /// The full Hessian by the tangent of theta^r, of any signs (Eq. 9). \p step: of its central differences.
+  Matrix4d hessian(const RelativeTrunk &relative, const Vector4d &step) const;
 
   /// Signed mean gradient along a border at \p relative.
   double contrastAt(const RelativeTrunk &relative, Border border) const;

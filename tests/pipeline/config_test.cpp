@@ -101,6 +101,8 @@ TEST(Config, ReadingWhatWasWrittenChangesNothing)
   for (OptionEntry &entry : optionTable(options)) // another value in each than its default
     if (auto *const *flag = std::get_if<bool *>(&entry.value))
       **flag = !**flag;
+    else if (auto *const *policy = std::get_if<MapPolicy *>(&entry.value))
+      **policy = MapPolicy::paper;
     else
       EXPECT_TRUE(entry.assign(std::get_if<int *>(&entry.value) ? "31" : fmt::format("{}", entry.high.value)))
           << entry.key;
@@ -116,9 +118,8 @@ TEST(Config, EveryMistakeInEveryOptionIsNamedWithItsLine)
 {
   Options options;
   for (const OptionEntry &entry : optionTable(options)) {
-    const bool is_flag = std::holds_alternative<bool *>(entry.value);
     std::vector<std::string> wrong = {"thin", "[1, 2]", "nan", ".inf", "1e999", "0,5", "", "{a: 1}", "1 2"};
-    if (!is_flag) {
+    if (entry.isNumber()) {
       wrong.push_back(fmt::format("{}", std::floor(entry.low.value - 1)));
       wrong.push_back(fmt::format("{}", std::ceil(entry.high.value + 1)));
     }

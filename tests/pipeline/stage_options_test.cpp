@@ -81,6 +81,8 @@ TEST(StageOptions, TakeEveryValueThatARangeAllows)
         OptionEntry entry = optionTable(options)[i];
         if (std::holds_alternative<bool *>(entry.value))
           **std::get_if<bool *>(&entry.value) ^= true;
+        else if (auto *const *policy = std::get_if<MapPolicy *>(&entry.value))
+          **policy = MapPolicy::paper;
         else
           ASSERT_TRUE(entry.assign(fmt::format("{}", is_high ? entry.high.value : entry.low.value)));
         EXPECT_NO_THROW(stageOptions(options, cameraWith(f))) << entry.key << " = " << entry.text() << ", f = " << f;

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "detector_statistics.h"
+
+#include "detection/level_profile.h"
+#include "geometry/horizontal_view.h"
+#include "geometry/median.h"
+#include "input/asl_source.h"
+#include "input/truth.h"
+#include "output/figure.h"
+#include "pipeline/paper_policy.h"
+#include "saliency/saliency.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole::apps
+{
+namespace
+{
+/// tan of the bearings, from the heading of the camera, of the borders of the true trunks within range.
+struct TrueBorders
+{
+  std::vector<double> left, right;
+
+  TrueBorders(const std::vector<TruthTrunk> &trunks, const Pose &wMc, double range)
+  {
+    const double heading = std::atan2(wMc.R(1, 2), wMc.R(0, 2));
+    for (const TruthTrunk &truth : trunks) {
+      Trunk trunk;
+      trunk.xy = truth.xy;
+      trunk.log_radius = std::log(std::max(truth.radius, 1e-3));
+      const HorizontalView view = horizontalView(wMc, trunk);
+      const double bearing = std::remainder(view.bearing - heading, 2 * M_PI);
+      if (truth.radius <= 0 || view.range > range || std::abs(bearing) > 1)
+        continue;
+      left.push_back(std::tan(bearing + view.half_angle));
+      right.push_back(std::tan(bearing - view.half_angle));
+    }
+  }
+};
+
+/// The strongest value within 2 px of \p q; nothing outside the profile.
+void addNear(const LevelProfile &profile, double sign, double q, std::vector<double> &values)
+{
+  const int at = static_cast<int>(std::lround((q - profile.q_first) / profile.step));
+  if (at < 4 || at + 5 > static_cast<int>(profile.mean.size()))
+    return;
+  double strongest = -1;
+  for (int i = at - 4; i <= at + 4; ++i)
+    strongest = std::max(strongest, sign * static_cast<double>(profile.mean[static_cast<std::size_t>(i)]));
+  values.push_back(strongest);
+}
+
+void addAll(const LevelProfile &profile, double sign, std::vector<double> &values)
+{
+  for (const float mean : profile.mean)
+    if (mean != 0) // in the image
+      values.push_back(sign * static_cast<double>(mean));
+}
+} // namespace
+
+DetectorStatistics detectorStatistics(const std::string &sequence, double range)
+{
+  AslSource source(sequence);
+  const PinholeCamera camera = source.camera();
+  Options paper;
+  paper.map.policy = MapPolicy::paper;
+  const StageOptions options = stageOptions(paper, camera);
+  const std::vector<TruthTrunk> trunks = readTruthTrunks(sequence);
+  SaliencyEstimator estimator(camera, options.saliency);
+  ProfileOptions lines;
+  lines.range = kWholeLine;
+  Trajectory flight;
+  DetectorStatistics statistics;
+  for (Frame frame; source.next(frame);) {
+    if (frame.status != FrameStatus::ok || !frame.wMb_odometry)
+      continue;
+    Saliency saliency = estimator.update(frame.image, gyroTurn(frame, flight, source.bMc(), options.points.gyro));
+    const bool is_first = flight.empty();
+    flight.push_back({frame.stamp_ns, *frame.wMb_odometry});
+    if (is_first)
+      continue;
+    for (unsigned i = 0; i < saliency.p_background.getSize(); ++i)
+      saliency.p_background.bitmap[i] = 1 - saliency.p_background.bitmap[i];
+    const Gradient gradient = computeGradient(frame.image, options.gradient);
+    const Pose wMc = *frame.wMb_odometry * source.bMc();
+    const auto profileOf = [&](const vpImage<float> &field) {
+      return computeLevelProfile(field, camera, wMc.R, lines);
+    };
+    const LevelProfile falling = profileOf(gradient.negative), rising = profileOf(gradient.positive);
+    const LevelProfile foreground = profileOf(saliency.p_background);
+    addAll(falling, -1, statistics.gradient.of_all);
+    addAll(rising, 1, statistics.gradient.of_all);
+    addAll(foreground, 1, statistics.foreground.of_all);
+    const std::optional<Pose> truth = interpolate(source.truth(), frame.stamp_ns);
+    const TrueBorders borders(truth ? trunks : std::vector<TruthTrunk>(), truth.value_or(Pose()) * source.bMc(), range);
+    for (const double q : borders.left) {
+      addNear(falling, -1, q, statistics.gradient.of_borders);
+      addNear(foreground, 1, q, statistics.foreground.of_borders);
+    }
+    for (const double q : borders.right) {
+      addNear(rising, 1, q, statistics.gradient.of_borders);
+      addNear(foreground, 1, q, statistics.foreground.of_borders);
+    }
+  }
+  return statistics;
+}
+
+std::string toTable(const DetectorStatistics &statistics)
+{
+  constexpr double kShares[] = {0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99};
+  std::string text = fmt::format("{:<46}", "along a line, quantile");
+  for (const double share : kShares)
+    text += fmt::format("{:8.2f}", share);
+  const auto row = [&](const char *name, const std::vector<double> &values) {
+    text += fmt::format("\n{:<46}", name);
+    for (const double share : kShares)
+      text += figure(quantileOf(values, share), 8, 4);
+  };
+  row("mean gradient (Eq. 19), all lines", statistics.gradient.of_all);
+  row("mean gradient, borders of near true trunks", statistics.gradient.of_borders);
+  row("mean of 1 - p(background) (Eq. 20), all lines", statistics.foreground.of_all);
+  row("mean of 1 - p(background), near true trunks", statistics.foreground.of_borders);
+  return text + "\n";
+}
+} // namespace bole::apps

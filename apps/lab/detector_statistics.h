@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the paper's detector reads along the lines of a flight (Eq. 19 and 20): its thresholds are set "by inspection
+/// of the statistics of the data" (Section 6).
+
+#include <string>
+#include <vector>
+
+namespace bole::apps
+{
+/// One value a vertical line of each image: all lines, and those nearest to the borders of true trunks.
+struct LineStatistics
+{
+  std::vector<double> of_all, of_borders;
+};
+
+struct DetectorStatistics
+{
+  LineStatistics gradient;   ///< mean of the blurred part, positive where it speaks for a border [full scale/px]
+  LineStatistics foreground; ///< mean of 1 - p(background)
+};
+
+/// Reads the flight \p sequence with the preset of the paper. Trunks of the truth count within \p range [m].
+DetectorStatistics detectorStatistics(const std::string &sequence, double range = 6);
+
+/// A table of quantiles.
+std::string toTable(const DetectorStatistics &statistics);
+} // namespace bole::apps

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/paper_policy.h"
+
+#include "geometry/horizontal_view.h"
+#include "tracking/borders.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace bole
+{
+namespace
+{
+/// A tree whose image takes part in the joint optimisation of a frame.
+struct ObservedTree
+{
+  int id = -1; ///< in the map; -1: found in this frame
+  std::size_t smoother_id = 0;
+  RelativeTrunk relative;
+};
+
+TrunkEnergy energyOf(const Gradient &gradient, const PinholeCamera &camera, const StageOptions &options)
+{
+  return {gradient, camera, kWholeLine, BorderTarget(), BorderTarget(), options.tracking.energy};
+}
+
+/// Eq. 18 to 21: pairs of lines, each a tree whose range is that of the median radius.
+std::vector<ObservedTree> instantiate(const Gradient &gradient, const vpImage<float> *p_background,
+                                      const Viewpoint &view, Smoother &smoother, const TrunkMap &map,
+                                      const StageOptions &options)
+{
+  std::vector<ObservedTree> trees;
+  if (smoother.poseCount() < 2) // without a frame before there is no saliency
+    return trees;
+  ProfileOptions lines;
+  lines.range = kWholeLine;
+  for (const LineDetection &found : detectLines(gradient, p_background, view.camera, view.wMc.R,
+                                                inhibitedRanges(map, view, true), lines, options.lines)) {
+    const Trunk guess = trunkFromRelative(view.wMc, found.relative, options.smoothing.prior_radius);
+    trees.push_back({-1, smoother.addTrunk(guess, priorOf(guess, options.smoothing)), found.relative});
+  }
+  return trees;
+}
+
+/// Eq. 2 with the energies of the newest image, by Newton steps on all of it together: each tree's energy is expanded
+/// about where the last step left it, until no border moves any more.
+void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
+                     Smoother &smoother)
+{
+  constexpr int kIterations = 12;
+  constexpr double kSettled_px = 0.02;
+  const std::size_t newest = smoother.poseCount() - 1;
+  for (int i = 0; i < kIterations && !trees.empty(); ++i) {
+    double moved_px = 0;
+    for (ObservedTree &tree : trees) {
+      const RelativeTrunk before = std::exchange(tree.relative, smoother.predictedRelative(tree.smoother_id));
+      smoother.removeObservation(newest, tree.smoother_id);
+      if (!tree.relative.isFinite())
+        continue;
+      const Vector4d steps = pixelSteps(camera, tree.relative);
+      moved_px = std::max(moved_px, tree.relative.minus(before).cwiseQuotient(steps).cwiseAbs().maxCoeff());
+      smoother.addObservation(newest, tree.smoother_id,
+                              convexified(expandEnergy(energy, camera, tree.relative), steps));
+    }
+    if (i > 0 && moved_px < kSettled_px)
+      return;
+    smoother.update();
+  }
+}
+
+Sighting sightingOf(const ObservedTree &tree, const TrunkEnergy &energy, const Trunk &trunk, const Viewpoint &view)
+{
+  Sighting sighting;
+  sighting.id = tree.id;
+  sighting.kind = Sighting::Kind::seen;
+  sighting.view.time_s = view.time_s;
+  sighting.view.camera = view.wMc.t;
+  sighting.view.bearing = horizontalView(view.wMc, trunk).bearing;
+  sighting.view.left_contrast = energy.contrastAt(tree.relative, Border::left);
+  sighting.view.right_contrast = energy.contrastAt(tree.relative, Border::right);
+  return sighting;
+}
+
+/// Eq. 9 at the joint optimum, and the end of those whose energy is not convex there. A tree that no image has
+/// measured is none.
+std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<ObservedTree> &trees, const Viewpoint &view,
+                                   Smoother &smoother, TrunkMap &map, const StageOptions &options)
+{
+  const std::size_t newest = smoother.poseCount() - 1;
+  std::vector<TrunkInView> seen;
+  for (ObservedTree &tree : trees) {
+    tree.relative = smoother.predictedRelative(tree.smoother_id);
+    const Trunk trunk = smoother.trunk(tree.smoother_id);
+    smoother.removeObservation(newest, tree.smoother_id);
+    bool is_observed = false;
+    if (tree.relative.isFinite()) {
+      const SummaryFactor summary = expandEnergy(energy, view.camera, tree.relative);
+      is_observed = isConvex(summary, pixelSteps(view.camera, tree.relative)) &&
+                    smoother.addObservation(newest, tree.smoother_id, summary) != SummaryStatus::not_finite;
+    }
+    if (tree.id < 0 && !is_observed) {
+      smoother.removeTrunk(tree.smoother_id);
+      continue;
+    }
+    if (tree.id < 0) {
+      NewTrunk found;
+      found.smoother_id = tree.smoother_id;
+      found.trunk = trunk;
+      found.found_s = view.time_s;
+      tree.id = map.add(found);
+    }
+    if (is_observed)
+      map.record(sightingOf(tree, energy, trunk, view));
+    else
+      map.end(tree.id);
+    if (!tree.relative.isFinite())
+      continue;
+    const ElevationRange drawn = elevationOf(tree.relative, trunk, view, options);
+    seen.push_back({tree.id, map.trunk(tree.id).status, is_observed,
+                    toString(is_observed ? TrackingStatus::tracked : TrackingStatus::negative_curvature), tree.relative,
+                    drawn.low, drawn.high, horizontalView(view.wMc, trunk).range});
+  }
+  smoother.update();
+  return seen;
+}
+} // namespace
+
+Vector4d pixelSteps(const PinholeCamera &camera, const RelativeTrunk &relative)
+{
+  constexpr double kLongest = 0.1; // of an angle [rad] and of the log of r/d: farther the energy is another
+  Vector4d most = Vector4d::Constant(1 / kLongest);
+  for (const Border border : kBorders) {
+    const BorderLine line = borderLine(camera, relative, border, kWholeLine);
+    if (line.rows() > 0)
+      most = most.cwiseMax(
+          borderJacobian(camera, relative, border, line).cwiseAbs().colwise().maxCoeff().transpose().eval());
+  }
+  return most.cwiseInverse();
+}
+
+SummaryFactor expandEnergy(const TrunkEnergy &energy, const PinholeCamera &camera, const RelativeTrunk &relative)
+{
+  constexpr double kStep_px = 0.5; // of the central differences: a sixth of the blur of Eq. 3
+  SummaryFactor summary;
+  summary.optimum = relative;
+  summary.energy = energy.evaluate(relative, &summary.f);
+  summary.F = energy.hessian(relative, kStep_px * pixelSteps(camera, relative));
+  return summary;
+}
+
+bool isConvex(const SummaryFactor &summary, const Vector4d &steps)
+{
+  const Matrix4d F = steps.asDiagonal() * summary.F * steps.asDiagonal();
+  return F.allFinite() && Eigen::SelfAdjointEigenSolver<Matrix4d>(F).eigenvalues()(0) > 0;
+}
+
+SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps)
+{
+  constexpr double kMost_px = 1;
+  constexpr double kLeast = 1e-6; // curvature [1/px^2]: nothing
+  const Eigen::SelfAdjointEigenSolver<Matrix4d> eigen(steps.asDiagonal() * summary.F * steps.asDiagonal());
+  const Vector4d slope = eigen.eigenvectors().transpose() * steps.cwiseProduct(summary.f);
+  const Vector4d curvature = eigen.eigenvalues().cwiseAbs().cwiseMax(slope.cwiseAbs() / kMost_px).cwiseMax(kLeast);
+  const Matrix4d V = steps.cwiseInverse().asDiagonal() * eigen.eigenvectors();
+  summary.F = V * curvature.asDiagonal() * V.transpose();
+  return summary;
+}
+
+std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flight, const Pose &bMc,
+                                      const GyroOptions &options)
+{
+  if (flight.empty() || frame.gyro.empty())
+    return std::nullopt;
+  const GyroRotation turn =
+      integrateGyro(frame.gyro, flight.back().stamp_ns, frame.stamp_ns, GyroBias::unknown(options), options);
+  if (!turn.complete)
+    return std::nullopt;
+  return RotationPrior{bMc.R.transpose() * turn.R * bMc.R, bMc.R.transpose() * turn.covariance() * bMc.R};
+}
+
+std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<float> *p_background, const Viewpoint &view,
+                                    Smoother &smoother, TrunkMap &map, const StageOptions &options)
+{
+  std::vector<ObservedTree> trees = instantiate(gradient, p_background, view, smoother, map, options);
+  for (const std::size_t i : map.active()) // observed in the frame before, or ended
+    trees.push_back({map.trunks()[i].id, map.trunks()[i].smoother_id, {}});
+  const TrunkEnergy energy = energyOf(gradient, view.camera, options);
+  smoother.update(); // what is new may be asked for
+  for (ObservedTree &tree : trees)
+    tree.relative = smoother.predictedRelative(tree.smoother_id);
+  optimiseJointly(energy, view.camera, trees, smoother);
+  return summarise(energy, trees, view, smoother, map, options);
+}
+} // namespace bole

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// The paper's own way from a frame to the map (Sections 3, 4, 6 and 7), for MapPolicy::paper. src/doc/paper.md goes
+/// through its equations and says what had to be decided where it is silent.
+///
+/// Idea: a pair of lines that the detector finds is a tree at once (Eq. 18 to 21). The trees that the frame before
+/// observed are observed again: their energies (Eq. 3 and 4) are optimised together with the pose, all other trees and
+/// what the earlier frames left (Eq. 2, Fig. 2), and there the image becomes a summary factor for ever (Eq. 9). A tree
+/// whose energy is not convex there is observed no more: it stays in the map, and nothing is ever associated with it.
+///
+/// Laws (each a test): at the joint optimum the gradients of the images and of all other factors cancel; a tree is
+/// confirmed in the frame that finds it; one that ends stays, and what is found in its place is another tree.
+
+#include "pipeline/adoption.h"
+#include "saliency/rotation_em.h"
+#include <bole/report.h>
+#include <bole/trajectory.h>
+
+namespace bole
+{
+/// A cylinder has no ends (theta is x, y and r): its borders run through the whole image, up to 87 degrees of
+/// elevation.
+constexpr ElevationRange kWholeLine = {-20, 20};
+
+/// Steps of the tangent of \p relative that move an end of one of its borders by a pixel, none longer than a tenth.
+Vector4d pixelSteps(const PinholeCamera &camera, const RelativeTrunk &relative);
+
+/// Eq. 3 of one tree about \p relative, to second order.
+SummaryFactor expandEnergy(const TrunkEnergy &energy, const PinholeCamera &camera, const RelativeTrunk &relative);
+
+/// Whether the quadratic has a minimum, in each direction of the tangent.
+bool isConvex(const SummaryFactor &summary, const Vector4d &steps);
+
+/// The same value and gradient with a Hessian that is positive and lets the image move a border by a pixel at most: one
+/// step towards the optimum from wherever it starts.
+SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps);
+
+/// The turn of the camera since the last pose of \p flight by the gyro, where it covers it: what EM starts from.
+std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flight, const Pose &bMc,
+                                      const GyroOptions &options);
+
+/// From the newest pose's image to the map: detects, optimises jointly, summarises.
+/// Returns what was looked for.
+std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<float> *p_background, const Viewpoint &view,
+                                    Smoother &smoother, TrunkMap &map, const StageOptions &options);
+} // namespace bole
