@@ -3,6 +3,7 @@
 #include "geometry/constants.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
+#include "geometry/yaw.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,7 +16,6 @@ namespace
 {
 constexpr double kCorrelation_s = 0.1; // of the velocity's error
 
-double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
 Eigen::Matrix3d turnedBy(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
 
 /// What one packet says by itself: attitude, velocity, rate, height.
