@@ -5,6 +5,7 @@
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
@@ -144,7 +145,7 @@ PYBIND11_MODULE(_bole, module)
         std::rethrow_exception(raised);
     }
     catch (const vpException &error) {
-      py::set_error(PyExc_ValueError, error.getStringMessage().c_str());
+      PyErr_SetString(PyExc_ValueError, error.getStringMessage().c_str());
     }
   });
 
