@@ -20,7 +20,9 @@
 #include <deque>
 #include <filesystem>
 #include <fmt/format.h>
+#include <future>
 #include <memory>
+#include <optional>
 
 namespace bole::apps
 {
@@ -144,24 +146,37 @@ RunSummary describeRun(const TrackArguments &arguments)
   return made;
 }
 
+/// The next frame, nothing at the end. One that waits in a file is read while the one before is worked on; a live one
+/// is as new as it can be.
+std::future<std::optional<Frame>> nextOf(FrameSource &source, bool is_live)
+{
+  return std::async(is_live ? std::launch::deferred : std::launch::async, [&source]() -> std::optional<Frame> {
+    Frame frame;
+    return source.next(frame) ? std::optional<Frame>(std::move(frame)) : std::nullopt;
+  });
+}
+
 /// Frames from \p source until it ends, enough were taken, or somebody interrupts. Returns how many.
-std::size_t fly(const TrackArguments &arguments, FrameSource &source, Pipeline &pipeline, TrackOutput &output,
-                Flight &flight)
+std::size_t fly(const TrackArguments &arguments, FrameSource &source, bool is_live, Pipeline &pipeline,
+                TrackOutput &output, Flight &flight)
 {
   constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written
   Progress progress(arguments.is_quiet ? 0 : source.size(), stderr);
   std::size_t count = 0;
-  while (!interrupted() && (arguments.frames_most == 0 || count < arguments.frames_most)) {
-    Frame frame;
-    if (!source.next(frame))
+  auto next = nextOf(source, is_live);
+  while (!interrupted() && next.valid()) {
+    std::optional<Frame> frame = next.get();
+    if (!frame)
       break;
-    if (arguments.is_without_odometry)
-      frame.wMb_odometry.reset();
-    if (arguments.is_without_gyro)
-      frame.gyro.clear();
-    const FrameStatus status = frame.status;
-    flight.take(std::move(frame));
     ++count;
+    if (arguments.frames_most == 0 || count < arguments.frames_most)
+      next = nextOf(source, is_live);
+    if (arguments.is_without_odometry)
+      frame->wMb_odometry.reset();
+    if (arguments.is_without_gyro)
+      frame->gyro.clear();
+    const FrameStatus status = frame->status;
+    flight.take(std::move(*frame));
     if (!arguments.is_quiet)
       progress.update(count, fmt::format("{} trunks in view  {}", output.trunksInView(), toString(status)));
     if (count % kKeepEvery == 0)
@@ -192,7 +207,7 @@ void track(const TrackArguments &arguments)
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   endAtInterrupt();
-  if (fly(arguments, *source, pipeline, output, flight) == 0) {
+  if (fly(arguments, *source, live != nullptr, pipeline, output, flight) == 0) {
     if (interrupted())
       endWith(ExitCode::interrupted);
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
@@ -211,6 +226,8 @@ void track(const TrackArguments &arguments)
   const Verdict verdict = output.verdict();
   if (!arguments.is_quiet)
     report(arguments, output, verdict);
+  if (arguments.is_profiled)
+    std::fputs(toText(output.timing()).c_str(), stdout);
   if (interrupted()) {
     std::fprintf(stderr, "bole: interrupted; what was known is in %s\n", arguments.run.c_str());
     endWith(ExitCode::interrupted);

@@ -93,6 +93,7 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
   trace(frame, report);
   const bool has_image =
       frame.image.getSize() > 0 && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width;
+  waitForFilm();
   return has_image && (m_overlay || m_has_pictures) ? draw(frame, report) : vpImage<vpRGBa>();
 }
 
@@ -143,20 +144,31 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
         {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
     candidates += trunk.is_tracked && trunk.status == TrunkStatus::candidate ? 1 : 0;
   }
-  if (report.saliency)
-    overlay.foreground = foregroundOf(*report.saliency);
   overlay.is_warning = frame.status != FrameStatus::ok;
   overlay.text = fmt::format("{:.1f} s  {} trunk{}, {} candidate{}  {}", 1e-9 * static_cast<double>(frame.stamp_ns),
                              m_in_view, m_in_view == 1 ? "" : "s", candidates, candidates == 1 ? "" : "s",
                              overlay.is_warning ? toString(frame.status) : "");
-  vpImage<vpRGBa> picture = drawOverlay(frame.image, m_summary.camera, overlay);
-  film([&] {
-    if (m_overlay)
-      m_overlay->write(picture, frame.stamp_ns);
-    if (m_saliency && report.saliency)
-      m_saliency->write(drawSaliency(frame.image, m_summary.camera, overlay.foreground, overlay.text), frame.stamp_ns);
+  if (report.saliency)
+    overlay.foreground = foregroundOf(*report.saliency);
+  vpImage<vpRGBa> picture;
+  if (m_has_pictures)
+    picture = drawOverlay(frame.image, m_summary.camera, overlay);
+  m_filming = std::async(std::launch::async, [this, image = frame.image, stamp_ns = frame.stamp_ns, picture, overlay] {
+    film([&] {
+      if (m_overlay)
+        m_overlay->write(m_has_pictures ? picture : drawOverlay(image, m_summary.camera, overlay), stamp_ns);
+      if (m_saliency && overlay.foreground.getSize() > 0)
+        m_saliency->write(drawSaliency(image, m_summary.camera, overlay.foreground, overlay.text), stamp_ns);
+    });
   });
   return picture;
+}
+
+/// The videos are drawn and encoded while the next frame is worked on.
+void TrackOutput::waitForFilm()
+{
+  if (m_filming.valid())
+    m_filming.get();
 }
 
 /// A video that cannot be written, on a full disk for example, costs nothing else.
@@ -218,6 +230,7 @@ void TrackOutput::waitForKeeping()
   if (!m_keeping.valid())
     return;
   const std::string error = m_keeping.get();
+  waitForFilm();
   if (!error.empty())
     loseVideos(error); // the disk may be full of them
 }
@@ -242,6 +255,7 @@ void TrackOutput::keep(const Pipeline &pipeline)
 
 void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
 {
+  waitForFilm();
   waitForKeeping();
   m_is_cancelled = !is_complete;
   if (m_digest.valid())

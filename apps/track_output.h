@@ -53,6 +53,7 @@ private:
   template <typename Action> void film(const Action &action);
   void loseVideos(const std::string &why);
   void take(const Pipeline &pipeline, bool is_complete);
+  void waitForFilm();
   void waitForKeeping();
 
   RunFolder m_folder;
@@ -69,6 +70,7 @@ private:
   bool m_is_begun = false;
   std::atomic<bool> m_is_cancelled{false};
   std::future<std::optional<InputDigest>> m_digest;
-  std::future<std::string> m_keeping; ///< what went wrong; last: it ends before the rest goes
+  std::future<std::string> m_keeping; ///< what went wrong; it and the film last: they end before the rest goes
+  std::future<void> m_filming;        ///< of the frame before
 };
 } // namespace bole::apps

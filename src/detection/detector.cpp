@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/detector.h"
 
-#include <Eigen/Cholesky>
+#include "detection/window_loops.h"
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -24,43 +25,54 @@ struct PlaneView
   Vector2d position, forward, left; ///< of the level camera in the world
 };
 
-struct Columns
+ViewColumns columnsOf(const std::vector<PlaneView> &views)
 {
-  double q_left, q_right;
-};
-
-/// Columns of the borders of the circle (xy, r); nothing when it is not in front of the view.
-std::optional<Columns> bordersOf(const PlaneView &view, const Vector2d &xy, double r)
-{
-  const Vector2d w = xy - view.position;
-  const double ahead = view.forward.dot(w), d2 = w.squaredNorm();
-  if (ahead < 0.2 || d2 <= 1.2 * r * r)
-    return std::nullopt;
-  const double q = view.left.dot(w) / ahead, t = r / std::sqrt(d2 - r * r);
-  if (q * t > 0.9 || q * t < -0.9)
-    return std::nullopt;
-  return Columns{(q + t) / (1 - q * t), (q - t) / (1 + q * t)};
+  ViewColumns columns;
+  const auto add = [&columns](const PlaneView &view, double q_first, double q_last, double step) {
+    columns.x.push_back(view.position.x());
+    columns.y.push_back(view.position.y());
+    columns.forward_x.push_back(view.forward.x());
+    columns.forward_y.push_back(view.forward.y());
+    columns.left_x.push_back(view.left.x());
+    columns.left_y.push_back(view.left.y());
+    columns.q_first.push_back(q_first);
+    columns.q_last.push_back(q_last);
+    columns.by_step.push_back(1 / step);
+  };
+  for (const PlaneView &view : views) {
+    const LevelProfile &profile = *view.profile;
+    add(view, profile.q_first, profile.qLast(), profile.step);
+    columns.first_sample.push_back(static_cast<int>(columns.rising_peak.size()));
+    columns.rising_peak.insert(columns.rising_peak.end(), profile.rising_peak.begin(), profile.rising_peak.end());
+    columns.falling_peak.insert(columns.falling_peak.end(), profile.falling_peak.begin(), profile.falling_peak.end());
+  }
+  constexpr std::size_t kTogether = 4; // views that are worked on at once: the last ones may be blind
+  while (columns.x.size() % kTogether != 0) {
+    add({nullptr, Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()}, 1, 0, 1);
+    columns.first_sample.push_back(0);
+  }
+  return columns;
 }
 
-/// How well a profile value continues a contrast: 1 the same, 0 nothing there, negative the other polarity.
-double agreement(double value, double contrast) { return std::clamp(value / contrast, -0.3, 1.0); }
+/// A peak of the current view, with half of its bearing.
+struct HalfBearing
+{
+  explicit HalfBearing(double q) : half(0.5 * std::atan(q)), sine(std::sin(half)), cosine(std::cos(half)) {}
+
+  double half, sine, cosine;
+};
 
 struct PairHypothesis
 {
   ProfilePeak left, right;
-  Vector2d direction; ///< of the bearing in the world, unit
+  double bearing = 0; ///< of the middle
   double s = 0;       ///< r / d
-};
 
-PairHypothesis makePair(const PlaneView &view, const ProfilePeak &left, const ProfilePeak &right)
-{
-  PairHypothesis pair{left, right, {}, 0};
-  const double b_left = std::atan(left.q), b_right = std::atan(right.q);
-  const double bearing = 0.5 * (b_left + b_right);
-  pair.s = std::sin(0.5 * (b_left - b_right));
-  pair.direction = std::cos(bearing) * view.forward + std::sin(bearing) * view.left;
-  return pair;
-}
+  PairHypothesis(const ProfilePeak &l, const HalfBearing &at_l, const ProfilePeak &r, const HalfBearing &at_r)
+      : left(l), right(r), bearing(at_l.half + at_r.half), s(at_l.sine * at_r.cosine - at_l.cosine * at_r.sine)
+  {
+  }
+};
 
 /// How well the window agrees with one peak of the current view, if its border stood at each of the ranges swept. The
 /// border of a trunk is a vertical line that hardly moves over a window, so the curves of two borders add up to that
@@ -68,37 +80,38 @@ PairHypothesis makePair(const PlaneView &view, const ProfilePeak &left, const Pr
 struct RangeCurve
 {
   std::vector<float> sum;  ///< of agreement over the views that see it, by range
-  std::vector<short> seen; ///< those views
+  std::vector<float> seen; ///< how many those are
 };
 
 /// Ranges swept, uniform in inverse depth: near enough for no focus to fall between two.
-std::vector<double> sweptRanges(const DetectorOptions &options)
+std::vector<float> sweptRanges(const DetectorOptions &options)
 {
   constexpr int kRanges = 80;
   const double far = 1 / (1.2 * options.range_max), near = 1 / options.range_min;
-  std::vector<double> ranges;
+  std::vector<float> ranges;
   for (int i = 0; i < kRanges; ++i)
-    ranges.push_back(1 / (far + (near - far) * i / (kRanges - 1)));
+    ranges.push_back(static_cast<float>(1 / (far + (near - far) * i / (kRanges - 1))));
   return ranges;
 }
 
-RangeCurve sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<double> &ranges)
+RangeCurve sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<float> &ranges)
 {
-  RangeCurve curve{std::vector<float>(ranges.size(), 0.f), std::vector<short>(ranges.size(), 0)};
+  RangeCurve curve{std::vector<float>(ranges.size(), 0.f), std::vector<float>(ranges.size(), 0.f)};
   const PlaneView &now = views.back();
   const Vector2d direction = (now.forward + peak.q * now.left).normalized();
   for (std::size_t v = 0; v + 1 < views.size(); ++v) {
     const Vector2d offset = now.position - views[v].position;
-    const double ahead0 = views[v].forward.dot(offset), ahead1 = views[v].forward.dot(direction);
-    const double left0 = views[v].left.dot(offset), left1 = views[v].left.dot(direction);
-    for (std::size_t i = 0; i < ranges.size(); ++i) {
-      const double ahead = ahead0 + ranges[i] * ahead1;
-      const double q = (left0 + ranges[i] * left1) / ahead;
-      if (ahead < 0.2 || !views[v].profile->covers(q))
-        continue;
-      ++curve.seen[i];
-      curve.sum[i] += static_cast<float>(agreement(views[v].profile->strongestNear(q, peak.contrast), peak.contrast));
-    }
+    const LevelProfile &profile = *views[v].profile;
+    const SweptView view{static_cast<float>(views[v].forward.dot(offset)),
+                         static_cast<float>(views[v].forward.dot(direction)),
+                         static_cast<float>(views[v].left.dot(offset)),
+                         static_cast<float>(views[v].left.dot(direction)),
+                         static_cast<float>(profile.q_first),
+                         static_cast<float>(1 / profile.step),
+                         (peak.contrast > 0 ? profile.rising : profile.falling).data(),
+                         static_cast<int>(profile.mean.size())};
+    addAgreement(view, static_cast<float>(1 / peak.contrast), ranges.data(), static_cast<int>(ranges.size()),
+                 curve.sum.data(), curve.seen.data());
   }
   return curve;
 }
@@ -108,26 +121,27 @@ struct SweepResult
   double range = 0, agreement = 0;
 };
 
-/// The ranges at which the window agrees with the pair and with neither neighbour more, best first.
+/// The ranges at which the window agrees with the pair and with neither neighbour more, best first. \p scores keeps its
+/// memory.
 std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &left, const RangeCurve &right,
-                               const std::vector<double> &ranges, const DetectorOptions &options)
+                               const std::vector<float> &ranges, const DetectorOptions &options,
+                               std::vector<float> &scores)
 {
-  const auto score = [&](std::size_t i) {
-    const int seen = left.seen[i] + right.seen[i];
-    const bool is_seen = std::min(left.seen[i], right.seen[i]) >= kLeastViews;
-    const double r = pair.s * ranges[i];
-    return is_seen && r >= options.radius_min && r <= options.radius_max ? (left.sum[i] + right.sum[i]) / seen : -1.0;
-  };
   constexpr std::size_t kMost = 2;
+  // Ranges fall: those that give a radius within the limits stand together.
+  const auto isWider = [&pair](float range, double radius) { return pair.s * range > radius; };
+  const auto begin = std::lower_bound(ranges.begin(), ranges.end(), options.radius_max, isWider);
+  const auto end = std::lower_bound(begin, ranges.end(), options.radius_min, isWider);
+  const std::size_t first = static_cast<std::size_t>(begin - ranges.begin());
+  scores.resize(static_cast<std::size_t>(end - begin));
+  scoresOfPair({left.sum.data() + first, left.seen.data() + first},
+               {right.sum.data() + first, right.seen.data() + first}, static_cast<int>(scores.size()), kLeastViews,
+               scores.data());
   std::vector<SweepResult> maxima;
-  double before = -1, here = score(0);
-  for (std::size_t i = 0; i < ranges.size(); ++i) {
-    const double after = i + 1 < ranges.size() ? score(i + 1) : -1;
-    if (here >= options.agreement_min && here >= before && here > after)
-      maxima.push_back({ranges[i], here});
-    before = here;
-    here = after;
-  }
+  for (std::size_t i = 0; i < scores.size(); ++i)
+    if (scores[i] >= options.agreement_min && (i == 0 || scores[i] >= scores[i - 1]) &&
+        (i + 1 == scores.size() || scores[i] > scores[i + 1]))
+      maxima.push_back({ranges[first + i], scores[i]});
   std::sort(maxima.begin(), maxima.end(),
             [](const SweepResult &a, const SweepResult &b) { return a.agreement > b.agreement; });
   if (maxima.size() > kMost)
@@ -143,59 +157,29 @@ struct Fit
   double rms_px = 0;
 };
 
-/// Normal equations of one border in one view: residual [px] of its column against a peak.
-void accumulate(const PlaneView &view, const Vector3d &p, double q, double q_seen, double side, double px_per_q,
-                Matrix3d &H, Vector3d &g, double weight)
-{
-  const Vector2d w = p.head<2>() - view.position;
-  const double d = w.norm(), tangent = std::exp(p(2)) / std::sqrt(d * d - std::exp(2 * p(2)));
-  Vector3d J;
-  J.head<2>() = Vector2d(-w.y(), w.x()) / (d * d) - side * tangent / (d * d) * w;
-  J(2) = side * tangent;
-  J *= (1 + q * q) * px_per_q;
-  const double residual = (q - q_seen) * px_per_q;
-  H += weight * J * J.transpose();
-  g += weight * residual * J;
-}
-
 /// Least squares on the nearest peaks of the window, with the log-normal prior on the radius.
-Fit refine(const std::vector<PlaneView> &views, const PairHypothesis &pair, double range, double px_per_q,
+Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis &pair, double range, double px_per_q,
            const DetectorOptions &options)
 {
   Fit fit;
-  fit.p << views.back().position + range * pair.direction, std::log(pair.s * range);
+  const Vector2d direction = std::cos(pair.bearing) * now.forward + std::sin(pair.bearing) * now.left;
+  fit.p << now.position + range * direction, std::log(pair.s * range);
   constexpr int kIterations = 6;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
     const double gate_px = iteration < 2 ? 2 * options.inlier_px : options.inlier_px;
-    Matrix3d H = Matrix3d::Zero();
-    Vector3d g = Vector3d::Zero();
-    fit.views = fit.inliers = 0;
-    double squares = 0;
-    for (const PlaneView &view : views) {
-      const auto columns = bordersOf(view, fit.p.head<2>(), std::exp(fit.p(2)));
-      if (!columns || !view.profile->covers(columns->q_left) || !view.profile->covers(columns->q_right))
-        continue;
-      ++fit.views;
-      const double left = view.profile->nearestPeak(columns->q_left, pair.left.contrast);
-      const double right = view.profile->nearestPeak(columns->q_right, pair.right.contrast);
-      const double left_px = (columns->q_left - left) * px_per_q, right_px = (columns->q_right - right) * px_per_q;
-      const bool has_left = std::abs(left_px) < gate_px, has_right = std::abs(right_px) < gate_px; // false for NaN
-      if (has_left)
-        accumulate(view, fit.p, columns->q_left, left, 1, px_per_q, H, g, 1);
-      if (has_right)
-        accumulate(view, fit.p, columns->q_right, right, -1, px_per_q, H, g, 1);
-      if (has_left && has_right) {
-        ++fit.inliers;
-        squares += 0.5 * (left_px * left_px + right_px * right_px);
-      }
-    }
-    fit.rms_px = fit.inliers ? std::sqrt(squares / fit.inliers) : 1e9;
+    const Circle circle{fit.p.x(), fit.p.y(), std::exp(fit.p(2)), pair.left.contrast > 0, pair.right.contrast > 0};
+    const BorderSums sums = sumsOfBorders(views, circle, px_per_q, gate_px);
+    fit.views = static_cast<int>(sums.views);
+    fit.inliers = static_cast<int>(sums.inliers);
+    fit.rms_px = fit.inliers ? std::sqrt(sums.squares / fit.inliers) : 1e9;
+    Matrix3d H;
+    H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     fit.information = H;
     const bool is_hopeless = fit.inliers < kLeastViews || fit.inliers < 0.8 * options.inliers_min * fit.views;
     if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
-    const Vector3d step = H.ldlt().solve(-g);
+    const Vector3d step = -(H.inverse() * Vector3d::Map(sums.g));
     if (!step.allFinite())
       break;
     fit.p += step.cwiseMax(-0.5).cwiseMin(0.5);
@@ -239,10 +223,11 @@ std::vector<Detection> suppress(std::vector<Detection> found)
   return kept;
 }
 
-std::optional<Detection> verify(const std::vector<PlaneView> &views, const PairHypothesis &pair,
-                                const SweepResult &sweep, double px_per_q, const DetectorOptions &options)
+std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewColumns &columns,
+                                const PairHypothesis &pair, const SweepResult &sweep, double px_per_q,
+                                const DetectorOptions &options)
 {
-  const Fit fit = refine(views, pair, sweep.range, px_per_q, options);
+  const Fit fit = refine(views.back(), columns, pair, sweep.range, px_per_q, options);
   if (fit.inliers < kLeastViews || fit.inliers < options.inliers_min * fit.views || fit.rms_px > options.rms_max_px)
     return std::nullopt;
 
@@ -291,12 +276,16 @@ double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera
 {
   const BorderLine left = borderLine(camera, relative, Border::left, range, 0);
   const BorderLine right = borderLine(camera, relative, Border::right, range, 0);
-  double sum = 0;
+  double background = 0;
   int n = 0;
-  for (int v = std::max(left.row_begin, right.row_begin); v < std::min(left.row_end, right.row_end); ++v)
-    for (int u = static_cast<int>(std::ceil(left.xAt(v))); u <= right.xAt(v); ++u, ++n)
-      sum += 1 - static_cast<double>(p_background[v][u]);
-  return n >= 30 ? sum / n : -1;
+  for (int v = std::max(left.row_begin, right.row_begin); v < std::min(left.row_end, right.row_end); ++v) {
+    const int first = static_cast<int>(std::ceil(left.xAt(v))), last = static_cast<int>(std::floor(right.xAt(v)));
+    if (last < first)
+      continue;
+    background += static_cast<double>(sumOfRow(p_background[v] + first, last - first + 1));
+    n += last - first + 1;
+  }
+  return n >= 30 ? 1 - background / n : -1;
 }
 
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
@@ -314,19 +303,24 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
   }
 
   const auto &peaks = views.back().profile->peaks; // by rising q: from right to left
-  const std::vector<double> ranges = sweptRanges(options);
+  const ViewColumns columns = columnsOf(plane);
+  const std::vector<float> ranges = sweptRanges(options);
+  std::vector<float> scores;
   std::vector<RangeCurve> curves;
-  for (const ProfilePeak &peak : peaks)
+  std::vector<HalfBearing> bearings;
+  for (const ProfilePeak &peak : peaks) {
     curves.push_back(sweep(plane, peak, ranges));
+    bearings.emplace_back(peak.q);
+  }
   for (std::size_t i = 0; i < peaks.size(); ++i)
     for (std::size_t j = i + 1; j < peaks.size(); ++j) {
-      const PairHypothesis pair = makePair(plane.back(), peaks[j], peaks[i]);
+      const PairHypothesis pair(peaks[j], bearings[j], peaks[i], bearings[i]);
       if (pair.s * options.range_min > options.radius_max)
         break;
       if (pair.s * options.range_max < options.radius_min || inhibited(known, peaks[i].q, peaks[j].q))
         continue;
-      for (const SweepResult &at : focus(pair, curves[j], curves[i], ranges, options)) {
-        auto detection = verify(plane, pair, at, camera.fx, options);
+      for (const SweepResult &at : focus(pair, curves[j], curves[i], ranges, options, scores)) {
+        auto detection = verify(plane, columns, pair, at, camera.fx, options);
         if (!detection)
           continue;
         if (p_background)

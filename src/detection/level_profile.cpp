@@ -10,24 +10,6 @@ namespace bole
 {
 using Eigen::Vector3d;
 
-double LevelProfile::strongestNear(double q, double contrast) const
-{
-  const double x = (q - q_first) / step + 0.5;
-  if (!(x >= 0) || x >= static_cast<double>(mean.size()))
-    return 0;
-  const auto i = static_cast<std::size_t>(x);
-  return contrast > 0 ? rising[i] : falling[i];
-}
-
-double LevelProfile::nearestPeak(double q, double contrast) const
-{
-  const double x = (q - q_first) / step + 0.5;
-  if (!(x >= 0) || x >= static_cast<double>(mean.size()))
-    return std::numeric_limits<double>::quiet_NaN();
-  const auto i = static_cast<std::size_t>(x);
-  return static_cast<double>(contrast > 0 ? rising_peak[i] : falling_peak[i]);
-}
-
 namespace
 {
 /// Least part of the line inside the image, or of the image that it crosses: a shorter one says little.

@@ -35,10 +35,6 @@ struct LevelProfile
 
   double qLast() const { return q_first + step * static_cast<double>(mean.size() - 1); }
   bool covers(double q) const { return q >= q_first && q <= qLast(); }
-  /// The strongest value within a pixel of \p q with the sign of \p contrast; 0 outside.
-  double strongestNear(double q, double contrast) const;
-  /// q of the peak nearest to \p q with the sign of \p contrast; NaN where there is none or outside.
-  double nearestPeak(double q, double contrast) const;
 };
 
 struct ProfileOptions

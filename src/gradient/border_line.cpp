@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "gradient/border_line.h"
 
+#include "gradient/line_loops.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -99,50 +101,27 @@ Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const Re
   return J;
 }
 
+namespace
+{
+LineSamples samplesOf(const vpImage<float> &g, const BorderLine &line)
+{
+  return {g[line.row_begin], static_cast<int>(g.getCols()), line.rows(), line.x_top, line.slope};
+}
+} // namespace
+
 MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line)
 {
-  MeanGradient sum;
   const int rows = line.rows();
   if (rows == 0)
-    return sum;
-  const int cols = static_cast<int>(g.getCols());
-  const double step = rows > 1 ? 1.0 / (rows - 1) : 0;
-  for (int i = 0; i < rows; ++i) {
-    const double x = line.x_top + line.slope * i;
-    if (!(x >= 1 && x < cols - 2))
-      continue;
-    const int column = static_cast<int>(x);
-    const float *p = g[line.row_begin + i] + column - 1;
-    // Catmull-Rom: with linear interpolation the optimum of an upright line would snap to whole columns
-    const double t = x - column;
-    const double c1 = 0.5 * (p[2] - p[0]), c2 = p[0] - 2.5 * p[1] + 2 * p[2] - 0.5 * p[3];
-    const double c3 = 0.5 * (p[3] - p[0]) + 1.5 * (p[1] - p[2]);
-    const double slope = c1 + t * (2 * c2 + t * 3 * c3);
-    const double weight = i * step;
-    sum.mean += p[1] + t * (c1 + t * (c2 + t * c3));
-    sum.by_top += (1 - weight) * slope;
-    sum.by_bottom += weight * slope;
-  }
-  sum.mean /= rows;
-  sum.by_top /= rows;
-  sum.by_bottom /= rows;
-  return sum;
+    return {};
+  const CubicSums sums = cubicSumsAlong(samplesOf(g, line));
+  const double by_bottom = rows > 1 ? sums.slope_by_row / (rows - 1) : 0;
+  return {sums.value / rows, (sums.slope - by_bottom) / rows, by_bottom / rows};
 }
 
 double meanAlongOnly(const vpImage<float> &g, const BorderLine &line)
 {
-  const int rows = line.rows();
-  const int cols = static_cast<int>(g.getCols());
-  double sum = 0;
-  for (int i = 0; i < rows; ++i) {
-    const double x = line.x_top + line.slope * i;
-    if (!(x >= 0 && x < cols - 1))
-      continue;
-    const int column = static_cast<int>(x);
-    const float *pixel = g[line.row_begin + i] + column;
-    sum += pixel[0] + (x - column) * (pixel[1] - pixel[0]);
-  }
-  return rows ? sum / rows : 0;
+  return line.rows() > 0 ? linearSumAlong(samplesOf(g, line)) / line.rows() : 0;
 }
 
 double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sign)

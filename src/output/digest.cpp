@@ -45,7 +45,7 @@ private:
 bool addFile(Sha256 &hash, const fs::path &path, std::uint64_t &bytes, const std::atomic<bool> &is_cancelled)
 {
   std::ifstream file(path, std::ios::binary);
-  std::vector<char> block(1 << 20);
+  std::vector<char> block(1 << 16);
   while (file && !is_cancelled) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     const auto count = static_cast<std::size_t>(file.gcount());

@@ -20,20 +20,22 @@ std::vector<double> totals(const std::vector<FrameTiming> &frames)
     values.push_back(frame.total_ms);
   return values;
 }
+
+std::vector<double> ofStage(const std::vector<FrameTiming> &frames, std::size_t stage)
+{
+  std::vector<double> values;
+  for (const FrameTiming &frame : frames)
+    if (stage < frame.stages_ms.size())
+      values.push_back(frame.stages_ms[stage]);
+  return values;
+}
 } // namespace
 
 double TimingTable::medianTotal_ms() const { return quantileOf(totals(frames), 0.5); }
 
 double TimingTable::percentile95_ms() const { return quantileOf(totals(frames), 0.95); }
 
-double TimingTable::medianStage_ms(std::size_t stage) const
-{
-  std::vector<double> values;
-  for (const FrameTiming &frame : frames)
-    if (stage < frame.stages_ms.size())
-      values.push_back(frame.stages_ms[stage]);
-  return quantileOf(std::move(values), 0.5);
-}
+double TimingTable::medianStage_ms(std::size_t stage) const { return quantileOf(ofStage(frames, stage), 0.5); }
 
 std::optional<double> TimingTable::age_ms(double part) const
 {
@@ -42,6 +44,21 @@ std::optional<double> TimingTable::age_ms(double part) const
     if (frame.age_ms)
       values.push_back(*frame.age_ms);
   return values.empty() ? std::nullopt : std::optional<double>(quantileOf(std::move(values), part));
+}
+
+std::string toText(const TimingTable &timing)
+{
+  std::string text = fmt::format("{:<12}{:>10}{:>10}{:>10}{:>10}\n", "[ms]", "median", "p95", "p99", "most");
+  const auto add = [&text](const std::string &name, const std::vector<double> &values) {
+    text += fmt::format("{:<12}", name);
+    for (const double part : {0.5, 0.95, 0.99, 1.0})
+      text += fmt::format("{:>10.3f}", quantileOf(values, part));
+    text += '\n';
+  };
+  for (std::size_t i = 0; i < timing.stages.size(); ++i)
+    add(timing.stages[i], ofStage(timing.frames, i));
+  add("total", totals(timing.frames));
+  return text;
 }
 
 void writeTiming(const std::string &path, const TimingTable &timing)

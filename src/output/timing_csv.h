@@ -35,6 +35,9 @@ struct TimingTable
   std::optional<double> age_ms(double quantile) const;
 };
 
+/// A line a stage, and one for the whole frame: median, 95th and 99th percentile, most.
+std::string toText(const TimingTable &timing);
+
 /// Header "frame,timestamp [s],<stage> [ms],...,total [ms]", and "age [ms]" for a live run; one line
 /// a frame, atomically.
 void writeTiming(const std::string &path, const TimingTable &timing);

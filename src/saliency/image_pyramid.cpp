@@ -11,7 +11,8 @@ constexpr unsigned kMinSize = 16;
 
 vpImage<float> toFloat(const vpImage<unsigned char> &image)
 {
-  vpImage<float> result(image.getHeight(), image.getWidth());
+  vpImage<float> result; // resize() leaves it as it is, the constructor would fill it
+  result.resize(image.getHeight(), image.getWidth());
   for (unsigned i = 0; i < image.getSize(); ++i)
     result.bitmap[i] = image.bitmap[i] * (1.f / 255.f);
   return result;
@@ -19,7 +20,8 @@ vpImage<float> toFloat(const vpImage<unsigned char> &image)
 
 vpImage<float> halved(const vpImage<float> &image)
 {
-  vpImage<float> result(image.getHeight() / 2, image.getWidth() / 2);
+  vpImage<float> result;
+  result.resize(image.getHeight() / 2, image.getWidth() / 2);
   for (unsigned i = 0; i < result.getHeight(); ++i) {
     const float *upper = image[2 * i], *lower = image[2 * i + 1];
     float *out = result[i];

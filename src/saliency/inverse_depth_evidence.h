@@ -50,20 +50,19 @@ public:
   const std::vector<float> &inverseDepths() const { return m_rho; }
 
 private:
-  void squaredResiduals(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc);
-  void averageOverWindow();
+  void compare(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc);
   void addLikelihood(const PyramidLevel &current, const Pose &oMc, const MotionNoise &noise);
 
   PinholeCamera m_camera;
   SaliencyOptions m_options;
   double m_intensity_variance;
-  int m_count, m_rows, m_window_rows;
+  int m_rows, m_window_rows;
   std::size_t m_first_near = 0; ///< first step nearer than near_range
   float m_prior_log_odds;
   std::vector<float> m_rho;       ///< [1/m], rising from 0
   std::vector<float> m_log_prior; ///< of each step
-  std::vector<float> m_evidence;  ///< row by row, pixel by pixel, m_count steps each
-  std::vector<float> m_scratch, m_residuals;
+  std::vector<float> m_evidence;  ///< row by row, pixel by pixel, all steps of each
+  std::vector<float> m_scratch, m_residuals, m_line, m_squares; ///< kept for their memory
 };
 
 /// Median flow [px of \p camera] of points at \p range under the translation of \p oMc.

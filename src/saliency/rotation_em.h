@@ -43,11 +43,13 @@ struct RotationEm
   double texture = 0;     ///< share of the pixels of the finest level whose gradient tells them apart
   bool converged = false; ///< the last step was under 1e-4 rad
   /// log p(background) - log p(foreground) without the prior of the labels, at the finest level worked on.
+  /// Empty where nobody asked for labels.
   vpImage<float> log_ratio;
 };
 
 /// \param prior the gyro's rotation; without it the search starts from \p start with wide labels.
+/// \param with_labels one more pass makes the log ratios.
 RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &current,
                             const std::optional<RotationPrior> &prior, const Eigen::Matrix3d &start,
-                            const SaliencyOptions &options);
+                            const SaliencyOptions &options, bool with_labels = true);
 } // namespace bole

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/saliency.h"
 #include "geometry/so3.h"
+#include "saliency/label_loops.h"
 
 #include <algorithm>
 #include <cmath>
@@ -39,31 +40,15 @@ PinholeCamera workingCamera(const PinholeCamera &camera, int level)
   return result;
 }
 
-/// \p small at the size of the full image, bilinear; pixel centres respected.
-vpImage<float> enlarged(const vpImage<float> &small, int level, const PinholeCamera &camera, int row_step = 1)
+/// Where the pixels of a line of \p size lie in one of \p small_size, 1 / \p scale times smaller; pixel centres
+/// respected.
+ColumnsBetween between(int size, int small_size, float scale, int step)
 {
-  if (level == 0 && row_step == 1)
-    return small;
-  vpImage<float> result(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width));
-  const float scale = std::ldexp(1.f, -level);
-  const int rows = static_cast<int>(small.getHeight()), columns = static_cast<int>(small.getWidth());
-  std::vector<int> column(static_cast<std::size_t>(camera.width));
-  std::vector<float> share(column.size());
-  for (int j = 0; j < camera.width; ++j) {
-    const float x = std::clamp((j + 0.5f) * scale - 0.5f, 0.f, columns - 1.001f);
-    column[static_cast<std::size_t>(j)] = static_cast<int>(x);
-    share[static_cast<std::size_t>(j)] = x - std::floor(x);
-  }
-  for (int i = 0; i < camera.height; ++i) {
-    const float y = std::clamp(((i + 0.5f) * scale - 0.5f) / row_step, 0.f, rows - 1.001f);
-    const int row = static_cast<int>(y);
-    const float b = y - row, *p = small[row], *q = small[row + 1];
-    float *out = result[i];
-    for (std::size_t j = 0; j < column.size(); ++j) {
-      const int c = column[j];
-      const float upper = p[c] + share[j] * (p[c + 1] - p[c]), lower = q[c] + share[j] * (q[c + 1] - q[c]);
-      out[j] = upper + b * (lower - upper);
-    }
+  ColumnsBetween result;
+  for (int j = 0; j < size; ++j) {
+    const float x = std::clamp(((j + 0.5f) * scale - 0.5f) / step, 0.f, small_size - 1.f);
+    result.left.push_back(std::min(static_cast<int>(x), small_size - 2));
+    result.share.push_back(x - result.left.back());
   }
   return result;
 }
@@ -152,12 +137,11 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   if (m_views.empty()) {
     vpImage<float> none(static_cast<unsigned>(m_camera.height), static_cast<unsigned>(m_camera.width));
     none = m_evidence.priorLogOdds();
-    result.confidence = none;
-    fill(none, m_evidence.priorLogOdds(), result);
+    fill(none, 0, 1, m_evidence.priorLogOdds(), result);
   }
   else {
     const RotationEm rotation = refineRotation(view.pyramid, result);
-    if (m_options.use_translation && m_translation) {
+    if (asksForRange()) {
       view.vMc = m_views.front().vMc * Pose(result.pRc, m_translation->pt);
       m_views.push_front(std::move(view));
       labelByRange(m_views.front().pyramid, result);
@@ -215,7 +199,8 @@ void SaliencyEstimator::addMotion(const std::optional<RotationPrior> &gyro,
 
 RotationEm SaliencyEstimator::refineRotation(const ImagePyramid &current, Saliency &result) const
 {
-  const RotationEm rotation = estimateRotation(m_views.front().pyramid, current, m_gyro, m_last_turn, m_options);
+  const RotationEm rotation =
+      estimateRotation(m_views.front().pyramid, current, m_gyro, m_last_turn, m_options, !asksForRange());
   const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
   result.iterations = rotation.iterations;
   result.pRc = rotation.pRc;
@@ -250,32 +235,35 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
     break;
   }
   result.asks_for_range = true;
-  constexpr int step = InverseDepthEvidence::kRowStep;
-  fill(enlarged(m_evidence.logOddsNear(), level, m_camera, step), m_evidence.priorLogOdds(), result);
+  fill(m_evidence.logOddsNear(), level, InverseDepthEvidence::kRowStep, m_evidence.priorLogOdds(), result);
 }
 
 void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &result) const
 {
   const double prior = m_options.background_prior;
   const float prior_log_odds = static_cast<float>(std::log((1 - prior) / prior));
-  const vpImage<float> ratio = windowMean(rotation.log_ratio, m_options.label_window_px);
-  vpImage<float> log_odds = enlarged(ratio, workingLevel(m_camera, m_options), m_camera);
+  vpImage<float> log_odds = windowMean(rotation.log_ratio, m_options.label_window_px);
   for (unsigned p = 0; p < log_odds.getSize(); ++p)
     log_odds.bitmap[p] = prior_log_odds - log_odds.bitmap[p];
-  fill(log_odds, prior_log_odds, result);
+  fill(log_odds, workingLevel(m_camera, m_options), 1, prior_log_odds, result);
 }
 
-void SaliencyEstimator::fill(const vpImage<float> &log_odds_near, float prior_log_odds, Saliency &result) const
+/// \p log_odds_near: of each \p row_step-th row of \p level.
+void SaliencyEstimator::fill(const vpImage<float> &log_odds_near, int level, int row_step, float prior_log_odds,
+                             Saliency &result) const
 {
-  result.p_background.resize(log_odds_near.getHeight(), log_odds_near.getWidth());
-  result.confidence.resize(log_odds_near.getHeight(), log_odds_near.getWidth());
-  unsigned unknown = 0;
-  for (unsigned p = 0; p < log_odds_near.getSize(); ++p) {
-    const float odds = log_odds_near.bitmap[p];
-    result.p_background.bitmap[p] = 1.f / (1.f + std::exp(std::clamp(odds, -80.f, 80.f)));
-    result.confidence.bitmap[p] = std::abs(odds - prior_log_odds);
-    unknown += result.confidence.bitmap[p] < result.unknown_below;
+  const unsigned height = static_cast<unsigned>(m_camera.height), width = static_cast<unsigned>(m_camera.width);
+  result.p_background.resize(height, width);
+  result.confidence.resize(height, width);
+  const float scale = std::ldexp(1.f, -level);
+  const ColumnsBetween columns = between(m_camera.width, static_cast<int>(log_odds_near.getWidth()), scale, 1);
+  const ColumnsBetween rows = between(m_camera.height, static_cast<int>(log_odds_near.getHeight()), scale, row_step);
+  int unknown = 0;
+  for (unsigned i = 0; i < height; ++i) {
+    const int above = rows.left[i];
+    unknown += labelsOfRow(log_odds_near[above], log_odds_near[above + 1], rows.share[i], columns, prior_log_odds,
+                           result.unknown_below, result.p_background[i], result.confidence[i]);
   }
-  result.unknown_share = static_cast<double>(unknown) / std::max(1u, log_odds_near.getSize());
+  result.unknown_share = static_cast<double>(unknown) / std::max(1u, height * width);
 }
 } // namespace bole

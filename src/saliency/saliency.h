@@ -83,11 +83,12 @@ private:
     Pose vMc; ///< camera in the frame of the first view kept
   };
   bool isStale(const vpImage<unsigned char> &image) const;
+  bool asksForRange() const { return m_options.use_translation && m_translation; }
   void addMotion(const std::optional<RotationPrior> &gyro, const std::optional<TranslationPrior> &translation);
   RotationEm refineRotation(const ImagePyramid &current, Saliency &result) const;
   void labelByRange(const ImagePyramid &current, Saliency &result);
   void labelByMotion(const RotationEm &rotation, Saliency &result) const;
-  void fill(const vpImage<float> &log_odds_near, float prior_log_odds, Saliency &result) const;
+  void fill(const vpImage<float> &log_odds_near, int level, int row_step, float prior_log_odds, Saliency &result) const;
 
   PinholeCamera m_camera;
   SaliencyOptions m_options;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/border_profile.h"
 
+#include "tracking/profile_loops.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -95,13 +97,20 @@ void addAcross(const vpImage<unsigned char> &image, const ImageBorder &border, i
 
 std::vector<float> meanAcross(const vpImage<float> &g, const BorderLine &line, double half_px)
 {
+  constexpr int kTogether = 8; // offsets that are worked on at once
   const int steps = int(std::ceil(half_px / kStep_px)), half = (steps + 1) / 2, n = 2 * half + 1;
-  std::vector<float> whole(std::size_t(n), 0.f), between(std::size_t(n), 0.f), mean;
+  const int padded = (n + kTogether - 1) / kTogether * kTogether, columns = int(g.getCols());
+  std::vector<float> whole(std::size_t(padded), 0.f), between(std::size_t(padded), 0.f), mean;
   for (int i = 0; i < line.rows(); ++i) {
     const float *row = g[line.row_begin + i];
-    const double x = line.x_top + line.slope * i;
-    addPixels(row, int(g.getCols()), x, half, whole.data());
-    addPixels(row, int(g.getCols()), x + kStep_px, half, between.data());
+    const double x = line.x_top + line.slope * i, left = std::floor(x);
+    const int first = int(left) - half;
+    if (first >= 0 && first + padded + 2 < columns) {
+      addAcrossRow(row + first, padded, float(x - left), whole.data(), between.data());
+      continue;
+    }
+    addPixels(row, columns, x, half, whole.data());
+    addPixels(row, columns, x + kStep_px, half, between.data());
   }
   const float scale = line.rows() > 0 ? 1 / float(line.rows()) : 0;
   mean.reserve(std::size_t(2 * steps + 1));

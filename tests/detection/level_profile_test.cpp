@@ -79,15 +79,15 @@ TEST(LevelProfile, SortsItsPeaksFromRightToLeft)
     EXPECT_LT(profile.peaks[i - 1].q, profile.peaks[i].q);
 }
 
-TEST(LevelProfile, StrongestNearKeepsTheSign)
+TEST(LevelProfile, KeepsRisingAndFallingBordersApart)
 {
   const DrawnTrunk trunk{4, 0.3, 0.2, 40};
   const Pose wMc = lookingAhead(0, 0);
   const LevelProfile profile = profileOf({trunk}, wMc);
   const double q = borderColumn(trunk, wMc, true);
-  EXPECT_LT(profile.strongestNear(q, -1), -0.1);
-  EXPECT_LT(profile.strongestNear(q, 1), 0.01);
-  EXPECT_EQ(profile.strongestNear(10, 1), 0);
+  const auto sample = static_cast<std::size_t>((q - profile.q_first) / profile.step + 0.5);
+  EXPECT_LT(profile.falling[sample], -0.1);
+  EXPECT_LT(profile.rising[sample], 0.01);
   EXPECT_TRUE(profile.covers(q));
   EXPECT_FALSE(profile.covers(10));
 }

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+// Private to the stage: sums of a gradient image along a line, a sample a row.
+
+#include <cstddef>
+
+namespace bole
+{
+/// Samples at x = x_top + slope i of the rows i of \p pixels, which are \p columns wide.
+struct LineSamples
+{
+  const float *pixels;
+  int columns, rows;
+  double x_top, slope;
+};
+
+/// Sum of the samples, cubic between columns (Catmull and Rom: with linear interpolation the optimum of an upright line
+/// would snap to whole columns), and of their slopes, plain and times the row.
+struct CubicSums
+{
+  double value = 0, slope = 0, slope_by_row = 0;
+};
+CubicSums cubicSumsAlong(const LineSamples &line);
+
+/// Sum of the samples, linear between columns.
+double linearSumAlong(const LineSamples &line);
+} // namespace bole
