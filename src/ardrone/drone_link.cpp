@@ -39,8 +39,8 @@ struct DroneLink::State
   NavdataOdometry odometry;
   std::optional<std::int64_t> last_given_stamp_ns;
 
-  std::unique_ptr<VideoReceiver> video; // last: their threads end before the rest goes
-  std::unique_ptr<NavdataReceiver> navdata;
+  std::unique_ptr<VideoReceiver> video_receiver; // last: their threads end before the rest goes
+  std::unique_ptr<NavdataReceiver> navdata_receiver;
 
   void start(const LinkTap &tap)
   {
@@ -58,8 +58,9 @@ struct DroneLink::State
     of_navdata.packet = [this](const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns) {
       return takeNavdata(data, size, arrival_ns);
     };
-    video = std::make_unique<VideoReceiver>(address, options, std::move(of_video));
-    navdata = std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
+    video_receiver = std::make_unique<VideoReceiver>(address, options, std::move(of_video));
+    navdata_receiver =
+        std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
   }
 
   void publish(DecodedFrame &&decoded, const DroneVideoDecoder::Counters &counted, std::int64_t arrival_ns)
@@ -239,7 +240,7 @@ std::optional<BodyState> DroneLink::body() const
   return m_state->odometry.newest();
 }
 
-int DroneLink::generation() const { return m_state->video->generation(); }
+int DroneLink::generation() const { return m_state->video_receiver->generation(); }
 LinkCounters DroneLink::counters() const
 {
   const std::lock_guard<std::mutex> lock(m_state->mutex);

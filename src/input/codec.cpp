@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/codec.h"
+#include "input/libav.h"
 
 #include <algorithm>
 #include <array>
@@ -152,7 +153,7 @@ PictureEncoder::PictureEncoder(const Settings &settings) : m_frame(av_frame_allo
     av_opt_set(context.priv_data, "crf", std::to_string(settings.quality).c_str(), 0);
   if (settings.is_live) {
     context.max_b_frames = 0;
-    context.profile = FF_PROFILE_H264_BASELINE;
+    context.profile = libav::kBaseline;
     av_opt_set(context.priv_data, "tune", "zerolatency", 0);
     av_opt_set(context.priv_data, "profile", "baseline", 0);
   }

@@ -12,6 +12,12 @@ extern "C" {
 
 namespace bole::libav
 {
+#ifdef AV_PROFILE_H264_BASELINE // since 6.1; the other name is gone since 9
+constexpr int kBaseline = AV_PROFILE_H264_BASELINE;
+#else
+constexpr int kBaseline = FF_PROFILE_H264_BASELINE;
+#endif
+
 /// The matrix that brings the pictures of \p stream upright, as av_display_rotation_get() takes it; nullptr for none.
 inline const std::uint8_t *displayMatrix(const AVStream &stream)
 {

@@ -233,13 +233,12 @@ void SensorMonitor::checkRotations()
   if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
     return;
   const auto first = m_comparisons.end() - std::min<std::ptrdiff_t>(window, std::ptrdiff_t(m_comparisons.size()));
-  int gyro_points = 0, gyro_odometry = 0, odometry_points = 0, with_odometry = 0;
+  int gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
   double since_s = inSeconds(m_comparisons.back().a_ns);
   for (auto c = first; c != m_comparisons.end(); ++c) {
     gyro_points += c->gyro_points > m_options.limit_points;
     gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
     odometry_points += c->odometry_points > m_options.limit_odometry;
-    with_odometry += c->odometry.has_value();
     if (c->gyro_points > m_options.limit_points || c->odometry_points > m_options.limit_odometry)
       since_s = std::min(since_s, inSeconds(c->a_ns));
   }
