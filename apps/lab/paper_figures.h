@@ -6,7 +6,7 @@
 #include "input/truth.h"
 #include <bole/camera.h>
 #include <bole/report.h>
-#include <bole/trajectory.h>
+#include <bole/pose.h>
 
 #include <string>
 #include <vector>

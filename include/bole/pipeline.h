@@ -26,7 +26,7 @@
 #include <bole/graph.h>
 #include <bole/options.h>
 #include <bole/report.h>
-#include <bole/trajectory.h>
+#include <bole/pose.h>
 
 #include <memory>
 #include <vector>

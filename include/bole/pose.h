@@ -6,6 +6,8 @@
 #include <Eigen/Core>
 
 #include <bole/visp.h>
+#include <cstdint>
+#include <vector>
 #include <visp3/core/vpHomogeneousMatrix.h>
 
 namespace bole
@@ -53,4 +55,14 @@ struct Pose
 /// Adjoint of \p aMb in the order (rho, phi): aMb * x.plus(xi) == (aMb * x * ...) with
 /// Exp(Ad(aMb) xi) * aMb == aMb * Exp(xi) to first order. Carries a covariance of b's tangent to a's.
 Matrix6d adjoint(const Pose &aMb);
+
+/// A pose and its time.
+struct StampedPose
+{
+  std::int64_t stamp_ns = 0; ///< of the frame
+  Pose wMb;                  ///< world from body
+};
+
+/// Poses of the body in the world with strictly rising stamps.
+using Trajectory = std::vector<StampedPose>;
 } // namespace bole

@@ -3,7 +3,7 @@
 /// \file
 /// The files that trajectories come in, and poses between those of a trajectory.
 
-#include <bole/trajectory.h>
+#include <bole/pose.h>
 
 #include <cstdint>
 #include <optional>

@@ -15,7 +15,7 @@
 #include "pipeline/adoption.h"
 #include "saliency/rotation_em.h"
 #include <bole/report.h>
-#include <bole/trajectory.h>
+#include <bole/pose.h>
 
 namespace bole
 {
