@@ -29,6 +29,7 @@ void addCommands(CLI::App &app)
   addReport(app);
   addExport(app);
   addOptions(app);
+  addLocalise(app);
   addRecord(app);
   addGraph(app);
   addSolve(app);
