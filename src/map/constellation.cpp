@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "map/constellation.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Dense>
 
 namespace bole
 {

@@ -13,6 +13,8 @@
 
 #include <bole/trunk_record.h>
 
+#include <Eigen/Geometry>
+
 #include <optional>
 #include <utility>
 #include <vector>

@@ -65,8 +65,6 @@ TEST(StageOptions, ThePaperPresetHasTheSaliencyAsPrinted)
   EXPECT_TRUE(paper.gradient.split);
   EXPECT_FALSE(paper.lines.either_polarity);
   EXPECT_FALSE(paper.flow.use_points);
-  EXPECT_TRUE(paper.flow.detect_lines);
-  EXPECT_FALSE(paper.flow.detect_window);
   EXPECT_EQ(paper.smoothing.prior_lean_sigma, 1e-4);
 }
 
