@@ -37,6 +37,7 @@ void addCommands(CLI::App &app)
   addReplay(app);
   addEmulate(app);
   addCalibrateSaliency(app);
+  addFitOdds(app);
   addShowSaliency(app);
 #endif
   addDocumentation(app, "bole " BOLE_VERSION);

@@ -8,6 +8,7 @@
 #include "track_output.h"
 
 #include "output/progress.h"
+#include "pipeline/stage_options.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>
 #include <bole/open_source.h>
@@ -30,7 +31,8 @@ struct TrackArguments
   std::string input, run, config;
   std::vector<std::string> settings;
   SourceOptions source;
-  bool is_shown = false, has_video = true, is_quiet = false, is_without_odometry = false, is_without_gyro = false;
+  bool is_shown = false, has_video = true, is_quiet = false, is_without_odometry = false, is_without_gyro = false,
+       is_online = false;
   std::size_t frames_most = 0;
   double give_up_s = ArDroneSource::Options().give_up_s;
   double camera_height = 0;
@@ -197,7 +199,9 @@ void track(const TrackArguments &arguments)
   if (!made.note.empty() && !arguments.is_quiet)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
 
-  Pipeline pipeline(source->camera(), source->bMc(), options);
+  StageOptions stages = stageOptions(options, source->camera());
+  stages.flow.final_pass = live == nullptr && !arguments.is_online;
+  Pipeline pipeline(source->camera(), source->bMc(), stages);
   TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
@@ -265,6 +269,9 @@ void addTrack(CLI::App &app)
   command->add_option("--give-up", arguments->give_up_s, "Silence of a live drone that ends its flight [s]")
       ->capture_default_str()
       ->check(within(0.1, 86400));
+  command->add_flag("--online", arguments->is_online,
+                    "Decide the map by what is known while it flies, as a live drone does; else all frames of a file "
+                    "are asked once more at the end");
   command->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
   command->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors; the exit status tells how it went");

@@ -41,6 +41,7 @@ struct FlowOptions
   bool use_points = true;       ///< relative poses from point features
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
   bool detect_lines = false;    ///< the one-frame detector too; always on where no odometry gives a range
+  bool final_pass = false;      ///< keep the frames, and decide the map once more by all of them at the end
   bool detect_window = true;    ///< the detector that asks a window of frames
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
   int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
