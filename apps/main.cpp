@@ -41,6 +41,7 @@ void addCommands(CLI::App &app)
   addReplay(app);
   addEmulate(app);
   addCalibrateSaliency(app);
+  addFitOdds(app);
   addShowSaliency(app);
   addReproduce(app);
 #endif
