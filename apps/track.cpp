@@ -204,7 +204,7 @@ void track(const TrackArguments &arguments)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
 
   StageOptions stages = stageOptions(options, source->camera());
-  stages.flow.final_pass = live == nullptr && !arguments.is_online;
+  stages.flow.final_pass = live == nullptr && !arguments.is_online && !stages.flow.as_paper;
   Pipeline pipeline(source->camera(), source->bMc(), stages);
   TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown);
   OverlayWindow window(arguments.is_shown, "bole track");
