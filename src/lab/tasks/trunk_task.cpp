@@ -13,6 +13,17 @@ namespace
 {
 constexpr double kSidestep_s =
     9; ///< one sidestep to and fro before a trunk is chosen, another before doubtful ones are
+constexpr double kChoiceAngle = 0.35;    ///< trunks farther from straight ahead are not chosen [rad]
+constexpr double kChoiceRange = 7;       ///< nor those beyond this [m]
+constexpr double kChoiceEvidence = 2;    ///< nor, at first, those of lower log odds to be one
+constexpr int kChoiceViews = 25;         ///< a trunk seen less often is not chosen yet: what is none is given up sooner
+constexpr double kBearingNoise = 0.0015; ///< of a tracked trunk in one image [rad]: a third of a pixel
+constexpr double kRatioNoise = 0.025;    ///< of its log r/d: half a pixel on a width of 20
+constexpr double kUnrest =
+    0.15;                     ///< how fast the velocity that nobody ordered changes [m/s per root of a second]: gusts
+constexpr double kSway = 0.8; ///< largest speed of swaying, where a distance is asked for [m/s]
+constexpr double kSwayClimb = 0.4;       ///< largest rate of climb meanwhile [m/s]
+constexpr double kSwayPeriod_s = 6;      ///< 0.76 m to either side: 15 degrees of parallax at 3 m
 constexpr double kPause_s = 0.25;        ///< without a command it hovered: what was sent before is over
 constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
@@ -33,18 +44,8 @@ void TrunkTaskOptions::validate() const
   requireRange("bearing", bearing, -0.5, 0.5);
   requireRange("speed", speed, -2, 2);
   requireRange("gain", gain, 0.05, 3);
-  requireRange("bearing_noise", bearing_noise, 1e-5, 0.1);
-  requireRange("ratio_noise", ratio_noise, 1e-5, 0.5);
-  requireRange("unrest", unrest, 1e-3, 2);
   requireRange("largest_speed", largest_speed, 0.05, 3);
-  requireRange("sway", sway, 0, 2);
-  requireRange("sway_climb", sway_climb, 0, 1);
-  requireRange("sway_period", sway_period, 1, 60);
   requireRange("free_way", free_way, 0, 5);
-  requireRange("choice_evidence", choice_evidence, -20, 20);
-  requireRange("choice_angle", choice_angle, 0.02, 0.6);
-  requireRange("choice_range", choice_range, 1, 20);
-  requireRange("choice_views", choice_views, 1, 1000);
   requireRange("search_s", search_s, 1, 600);
   response.validate();
   safety.validate();
@@ -88,20 +89,20 @@ bool TrunkTask::sees(const FrameReport &report) const
 int TrunkTask::choose(const FrameReport &report, double elapsed_s) const
 {
   const KnownTrunk *nearest = nullptr, *surest = nullptr;
-  double least_range = m_options.choice_range;
+  double least_range = kChoiceRange;
   const double heading = yawOf(m_sidestep.start());
   for (const KnownTrunk &trunk : report.map) {
-    if (trunk.status != TrunkStatus::confirmed || trunk.observations < m_options.choice_views)
+    if (trunk.status != TrunkStatus::confirmed || trunk.observations < kChoiceViews)
       continue;
     const Pose &start = m_sidestep.start();
     const Eigen::Vector2d w = trunk.trunk.axisAt(start.t.z()).head<2>() - start.t.head<2>();
     const double angle = std::remainder(std::atan2(w.y(), w.x()) - heading, 2 * M_PI), range = w.norm();
-    if (std::abs(angle) > m_options.choice_angle || range > m_options.choice_range)
+    if (std::abs(angle) > kChoiceAngle || range > kChoiceRange)
       continue;
     const double evidence = trunk.log_odds;
     if (!surest || evidence > surest->log_odds)
       surest = &trunk;
-    if (evidence >= m_options.choice_evidence && range < least_range) {
+    if (evidence >= kChoiceEvidence && range < least_range) {
       nearest = &trunk;
       least_range = range;
     }
@@ -198,7 +199,7 @@ TaskCommand TrunkTask::act(const FrameReport &report)
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
   const double sway = swayNow(time_s);
-  const double wanted = m_turned_back * m_options.speed + m_options.sway * sway;
+  const double wanted = m_turned_back * m_options.speed + kSway * sway;
   const bool is_free = isFree(trunk->id, obstacles(report, kWayRange, 1), report.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
   if (m_blocked > kPatience) {
@@ -207,7 +208,7 @@ TaskCommand TrunkTask::act(const FrameReport &report)
   }
   const double round = is_free ? wanted : 0;
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
-  command.velocity.z() = m_options.sway_climb * sway;
+  command.velocity.z() = kSwayClimb * sway;
   if (sway != 0)
     command.reason = "holds, swaying";
   else if (m_options.speed != 0)
@@ -222,7 +223,7 @@ double TrunkTask::swayNow(double time_s)
     return 0;
   if (m_sway_start_s < 0)
     m_sway_start_s = time_s;
-  return std::cos(2 * M_PI * (time_s - m_sway_start_s) / m_options.sway_period);
+  return std::cos(2 * M_PI * (time_s - m_sway_start_s) / kSwayPeriod_s);
 }
 
 /// Sent anew where it was cut: of two sent at one time the later counts.
@@ -264,14 +265,14 @@ void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
   const Eigen::Vector4d path = m_response.advance(time_s);
   if (m_has_feature) {
     const Eigen::Vector2d moved = interactionOf(feature) * path;
-    m_bearing.predict(moved(0), dt, m_options.unrest / d);
-    m_log_ratio.predict(moved(1), dt, m_options.unrest / d);
-    m_bearing.correct(feature.bearing(), m_options.bearing_noise);
-    m_log_ratio.correct(feature.logRatio(), m_options.ratio_noise);
+    m_bearing.predict(moved(0), dt, kUnrest / d);
+    m_log_ratio.predict(moved(1), dt, kUnrest / d);
+    m_bearing.correct(feature.bearing(), kBearingNoise);
+    m_log_ratio.correct(feature.logRatio(), kRatioNoise);
   }
   else {
-    m_bearing.start(feature.bearing(), m_options.bearing_noise, kFirstDrift / d);
-    m_log_ratio.start(feature.logRatio(), m_options.ratio_noise, kFirstDrift / d);
+    m_bearing.start(feature.bearing(), kBearingNoise, kFirstDrift / d);
+    m_log_ratio.start(feature.logRatio(), kRatioNoise, kFirstDrift / d);
   }
   m_has_feature = true;
   m_time_s = time_s;

@@ -34,23 +34,13 @@ namespace bole
 {
 struct TrunkTaskOptions
 {
-  double ratio = 0;              ///< r/d to be kept, 0 (by distance) to 0.5
-  double distance = 3;           ///< camera to axis, where no ratio is given [m], 0.5 to 20
-  double bearing = 0;            ///< to be kept, positive right [rad], -0.5 to 0.5
-  double speed = 0;              ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
-  double gain = 2;               ///< of vpServo [1/s], 0.05 to 3
-  double bearing_noise = 0.0015; ///< of a tracked trunk in one image [rad], 1e-5 to 0.1
-  double ratio_noise = 0.025;    ///< of its log r/d, 1e-5 to 0.5
-  double unrest = 0.15; ///< how fast the velocity that nobody ordered changes [m/s per root of a second], 1e-3 to 2
+  double ratio = 0;           ///< r/d to be kept, 0 (by distance) to 0.5
+  double distance = 3;        ///< camera to axis, where no ratio is given [m], 0.5 to 20
+  double bearing = 0;         ///< to be kept, positive right [rad], -0.5 to 0.5
+  double speed = 0;           ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
+  double gain = 2;            ///< of vpServo [1/s], 0.05 to 3
   double largest_speed = 0.9; ///< [m/s], 0.05 to 3
-  double sway = 0.8;          ///< largest speed of swaying, where a distance is asked for [m/s], 0 to 2
-  double sway_climb = 0.4;    ///< largest rate of climb meanwhile [m/s], 0 to 1
-  double sway_period = 6;     ///< [s], 1 to 60
   double free_way = 0.5;      ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
-  double choice_angle = 0.35; ///< trunks farther from straight ahead are not chosen [rad], 0.02 to 0.6
-  double choice_range = 7;    ///< nor those beyond this [m], 1 to 20
-  double choice_evidence = 2; ///< nor, at first, those of lower log odds to be one (TrunkMap::evidence), -20 to 20
-  int choice_views = 25;      ///< a trunk seen less often is not chosen yet: what is none is given up sooner, 1 to 1000
   double search_s = 40;       ///< gives up after [s], 1 to 600
   ResponseOptions response;
   SafetyOptions safety;

@@ -13,10 +13,11 @@ namespace bole
 {
 namespace
 {
-constexpr double kGrid = 0.2;       ///< [m]
-constexpr double kBehind = 1;       ///< as far the field reaches behind the drone [m]
-constexpr double kNearSight = 3;    ///< what is farther will be seen before it is reached [m]
-constexpr double kCreep = 0.02;     ///< where the hull would touch: only who stands there leaves [m/s]
+constexpr double kGrid = 0.2;    ///< [m]
+constexpr double kBehind = 1;    ///< as far the field reaches behind the drone [m]
+constexpr double kNearSight = 3; ///< what is farther will be seen before it is reached [m]
+constexpr double kTouchPace =
+    50; ///< through what the hull would touch: none flies there, who stands there leaves [s/m]
 constexpr double kOtherMind = 1.15; ///< what another way than the last must save
 constexpr double kSameWay = 0.4;    ///< places as near to the last way belong to it [m]
 constexpr double kSlant = 0.35;     ///< sine of the largest angle between what is flown and the way: 20 degrees
@@ -68,7 +69,7 @@ public:
         m_speed[k] = std::min(m_speed[k], options.unseen_speed);
       const double lost = 1 + (goal.detour ? goal.detour(p.x(), p.y()) : 0);
       const double other = last.places.empty() || isOn(last, p) ? 1 : kOtherMind;
-      m_pace[k] = is_wall ? kInfinite : lost * other / m_speed[k];
+      m_pace[k] = is_wall ? kInfinite : lost * other * (m_speed[k] > 0 ? 1 / m_speed[k] : kTouchPace);
     }
     search();
   }
@@ -144,7 +145,7 @@ private:
   static double speedAt(double clearance, const WayOptions &options)
   {
     if (clearance <= 0)
-      return kCreep;
+      return 0;
     const double speed = (clearance - options.free) / (kSlant * options.stopping_s);
     return std::clamp(speed, std::min(0.1, options.speed), options.speed);
   }
@@ -228,7 +229,9 @@ Way planWay(const std::vector<Obstacle> &surfaces, const Eigen::Vector2d &from, 
     if (next == k)
       break;
     if (field.clearance(next) <= field.clearance(k)) // what leads away need not slow down
-      way.speed = std::min(way.speed, field.speed(next) + flown / options.stopping_s);
+      way.speed =
+          std::min(way.speed, field.speed(next) + std::max(0.0, flown + (field.place(next) - here).norm() - kGrid) /
+                                                      options.stopping_s);
     k = next;
   }
   if ((aim - from).norm() > 1e-6)

@@ -144,7 +144,8 @@ TEST(SimulatorArDrone, LandsByTheLawsAsTheRealOneDoes)
 TEST(SimulatorArDrone, StaysWithinItsFenceAndItsBandOfHeightsInWind)
 {
   auto options = calm();
-  options.body.gust = 0.4;
+  options.gain = 0.6;
+  options.body.gust = 0.1;
   options.body.velocity_noise = 0.03;
   options.laws.fence = 3;
   options.laws.highest = 2;

@@ -156,8 +156,8 @@ TEST(Slalom, LooksFromBothSidesBeforeItLeaves)
     left = std::max(left, t < 4 ? report.wMb.t.y() : 0);
     right = std::min(right, t < 4 ? report.wMb.t.y() : 0);
   }
-  EXPECT_GT(left, 0.4);
-  EXPECT_LT(right, -0.4);
+  EXPECT_GT(left, 0.35);
+  EXPECT_LT(right, -0.35);
 }
 } // namespace
 } // namespace bole

@@ -38,7 +38,7 @@ Eigen::Vector2d safe(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p, 
 TEST(SafeVelocity, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 {
   const SafetyOptions options;
-  const std::vector<Obstacle> trunks{bark(3, 0.05)};
+  const std::vector<Obstacle> trunks{bark(3, 0)};
   const Surroundings around = clearing();
   Eigen::Vector2d p(0, 0), v(0, 0);
   for (int k = 0; k < 1000; ++k) { // obeys with a lag of 0.5 s
