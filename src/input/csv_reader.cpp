@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/csv_reader.h"
 
+#include <bole/visp.h>
 #include <charconv>
 #include <cmath>
 #include <filesystem>

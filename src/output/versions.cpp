@@ -3,9 +3,9 @@
 
 #include "bole_commit.h"
 
+#include <bole/visp.h>
 #include <fmt/format.h>
 #include <opencv2/core/version.hpp>
-#include <visp3/core/vpConfig.h>
 
 extern "C" {
 #include <libavutil/avutil.h>

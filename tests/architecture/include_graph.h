@@ -110,6 +110,20 @@ public:
     return faults;
   }
 
+  /// Files that include a header of ViSP and do not open the namespace that it may have.
+  std::vector<std::string> namespaceFaults() const
+  {
+    const std::string opens = "include/bole/visp.h";
+    std::vector<std::string> faults;
+    for (const auto &[file, lines] : m_lines) {
+      const auto of_visp = std::find_if(lines.begin(), lines.end(),
+                                        [](const std::string &line) { return line.rfind("<visp3/", 0) == 0; });
+      if (of_visp != lines.end() && file != opens && !reachable(file).count(opens))
+        faults.push_back(file + " includes " + *of_visp + " without <bole/visp.h>");
+    }
+    return faults;
+  }
+
   std::size_t publicHeaders() const
   {
     return static_cast<std::size_t>(

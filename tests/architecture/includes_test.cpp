@@ -49,12 +49,27 @@ TEST(Architecture, StagesSeeWhatTheyMayAndNeedWhatTheyMay)
   EXPECT_GT(graph.files(), 200u);
 }
 
+TEST(Architecture, WhereViSPIsUsedItsNamespaceIsOpen)
+{
+  EXPECT_THAT(IncludeGraph(BOLE_SOURCE_DIR).namespaceFaults(), IsEmpty());
+}
+
 TEST(Architecture, PublicHeadersAreFew)
 {
   EXPECT_LE(IncludeGraph(BOLE_SOURCE_DIR).publicHeaders(), kMostPublicHeaders);
 }
 
 TEST_F(SmallTree, IsSound) { EXPECT_THAT(faults(), IsEmpty()); }
+
+TEST_F(SmallTree, AClassOfViSPWithoutItsNamespaceIsFound)
+{
+  write("src/map/image.h", "#include <visp3/core/vpImage.h>\n");
+  write("src/map/opened.h", "#include \"map/opens.h\"\n#include <visp3/core/vpImage.h>\n");
+  write("src/map/opens.h", "#include <bole/visp.h>\n");
+  write("include/bole/visp.h", "#include <visp3/core/vpConfig.h>\n");
+  EXPECT_THAT(IncludeGraph(m_root).namespaceFaults(),
+              ElementsAre("src/map/image.h includes <visp3/core/vpImage.h> without <bole/visp.h>"));
+}
 
 TEST_F(SmallTree, AnArrowThatIsNotListedIsFound)
 {
