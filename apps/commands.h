@@ -56,7 +56,6 @@ void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone
 void addGraph(CLI::App &app);             ///< the graph of a run
 void addSolve(CLI::App &app);             ///< the optimum of a saved graph
 void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
-void addFitOdds(CLI::App &app);           ///< weights of the evidence for trunks
 /// Writes man pages and completions of all other commands; \p version goes into their foot.
 void addDocumentation(CLI::App &app, const std::string &version);
 void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images

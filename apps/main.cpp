@@ -41,7 +41,6 @@ void addCommands(CLI::App &app)
   addReplay(app);
   addEmulate(app);
   addCalibrateSaliency(app);
-  addFitOdds(app);
   addShowSaliency(app);
   addReproduce(app);
 #endif

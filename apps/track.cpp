@@ -9,7 +9,6 @@
 #include "track_output.h"
 
 #include "output/progress.h"
-#include "pipeline/stage_options.h"
 #include "report/report_page.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>
@@ -203,9 +202,7 @@ void track(const TrackArguments &arguments)
   if (!made.note.empty() && !arguments.is_quiet)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
 
-  StageOptions stages = stageOptions(options, source->camera());
-  stages.flow.final_pass = live == nullptr && !arguments.is_online && !stages.flow.as_paper;
-  Pipeline pipeline(source->camera(), source->bMc(), stages);
+  Pipeline pipeline(source->camera(), source->bMc(), options);
   TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);

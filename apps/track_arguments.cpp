@@ -46,9 +46,6 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
   command.add_option("--again", arguments->again,
                      "Repeat the run in this folder and tell whether its trunks.csv and trajectory.tum come out the "
                      "same, byte by byte");
-  command.add_flag("--online", arguments->is_online,
-                   "Decide the map by what is known while it flies, as a live drone does; else all frames of a file "
-                   "are asked once more at the end");
   command.add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command.add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
   command.add_flag("--profile", arguments->is_profiled, "Tell at the end what each stage of a frame cost");

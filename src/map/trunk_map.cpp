@@ -72,31 +72,6 @@ int TrunkMap::add(const NewTrunk &found)
   return trunk.id;
 }
 
-void TrunkMap::accept(int id, const NewTrunk &measured, double log_odds)
-{
-  MapTrunk trunk;
-  trunk.id = id;
-  trunk.smoother_id = measured.smoother_id;
-  trunk.status = TrunkStatus::confirmed;
-  trunk.fate = TrunkFate::none;
-  trunk.trunk = measured.trunk;
-  trunk.covariance = measured.covariance;
-  trunk.final_log_odds = log_odds;
-  for (const TrunkView &view : measured.views)
-    addView(trunk, view);
-  m_trunks[static_cast<std::size_t>(id)] = trunk;
-}
-
-void TrunkMap::reject(int id, TrunkFate fate, double log_odds)
-{
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
-  if (!trunk.removed)
-    trunk.fate = fate;
-  trunk.status = trunk.status == TrunkStatus::merged ? TrunkStatus::merged : TrunkStatus::lost;
-  trunk.removed = true;
-  trunk.final_log_odds = log_odds;
-}
-
 void TrunkMap::refresh(const TrunkEstimate &estimate)
 {
   MapTrunk &trunk = m_trunks[static_cast<std::size_t>(estimate.id)];
@@ -176,7 +151,7 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
     record.xy = trunk.trunk.axisAt(breast_z).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
-    record.probability = 1 / (1 + std::exp(-trunk.final_log_odds.value_or(evidence(trunk))));
+    record.probability = 1 / (1 + std::exp(-evidence(trunk)));
     Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
     J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
     J(2, 2) = record.radius;

@@ -79,7 +79,6 @@ struct MapTrunk
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
-  std::optional<double> final_log_odds; ///< to be a trunk, by all frames of the flight
 
   double parallax() const { return bearing_high - bearing_low; }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
@@ -201,10 +200,6 @@ public:
   MapUpdate review(double now_s, bool has_ranges = true);
   /// The same for the end of a flight: inactive candidates take part again.
   MapUpdate reviewAll(bool has_ranges = true);
-  /// The end of a flight decided: trunk \p id is one, measured anew as \p measured tells.
-  void accept(int id, const NewTrunk &measured, double log_odds);
-  /// ... and \p id is none. A reason that was found before stays.
-  void reject(int id, TrunkFate fate, double log_odds);
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 

@@ -66,28 +66,6 @@ TrunkPrior priorOf(const Trunk &guess, const SmootherOptions &options);
 Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const SmootherOptions &options,
                Matrix5d *information = nullptr);
 
-/// What stands in one frame after another where a trunk should.
-class Follower
-{
-public:
-  /// \p border_px: standard deviation of its borders where it should stand [px].
-  Follower(const Trunk &trunk, double border_px) : m_trunk(trunk), m_border_px(border_px) {}
-  /// \p at: of the frame, whose pose the smoother knows as \p pose.
-  void look(const Gradient &gradient, std::size_t pose, const Pose &wMb, const Viewpoint &at,
-            const HiddenBorders &hidden, const StageOptions &options);
-  /// The trunk that fits what was found.
-  Adoption result(double now_s, const PinholeCamera &camera, const StageOptions &options) const;
-
-private:
-  Trunk m_trunk;
-  double m_border_px;
-  std::vector<AdoptedView> m_views;
-  std::vector<TrunkView> m_seen;
-  std::vector<TrackingResult> m_results;
-  std::optional<Eigen::Vector3d> m_before;
-  std::optional<double> m_left_contrast, m_right_contrast;
-};
-
 /// A detection of the window, followed through its views. \p view: of the newest frame.
 Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
                              const TrunkMap &map, const Viewpoint &view, const StageOptions &options);

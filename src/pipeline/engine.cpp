@@ -110,8 +110,6 @@ FrameReport Engine::process(const Frame &frame)
         trackTrunks(gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
     add(tracked, view);                                                               // Eq. 9
     lap("tracking");
-    if (hasFinalPass() && view.has_ranges)
-      m_kept.push(frame.image, newest(), view.time_s, view.wMc.t, m_units.flow.view_spacing);
     m_window.push(std::move(gradient), newest(), view, m_smoother, m_units);
     adoptNew(view, background(saliency)); // Eq. 18-21
     lap("detection");
@@ -328,25 +326,18 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
 
 void Engine::finish()
 {
+  constexpr double kSettled = 1e-6; // of the cost: no view notices
   if (m_smoother.poseCount() == 0)
     return;
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  if (hasFinalPass() && m_motion->hasRanges())
-    decideByAllFrames();
-  else
-    decideOnce();
-  reviewScale(0, true);
-}
-
-/// By what was seen while it flew.
-void Engine::decideOnce()
-{
   const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
   apply(update);
   if (!update.merged.empty() || !update.removed.empty()) {
     m_smoother.optimize(kSettled);
     refreshWholeMap();
   }
+  reviewScale(0, true);
 }
+
 } // namespace bole

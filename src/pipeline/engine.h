@@ -7,7 +7,7 @@
 /// The stages are functions of plain values in this folder. The engine holds what lives from frame to frame (motion
 /// source, saliency, smoother, window, map) and hands the result of one stage to the next.
 
-#include "pipeline/final_pass.h"
+#include "pipeline/adoption.h"
 #include "pipeline/motion_source.h"
 #include "pipeline/units.h"
 #include "saliency/saliency.h"
@@ -43,19 +43,10 @@ private:
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);
-  bool hasFinalPass() const { return m_options.flow.final_pass && m_options.smoothing.fixed_lag == 0; }
-  void decideOnce();
-  void decideByAllFrames();
-  std::vector<Hypothesis> hypotheses() const;
-  void giveUp(const Hypothesis &one, TrunkFate fate);
-  Hypothesis takeIn(const Hypothesis &one, Adoption measured);
-  Trunk carried(const MapTrunk &trunk) const;
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);
   std::vector<KnownTrunk> known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
   FrameReport complete(FrameReport report, const Frame &frame, const Motion &motion);
-  static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
-
   std::size_t newest() const { return m_smoother.poseCount() - 1; }
   Pose cameraAt(std::size_t pose) const { return m_smoother.pose(pose) * m_bMc; }
 
@@ -68,7 +59,6 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
-  KeptFrames m_kept;
   TrunkMap m_map;
   Trajectory m_online;                    ///< in units of the motion
   Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion

@@ -41,7 +41,6 @@ struct FlowOptions
   bool use_points = true;       ///< relative poses from point features
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
   bool as_paper = false;        ///< detection, tracking and map as the paper has them: see paper_policy.h
-  bool final_pass = false;      ///< keep the frames, and decide the map once more by all of them at the end
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
   int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
                                 ///< time and, while it is wrong, pulls on the trajectory
