@@ -30,12 +30,31 @@ namespace bole::motion
 {
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
 {
-  a.reserve(matches.size());
-  b.reserve(matches.size());
   for (const PointMatch &match : matches) {
-    a.push_back(camera.ray(match.a_px));
-    b.push_back(camera.ray(match.b_px));
+    add(camera.ray(match.a_px), camera.ray(match.b_px));
   }
+}
+
+void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
+{
+  a.push_back(in_a);
+  b.push_back(in_b);
+  columns.ax.push_back(in_a.x());
+  columns.ay.push_back(in_a.y());
+  columns.bx.push_back(in_b.x());
+  columns.by.push_back(in_b.y());
+}
+
+EpipolarTerms Epipolar::terms(double sigma, double kernel) const
+{
+  EpipolarTerms terms;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.E) = m_E;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.R) = m_R;
+  Matrix32d::Map(terms.B) = m_B;
+  terms.sigma = sigma;
+  terms.kernel = kernel;
+  terms.epipole = kEpipole;
+  return terms;
 }
 
 MotionPrior::MotionPrior(const RelativePosePrior &prior)
@@ -157,27 +176,21 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
 double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
               const RelativePoseOptions &options)
 {
-  double cost = 0;
-  const Epipolar epipolar(motion);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    cost += epipolar.trust(rays.a[i]) * costOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, kKernel);
-  }
+  const double cost = costOfMatches(rays.columns, Epipolar(motion).terms(sigma, kKernel));
   return cost / options.inflation + priorCost(motion, prior);
 }
 
 /// Information and gradient of the matches at \p motion, inflation not applied.
 void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H, Vector5d &g)
 {
-  H.setZero();
-  g.setZero();
-  const Epipolar epipolar(motion);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    Vector5d J;
-    const double r = epipolar.residual(rays.a[i], rays.b[i], J) / sigma;
-    const double w = epipolar.trust(rays.a[i]) * weightOf(r, kernel);
-    H.noalias() += (w / (sigma * sigma)) * J * J.transpose();
-    g += (w * r / sigma) * J;
+  const EpipolarSums sums = sumsOfMatches(rays.columns, Epipolar(motion).terms(sigma, kernel));
+  const double *entry = sums.H;
+  for (int i = 0; i < 5; ++i) {
+    for (int j = i; j < 5; ++j) {
+      H(i, j) = H(j, i) = *entry++;
+    }
   }
+  g = Vector5d::Map(sums.g);
 }
 
 /// Levenberg-Marquardt with a fixed sigma.
@@ -301,8 +314,7 @@ Rays drawn(const Rays &rays, std::mt19937 &random, std::size_t n)
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = draw(random);
-    sample.a.push_back(rays.a[k]);
-    sample.b.push_back(rays.b[k]);
+    sample.add(rays.a[k], rays.b[k]);
   }
   return sample;
 }

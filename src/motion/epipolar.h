@@ -5,6 +5,7 @@
 /// the joint fit and the statistics of parallax.
 
 #include "geometry/so3.h"
+#include "motion/epipolar_loops.h"
 #include "motion/relative_pose.h"
 
 #include <Eigen/Geometry>
@@ -22,9 +23,11 @@ constexpr unsigned kSeed = 1;   ///< of the draws
 struct Rays
 {
   std::vector<Eigen::Vector3d> a, b;
+  RayColumns columns; ///< the same
 
   Rays() = default;
   Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera);
+  void add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b);
   std::size_t size() const { return a.size(); }
 };
 
@@ -69,6 +72,9 @@ public:
     const double sine2 = (m_E.transpose() * x_a).squaredNorm() / x_a.squaredNorm();
     return sine2 / (sine2 + kEpipole * kEpipole);
   }
+
+  /// For the sums over all matches.
+  EpipolarTerms terms(double sigma, double kernel) const;
 
 private:
   static constexpr double kEpipole = 0.04; // [rad]: 4 px of a small camera

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
+#include "motion/lucas_kanade.h"
+#include "motion/window_loops.h"
+
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +20,7 @@ constexpr int kColumns = 8, kRows = 6;   ///< cells of the grid that spreads the
 constexpr double kLeastDistance_px = 8;  ///< between a new corner and any other
 constexpr double kQuality = 0.01;        ///< of a corner against the strongest of the image
 constexpr double kLeastResponse = 1e-5;  ///< smallest eigenvalue of the gradient moments of a corner, grey 0 to 1
-constexpr int kWindow_px = 11;           ///< side of the Lucas-Kanade window, odd
 constexpr int kLevels = 3;               ///< pyramid levels above the image: 3 follow 20 px a frame and more
-constexpr int kIterations = 10;          ///< of Lucas-Kanade a level
 constexpr double kMostBackward_px = 0.3; ///< forward-backward error above which a track ends
 constexpr double kMargin_px = 4;         ///< from the border of the image
 } // namespace
@@ -28,13 +28,14 @@ constexpr double kMargin_px = 4;         ///< from the border of the image
 struct PointTracker::State
 {
   PinholeCamera camera;
-  std::vector<cv::Mat> pyramid; ///< of the last image
+  GreyPyramid pyramid, next; ///< of the last image and of the one before it
   std::vector<PointTrack> tracks;
   std::uint64_t next_id = 1;
   std::size_t frames = 0;
-  cv::Mat response, dilated; ///< kept for their memory
+  cv::Mat response; ///< kept for its memory
+  CornerScratch scratch;
 
-  void follow(const std::vector<cv::Mat> &next, const Eigen::Matrix3d &aRb);
+  void follow(const Eigen::Matrix3d &aRb);
   void replenish(const cv::Mat &image);
 };
 
@@ -69,6 +70,19 @@ struct Corner
   cv::Point at;
 };
 
+/// No neighbour is stronger.
+bool isPeak(const cv::Mat &response, int x, int y)
+{
+  const float here = response.at<float>(y, x);
+  for (int i = y - 1; i <= y + 1; ++i) {
+    const float *row = response.ptr<float>(i);
+    if (std::max({row[x - 1], row[x], row[x + 1]}) > here) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// The corner to a fraction of a pixel: the vertex of the parabola through the responses, per axis.
 Eigen::Vector2d refined(const cv::Mat &response, const cv::Point &at)
 {
@@ -95,50 +109,34 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
                       fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
                                   m_state->camera.width, m_state->camera.height));
   }
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(current, pyramid, cv::Size(kWindow_px, kWindow_px), kLevels, true, cv::BORDER_REFLECT_101,
-                              cv::BORDER_CONSTANT, false);
+  buildPyramid(current, kLevels, m_state->next);
   if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
-    m_state->follow(pyramid, aRb);
+    m_state->follow(aRb);
   }
   m_state->replenish(current);
-  m_state->pyramid = std::move(pyramid);
+  m_state->pyramid.swap(m_state->next);
   ++m_state->frames;
 }
 
-void PointTracker::State::follow(const std::vector<cv::Mat> &next, const Eigen::Matrix3d &aRb)
+void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
 {
-  const std::size_t n = tracks.size();
-  std::vector<cv::Point2f> from(n), to(n), back(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    from[i] = toCv(tracks[i].current());
-    const Eigen::Vector3d turned = aRb.transpose() * camera.ray(tracks[i].current());
-    to[i] = turned.z() > 0.1 ? toCv(camera.project(turned)) : from[i];
-  }
-  const cv::Size window(kWindow_px, kWindow_px);
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kIterations, 0.01);
-  std::vector<unsigned char> found, found_back;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(pyramid, next, from, to, found, error, window, kLevels, stop, cv::OPTFLOW_USE_INITIAL_FLOW,
-                           1e-4);
-  // Back again from where it arrived, started at where it came from: one level settles whether it
-  // is the same corner.
-  back = from;
-  cv::calcOpticalFlowPyrLK(next, pyramid, to, back, found_back, error, window, std::min(1, kLevels), stop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  FollowOptions there, back;
+  there.levels = kLevels;
+  back.levels = 1; // started where it came from, one level settles whether it is the same corner
   std::vector<PointTrack> kept;
-  kept.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Eigen::Vector2d at = toEigen(to[i]);
-    if (!found[i] || !found_back[i] || !camera.contains(at, kMargin_px) ||
-        cv::norm(back[i] - from[i]) > kMostBackward_px) {
+  kept.reserve(kMostPoints);
+  for (PointTrack &track : tracks) {
+    const cv::Point2f from = toCv(track.current());
+    const Eigen::Vector3d turned = aRb.transpose() * camera.ray(track.current());
+    cv::Point2f to = turned.z() > 0.1 ? toCv(camera.project(turned)) : from, again = from;
+    if (!followWindow(pyramid, next, from, to, there) || !camera.contains(toEigen(to), kMargin_px) ||
+        !followWindow(next, pyramid, to, again, back) || cv::norm(again - from) > kMostBackward_px) {
       continue;
     }
-    PointTrack track = std::move(tracks[i]);
     if (track.positions_px.size() >= static_cast<std::size_t>(PointTracker::kHistory)) {
       track.positions_px.erase(track.positions_px.begin());
     }
-    track.positions_px.push_back(at);
+    track.positions_px.push_back(toEigen(to));
     kept.push_back(std::move(track));
   }
   tracks = std::move(kept);
@@ -150,10 +148,8 @@ void PointTracker::State::replenish(const cv::Mat &image)
   if (missing <= kMostPoints / 6) {
     return;
   }
-  cv::cornerMinEigenVal(image, response, 5, 3);
-  cv::dilate(response, dilated, cv::Mat());
-  double strongest = 0;
-  cv::minMaxLoc(response, nullptr, &strongest);
+  response.create(image.size(), CV_32F);
+  const double strongest = cornerResponse(image.ptr(), image.cols, image.rows, scratch, response.ptr<float>());
   const float threshold = float(std::max(kQuality * strongest, kLeastResponse));
 
   Occupancy occupied(image.size(), kLeastDistance_px);
@@ -171,9 +167,9 @@ void PointTracker::State::replenish(const cv::Mat &image)
   std::vector<std::vector<Corner>> corners(static_cast<std::size_t>(cells));
   const int margin = std::max(2, cvCeil(kMargin_px) + 1);
   for (int y = margin; y < image.rows - margin; ++y) {
-    const float *r = response.ptr<float>(y), *d = dilated.ptr<float>(y);
+    const float *r = response.ptr<float>(y);
     for (int x = margin; x < image.cols - margin; ++x) {
-      if (r[x] > threshold && r[x] >= d[x]) {
+      if (r[x] > threshold && isPeak(response, x, y)) {
         corners[cellOf(x, y)].push_back({r[x], {x, y}});
       }
     }

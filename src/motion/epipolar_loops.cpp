@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/epipolar_loops.h"
+
+#include "geometry/vector_clones.h"
+
+#include <cmath>
+
+namespace bole::motion
+{
+BOLE_VECTOR_CLONES
+double costOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
+{
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
+  const double *E = terms.E, e00 = E[0], e01 = E[1], e02 = E[2], e10 = E[3], e11 = E[4], e12 = E[5], e20 = E[6],
+               e21 = E[7], e22 = E[8];
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
+  const double epipole2 = terms.epipole * terms.epipole;
+  double cost = 0;
+#pragma omp simd reduction(+ : cost)
+  for (int i = 0; i < n; ++i) {
+    const double l0 = e00 * bx[i] + e01 * by[i] + e02, l1 = e10 * bx[i] + e11 * by[i] + e12;
+    const double l2 = e20 * bx[i] + e21 * by[i] + e22; // E b: line in a
+    const double m0 = e00 * ax[i] + e10 * ay[i] + e20, m1 = e01 * ax[i] + e11 * ay[i] + e21;
+    const double m2 = e02 * ax[i] + e12 * ay[i] + e22; // E^T a: line in b
+    const double S = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24;
+    const double algebraic = (ax[i] * l0 + ay[i] * l1 + l2) * by_sigma, u2 = algebraic * algebraic / S;
+    const double sine2 = (m0 * m0 + m1 * m1 + m2 * m2) / (ax[i] * ax[i] + ay[i] * ay[i] + 1);
+    cost += sine2 / (sine2 + epipole2) * 0.5 * u2 / (1 + u2 * by_kernel2);
+  }
+  return cost;
+}
+
+BOLE_VECTOR_CLONES
+EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
+{
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
+  const double *E = terms.E, *R = terms.R, *B = terms.B;
+  const double e00 = E[0], e01 = E[1], e02 = E[2], e10 = E[3], e11 = E[4], e12 = E[5], e20 = E[6], e21 = E[7],
+               e22 = E[8];
+  const double r00 = R[0], r01 = R[1], r02 = R[2], r10 = R[3], r11 = R[4], r12 = R[5], r20 = R[6], r21 = R[7],
+               r22 = R[8];
+  const double b00 = B[0], b10 = B[1], b20 = B[2], b01 = B[3], b11 = B[4], b21 = B[5];
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
+  const double epipole2 = terms.epipole * terms.epipole;
+  double h00 = 0, h01 = 0, h02 = 0, h03 = 0, h04 = 0, h11 = 0, h12 = 0, h13 = 0, h14 = 0, h22 = 0, h23 = 0, h24 = 0,
+         h33 = 0, h34 = 0, h44 = 0, g0 = 0, g1 = 0, g2 = 0, g3 = 0, g4 = 0;
+#pragma omp simd reduction(+ : h00, h01, h02, h03, h04, h11, h12, h13, h14, h22, h23, h24, h33, h34, h44, g0, g1, g2,  \
+                               g3, g4)
+  for (int i = 0; i < n; ++i) {
+    const double xa = ax[i], ya = ay[i], xb = bx[i], yb = by[i];
+    const double l0 = e00 * xb + e01 * yb + e02, l1 = e10 * xb + e11 * yb + e12, l2 = e20 * xb + e21 * yb + e22;
+    const double m0 = e00 * xa + e10 * ya + e20, m1 = e01 * xa + e11 * ya + e21, m2 = e02 * xa + e12 * ya + e22;
+    const double S = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24, inverse = 1 / S;
+    const double algebraic = xa * l0 + ya * l1 + l2, share = algebraic * inverse;
+    const double scale = by_sigma * std::sqrt(inverse), u = algebraic * scale;
+    const double sine2 = (m0 * m0 + m1 * m1 + m2 * m2) / (xa * xa + ya * ya + 1);
+    const double root = 1 / (1 + u * u * by_kernel2), w = sine2 / (sine2 + epipole2) * root * root;
+    // by the direction: p x (a - share flat l) - share (R flat m) x a, with p = R b
+    const double p0 = r00 * xb + r01 * yb + r02, p1 = r10 * xb + r11 * yb + r12, p2 = r20 * xb + r21 * yb + r22;
+    const double c0 = xa - share * l0, c1 = ya - share * l1;
+    const double q0 = share * (r00 * m0 + r01 * m1), q1 = share * (r10 * m0 + r11 * m1),
+                 q2 = share * (r20 * m0 + r21 * m1);
+    const double d0 = p1 - p2 * c1 - (q1 - q2 * ya), d1 = p2 * c0 - p0 - (q2 * xa - q0),
+                 d2 = p0 * c1 - p1 * c0 - (q0 * ya - q1 * xa);
+    // by the rotation: b x (m - share E^T flat l) + share m x flat m
+    const double f0 = m0 - share * (e00 * l0 + e10 * l1), f1 = m1 - share * (e01 * l0 + e11 * l1),
+                 f2 = m2 - share * (e02 * l0 + e12 * l1);
+    const double j0 = scale * (yb * f2 - f1 - share * m2 * m1), j1 = scale * (f0 - xb * f2 + share * m2 * m0),
+                 j2 = scale * (xb * f1 - yb * f0);
+    const double j3 = scale * (b00 * d0 + b10 * d1 + b20 * d2), j4 = scale * (b01 * d0 + b11 * d1 + b21 * d2);
+    const double w0 = w * j0, w1 = w * j1, w2 = w * j2, w3 = w * j3, w4 = w * j4;
+    h00 += w0 * j0, h01 += w0 * j1, h02 += w0 * j2, h03 += w0 * j3, h04 += w0 * j4;
+    h11 += w1 * j1, h12 += w1 * j2, h13 += w1 * j3, h14 += w1 * j4;
+    h22 += w2 * j2, h23 += w2 * j3, h24 += w2 * j4, h33 += w3 * j3, h34 += w3 * j4, h44 += w4 * j4;
+    g0 += w0 * u, g1 += w1 * u, g2 += w2 * u, g3 += w3 * u, g4 += w4 * u;
+  }
+  return {{h00, h01, h02, h03, h04, h11, h12, h13, h14, h22, h23, h24, h33, h34, h44}, {g0, g1, g2, g3, g4}};
+}
+} // namespace bole::motion

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+// Private to the stage: sums of Sampson's residual over all matches.
+
+#include <vector>
+
+namespace bole::motion
+{
+/// Matches as (x, y, 1) of both frames, number by number.
+struct RayColumns
+{
+  std::vector<double> ax, ay, bx, by;
+};
+
+/// What all matches share: the essential matrix, the rotation (row by row) and the tangents of the direction (a column
+/// after the other); and the noise.
+struct EpipolarTerms
+{
+  double E[9], R[9], B[6];
+  double sigma, kernel;
+  double epipole; ///< tan of the angle from the epipole within which a match has little say
+};
+
+/// Sum of the robust costs.
+double costOfMatches(const RayColumns &rays, const EpipolarTerms &terms);
+
+/// Sums of the weighted products of the derivatives by (phi, tau), the upper triangle by rows, and of derivative and
+/// residual; both in sigmas.
+struct EpipolarSums
+{
+  double H[15], g[5];
+};
+EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms);
+} // namespace bole::motion

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/lucas_kanade.h"
+
+#include "motion/window_loops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/video/tracking.hpp>
+
+namespace bole
+{
+namespace
+{
+constexpr float kLeastTexture = 0.1f; ///< mean square of the gradient in its weakest direction [grey levels^2/px^2]
+constexpr float kSettled_px = 0.01f;  ///< a step below this is the last
+constexpr float kCoarsely_px = 0.05f; ///< the same where a finer level follows
+constexpr float kSwinging_px = 0.01f; ///< two steps that undo each other to this end the search half-way
+
+GreyPlane plane(const cv::Mat &level)
+{
+  return {level.ptr(), static_cast<std::ptrdiff_t>(level.step[0]), level.cols, level.rows};
+}
+
+bool reaches(const GreyPlane &image, const cv::Point2f &corner)
+{
+  return corner.x >= -kWindow_px && corner.y >= -kWindow_px && corner.x < static_cast<float>(image.width) &&
+         corner.y < static_cast<float>(image.height); // false for NaN
+}
+
+/// One level: moves \p to, the first pixel of the window; false where the window has no texture or leaves the image.
+bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations,
+              float settled_px)
+{
+  if (!reaches(first, from))
+    return false;
+  Window window;
+  cutWindow(first, from.x, from.y, window);
+  const float half_sum = 0.5f * (window.xx + window.yy), half_difference = 0.5f * (window.xx - window.yy);
+  const float weakest = half_sum - std::hypot(half_difference, window.xy);
+  const float determinant = window.xx * window.yy - window.xy * window.xy;
+  if (weakest < kLeastTexture * kWindow_px * kWindow_px || !(determinant > 0))
+    return false;
+  const float inverse = 1 / determinant;
+  cv::Point2f before(0, 0);
+  for (int i = 0; i < iterations; ++i) {
+    if (!reaches(second, to))
+      return false;
+    float by_x, by_y;
+    mismatch(second, to.x, to.y, window, by_x, by_y);
+    const cv::Point2f step((window.xy * by_y - window.yy * by_x) * inverse,
+                           (window.xy * by_x - window.xx * by_y) * inverse);
+    to += step;
+    if (step.dot(step) <= settled_px * settled_px)
+      break;
+    if (i > 0 && std::abs(step.x + before.x) < kSwinging_px && std::abs(step.y + before.y) < kSwinging_px) {
+      to -= 0.5f * step;
+      break;
+    }
+    before = step;
+  }
+  return true;
+}
+} // namespace
+
+void buildPyramid(const cv::Mat &image, int levels, GreyPyramid &pyramid)
+{
+  cv::buildOpticalFlowPyramid(image, pyramid, cv::Size(kWindowReach, kWindowReach), levels, false,
+                              cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+}
+
+bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
+                  const FollowOptions &options)
+{
+  const cv::Point2f half(0.5f * (kWindow_px - 1), 0.5f * (kWindow_px - 1));
+  const int top = std::min({options.levels, static_cast<int>(first.size()) - 1, static_cast<int>(second.size()) - 1});
+  bool is_found = false;
+  to *= std::ldexp(1.f, -top);
+  for (int level = top; level >= 0; --level) {
+    const std::size_t l = static_cast<std::size_t>(level);
+    cv::Point2f corner = to - half;
+    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - half, corner,
+                        options.iterations, level > 0 ? kCoarsely_px : kSettled_px);
+    to = corner + half;
+    if (level > 0)
+      to *= 2.f;
+  }
+  return is_found && reaches(plane(second[0]), to - half);
+}
+} // namespace bole

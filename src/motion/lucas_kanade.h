@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Where small windows of one image are in the next: pyramidal Lucas-Kanade.
+///
+/// The method, its pyramid and its limits are those of cv::calcOpticalFlowPyrLK (J.-Y. Bouguet, Pyramidal
+/// implementation of the Lucas Kanade feature tracker), in floats, a row of the window at a time: a third of the
+/// instructions.
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace bole
+{
+/// The image and its halves, each a little larger than it is by reflection.
+using GreyPyramid = std::vector<cv::Mat>;
+void buildPyramid(const cv::Mat &image, int levels, GreyPyramid &pyramid);
+
+struct FollowOptions
+{
+  int levels = 3;      ///< above the image
+  int iterations = 10; ///< a level, at most
+};
+
+/// Finds the window round \p from of \p first in \p second, from \p to on; false where it has no texture or leaves the
+/// image.
+bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
+                  const FollowOptions &options);
+} // namespace bole
