@@ -25,30 +25,32 @@ struct PlaneView
   Vector2d position, forward, left; ///< of the level camera in the world
 };
 
+/// Places from that of the last view.
 ViewColumns columnsOf(const std::vector<PlaneView> &views)
 {
   ViewColumns columns;
-  const auto add = [&columns](const PlaneView &view, double q_first, double q_last, double step) {
-    columns.x.push_back(view.position.x());
-    columns.y.push_back(view.position.y());
-    columns.forward_x.push_back(view.forward.x());
-    columns.forward_y.push_back(view.forward.y());
-    columns.left_x.push_back(view.left.x());
-    columns.left_y.push_back(view.left.y());
-    columns.q_first.push_back(q_first);
-    columns.q_last.push_back(q_last);
-    columns.by_step.push_back(1 / step);
+  const auto add = [&columns](const Vector2d &at, const PlaneView &view, double q_first, double q_last, double step) {
+    const auto put = [](std::vector<float> &column, double value) { column.push_back(static_cast<float>(value)); };
+    put(columns.x, at.x());
+    put(columns.y, at.y());
+    put(columns.forward_x, view.forward.x());
+    put(columns.forward_y, view.forward.y());
+    put(columns.left_x, view.left.x());
+    put(columns.left_y, view.left.y());
+    put(columns.q_first, q_first);
+    put(columns.q_last, q_last);
+    put(columns.by_step, 1 / step);
   };
   for (const PlaneView &view : views) {
     const LevelProfile &profile = *view.profile;
-    add(view, profile.q_first, profile.qLast(), profile.step);
+    add(view.position - views.back().position, view, profile.q_first, profile.qLast(), profile.step);
     columns.first_sample.push_back(static_cast<int>(columns.rising_peak.size()));
     columns.rising_peak.insert(columns.rising_peak.end(), profile.rising_peak.begin(), profile.rising_peak.end());
     columns.falling_peak.insert(columns.falling_peak.end(), profile.falling_peak.begin(), profile.falling_peak.end());
   }
-  constexpr std::size_t kTogether = 4; // views that are worked on at once: the last ones may be blind
+  constexpr std::size_t kTogether = 8; // views that are worked on at once: the last ones may be blind
   while (columns.x.size() % kTogether != 0) {
-    add({nullptr, Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()}, 1, 0, 1);
+    add(Vector2d::Zero(), {nullptr, Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()}, 1, 0, 1);
     columns.first_sample.push_back(0);
   }
   return columns;
@@ -167,11 +169,13 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
   constexpr int kIterations = 6;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
     const double gate_px = iteration < 2 ? 2 * options.inlier_px : options.inlier_px;
-    const Circle circle{fit.p.x(), fit.p.y(), std::exp(fit.p(2)), pair.left.contrast > 0, pair.right.contrast > 0};
-    const BorderSums sums = sumsOfBorders(views, circle, px_per_q, gate_px);
+    const Eigen::Vector2f at = (fit.p.head<2>() - now.position).cast<float>();
+    const Circle circle{at.x(), at.y(), static_cast<float>(std::exp(fit.p(2))), pair.left.contrast > 0,
+                        pair.right.contrast > 0};
+    const BorderSums sums = sumsOfBorders(views, circle, static_cast<float>(px_per_q), static_cast<float>(gate_px));
     fit.views = static_cast<int>(sums.views);
     fit.inliers = static_cast<int>(sums.inliers);
-    fit.rms_px = fit.inliers ? std::sqrt(sums.squares / fit.inliers) : 1e9;
+    fit.rms_px = fit.inliers ? std::sqrt(static_cast<double>(sums.squares) / fit.inliers) : 1e9;
     Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     fit.information = H;
@@ -179,7 +183,7 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
     if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
-    const Vector3d step = -(H.inverse() * Vector3d::Map(sums.g));
+    const Vector3d step = -(H.inverse() * Eigen::Vector3f::Map(sums.g).cast<double>());
     if (!step.allFinite())
       break;
     fit.p += step.cwiseMax(-0.5).cwiseMin(0.5);

@@ -9,48 +9,49 @@
 namespace bole
 {
 BOLE_VECTOR_CLONES
-BorderSums sumsOfBorders(const ViewColumns &views, const Circle &circle, double px_per_q, double gate_px)
+BorderSums sumsOfBorders(const ViewColumns &views, const Circle &circle, float px_per_q, float gate_px)
 {
-  constexpr double kLeastAhead = 0.2, kMostBeside = 0.9; // a circle beside the camera, or round it, has no borders
+  constexpr float kLeastAhead = 0.2f, kMostBeside = 0.9f; // a circle beside the camera, or round it, has no borders
   const int n = static_cast<int>(views.x.size());
-  const double *vx = views.x.data(), *vy = views.y.data(), *fx = views.forward_x.data(), *fy = views.forward_y.data();
-  const double *lx = views.left_x.data(), *ly = views.left_y.data(), *by_step = views.by_step.data();
-  const double *first = views.q_first.data(), *last = views.q_last.data();
+  const float *vx = views.x.data(), *vy = views.y.data(), *fx = views.forward_x.data(), *fy = views.forward_y.data();
+  const float *lx = views.left_x.data(), *ly = views.left_y.data(), *by_step = views.by_step.data();
+  const float *first = views.q_first.data(), *last = views.q_last.data();
   const int *sample = views.first_sample.data();
-  const double *peaks_left = (circle.left_rises ? views.rising_peak : views.falling_peak).data();
-  const double *peaks_right = (circle.right_rises ? views.rising_peak : views.falling_peak).data();
-  const double x = circle.x, y = circle.y, r = circle.r;
-  double h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0;
-  double seen = 0, inliers = 0, squares = 0;
+  const float *peaks_left = (circle.left_rises ? views.rising_peak : views.falling_peak).data();
+  const float *peaks_right = (circle.right_rises ? views.rising_peak : views.falling_peak).data();
+  const float x = circle.x, y = circle.y, r = circle.r;
+  float h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0;
+  float seen = 0, inliers = 0, squares = 0;
 #pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2, seen, inliers, squares)
   for (int i = 0; i < n; ++i) {
-    const double wx = x - vx[i], wy = y - vy[i], d2 = wx * wx + wy * wy;
-    const double ahead = fx[i] * wx + fy[i] * wy, beside = lx[i] * wx + ly[i] * wy;
-    const bool is_outside = (ahead >= kLeastAhead) & (d2 > 1.2 * r * r);
-    const double q = beside / (is_outside ? ahead : 1), t = r / std::sqrt(is_outside ? d2 - r * r : 1);
-    const double qt = q * t, left = (q + t) / (1 - qt), right = (q - t) / (1 + qt);
+    const float wx = x - vx[i], wy = y - vy[i], d2 = wx * wx + wy * wy;
+    const float ahead = fx[i] * wx + fy[i] * wy, beside = lx[i] * wx + ly[i] * wy;
+    const bool is_outside = (ahead >= kLeastAhead) & (d2 > 1.2f * r * r);
+    const float q = beside / (is_outside ? ahead : 1), t = r / std::sqrt(is_outside ? d2 - r * r : 1);
+    const float qt = q * t, left = (q + t) / (1 - qt), right = (q - t) / (1 + qt);
     const bool is_seen = is_outside & (qt <= kMostBeside) & (qt >= -kMostBeside) & (left >= first[i]) &
                          (left <= last[i]) & (right >= first[i]) & (right <= last[i]);
-    const double at_left = is_seen ? (left - first[i]) * by_step[i] + 0.5 : 0;
-    const double at_right = is_seen ? (right - first[i]) * by_step[i] + 0.5 : 0;
-    const double peak_left = peaks_left[sample[i] + static_cast<int>(at_left)];
-    const double peak_right = peaks_right[sample[i] + static_cast<int>(at_right)];
-    const double off_left = (left - peak_left) * px_per_q, off_right = (right - peak_right) * px_per_q;
+    const float at_left = is_seen ? (left - first[i]) * by_step[i] + 0.5f : 0;
+    const float at_right = is_seen ? (right - first[i]) * by_step[i] + 0.5f : 0;
+    const float peak_left = peaks_left[sample[i] + static_cast<int>(at_left)];
+    const float peak_right = peaks_right[sample[i] + static_cast<int>(at_right)];
+    const float off_left = (left - peak_left) * px_per_q, off_right = (right - peak_right) * px_per_q;
     const bool has_left = is_seen & (std::abs(off_left) < gate_px); // false for NaN
     const bool has_right = is_seen & (std::abs(off_right) < gate_px);
-    const double e_left = has_left ? off_left : 0, e_right = has_right ? off_right : 0;
-    const double by_d2 = 1 / d2, tx = t * wx * by_d2, ty = t * wy * by_d2, ox = -wy * by_d2, oy = wx * by_d2;
-    const double slope_l = has_left ? (1 + left * left) * px_per_q : 0;
-    const double slope_r = has_right ? (1 + right * right) * px_per_q : 0;
-    const double l0 = (ox - tx) * slope_l, l1 = (oy - ty) * slope_l, l2 = t * slope_l;
-    const double r0 = (ox + tx) * slope_r, r1 = (oy + ty) * slope_r, r2 = -t * slope_r;
+    const float e_left = has_left ? off_left : 0, e_right = has_right ? off_right : 0;
+    const float by_d2 = 1 / (is_outside ? d2 : 1), tx = t * wx * by_d2, ty = t * wy * by_d2, ox = -wy * by_d2,
+                oy = wx * by_d2;
+    const float slope_l = has_left ? (1 + left * left) * px_per_q : 0;
+    const float slope_r = has_right ? (1 + right * right) * px_per_q : 0;
+    const float l0 = (ox - tx) * slope_l, l1 = (oy - ty) * slope_l, l2 = t * slope_l;
+    const float r0 = (ox + tx) * slope_r, r1 = (oy + ty) * slope_r, r2 = -t * slope_r;
     h00 += l0 * l0 + r0 * r0, h01 += l0 * l1 + r0 * r1, h02 += l0 * l2 + r0 * r2;
     h11 += l1 * l1 + r1 * r1, h12 += l1 * l2 + r1 * r2, h22 += l2 * l2 + r2 * r2;
     g0 += e_left * l0 + e_right * r0, g1 += e_left * l1 + e_right * r1, g2 += e_left * l2 + e_right * r2;
     const bool has_both = has_left & has_right;
-    seen += is_seen ? 1.0 : 0.0;
-    inliers += has_both ? 1.0 : 0.0;
-    squares += has_both ? 0.5 * (e_left * e_left + e_right * e_right) : 0.0;
+    seen += is_seen ? 1.f : 0.f;
+    inliers += has_both ? 1.f : 0.f;
+    squares += has_both ? 0.5f * (e_left * e_left + e_right * e_right) : 0.f;
   }
   return {{h00, h01, h02, h11, h12, h22}, {g0, g1, g2}, seen, inliers, squares};
 }

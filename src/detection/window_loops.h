@@ -10,16 +10,16 @@ namespace bole
 /// of their profiles, one after the other, the peaks nearest to each sample.
 struct ViewColumns
 {
-  std::vector<double> x, y, forward_x, forward_y, left_x, left_y;
-  std::vector<double> q_first, q_last, by_step;
+  std::vector<float> x, y, forward_x, forward_y, left_x, left_y; ///< from a place among them
+  std::vector<float> q_first, q_last, by_step;
   std::vector<int> first_sample; ///< of each view in the peaks
-  std::vector<double> rising_peak, falling_peak;
+  std::vector<float> rising_peak, falling_peak;
 };
 
 /// A circle on the ground, and whether its borders in the image rise from dark to bright.
 struct Circle
 {
-  double x, y, r;
+  float x, y, r;
   bool left_rises, right_rises;
 };
 
@@ -27,10 +27,10 @@ struct Circle
 /// rows and gradient. Only residuals below the gate count.
 struct BorderSums
 {
-  double H[6] = {}, g[3] = {};
-  double views = 0, inliers = 0, squares = 0; ///< inliers: both borders within the gate; squares: theirs [px^2]
+  float H[6] = {}, g[3] = {};
+  float views = 0, inliers = 0, squares = 0; ///< inliers: both borders within the gate; squares: theirs [px^2]
 };
-BorderSums sumsOfBorders(const ViewColumns &views, const Circle &circle, double px_per_q, double gate_px);
+BorderSums sumsOfBorders(const ViewColumns &views, const Circle &circle, float px_per_q, float gate_px);
 
 /// A view that a border is looked for in: q = (left0 + range left1) / (ahead0 + range ahead1).
 struct SweptView

@@ -13,7 +13,6 @@ namespace
 {
 constexpr float kLeastTexture = 0.1f; ///< mean square of the gradient in its weakest direction [grey levels^2/px^2]
 constexpr float kSettled_px = 0.01f;  ///< a step below this is the last
-constexpr float kCoarsely_px = 0.05f; ///< the same where a finer level follows
 constexpr float kSwinging_px = 0.01f; ///< two steps that undo each other to this end the search half-way
 
 GreyPlane plane(const cv::Mat &level)
@@ -28,8 +27,7 @@ bool reaches(const GreyPlane &image, const cv::Point2f &corner)
 }
 
 /// One level: moves \p to, the first pixel of the window; false where the window has no texture or leaves the image.
-bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations,
-              float settled_px)
+bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations)
 {
   if (!reaches(first, from))
     return false;
@@ -50,7 +48,7 @@ bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f
     const cv::Point2f step((window.xy * by_y - window.yy * by_x) * inverse,
                            (window.xy * by_x - window.xx * by_y) * inverse);
     to += step;
-    if (step.dot(step) <= settled_px * settled_px)
+    if (step.dot(step) <= kSettled_px * kSettled_px)
       break;
     if (i > 0 && std::abs(step.x + before.x) < kSwinging_px && std::abs(step.y + before.y) < kSwinging_px) {
       to -= 0.5f * step;
@@ -78,8 +76,8 @@ bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv:
   for (int level = top; level >= 0; --level) {
     const std::size_t l = static_cast<std::size_t>(level);
     cv::Point2f corner = to - half;
-    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - half, corner,
-                        options.iterations, level > 0 ? kCoarsely_px : kSettled_px);
+    is_found =
+        refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - half, corner, options.iterations);
     to = corner + half;
     if (level > 0)
       to *= 2.f;

@@ -162,26 +162,27 @@ private:
   {
     ViewColumns views;
     for (int i = 0; i < 19; ++i) {
-      const double heading = 0.01 * i;
-      views.x.push_back(0.1 * i);
-      views.y.push_back(0.02 * i * i);
+      const float step = static_cast<float>(i), heading = 0.01f * step;
+      views.x.push_back(0.1f * step);
+      views.y.push_back(0.02f * step * step);
       views.forward_x.push_back(std::cos(heading));
       views.forward_y.push_back(std::sin(heading));
       views.left_x.push_back(-std::sin(heading));
       views.left_y.push_back(std::cos(heading));
-      views.q_first.push_back(-0.8);
-      views.q_last.push_back(0.8);
+      views.q_first.push_back(-0.8f);
+      views.q_last.push_back(0.8f);
       views.by_step.push_back(50);
       views.first_sample.push_back(81 * i);
       for (int k = 0; k <= 80; ++k) {
-        views.rising_peak.push_back(k % 11 == 3 ? std::nanf("") : -0.8f + 0.02f * static_cast<float>(k) + 0.001f * i);
-        views.falling_peak.push_back(-0.8f + 0.02f * static_cast<float>(k) - 0.002f * i);
+        views.rising_peak.push_back(k % 11 == 3 ? std::nanf("")
+                                                : -0.8f + 0.02f * static_cast<float>(k) + 0.001f * step);
+        views.falling_peak.push_back(-0.8f + 0.02f * static_cast<float>(k) - 0.002f * step);
       }
     }
-    const BorderSums sums = sumsOfBorders(views, {4.1, 0.7, 0.21, true, false}, 200, 30);
+    const BorderSums sums = sumsOfBorders(views, {4.1f, 0.7f, 0.21f, true, false}, 200, 30);
     keep(sums.H);
     keep(sums.g);
-    keep(std::vector<double>{sums.views, sums.inliers, sums.squares});
+    keep(std::vector<float>{sums.views, sums.inliers, sums.squares});
     std::vector<float> ranges, sum(80), counts(80), scores(80);
     for (int i = 0; i < 80; ++i)
       ranges.push_back(1 / (0.08f + 0.007f * static_cast<float>(i)));
