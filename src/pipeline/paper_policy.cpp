@@ -14,14 +14,6 @@ namespace bole
 {
 namespace
 {
-/// A tree whose image takes part in the joint optimisation of a frame.
-struct ObservedTree
-{
-  int id = -1; ///< in the map; -1: found in this frame
-  std::size_t smoother_id = 0;
-  RelativeTrunk relative;
-};
-
 TrunkEnergy energyOf(const Gradient &gradient, const PinholeCamera &camera, const StageOptions &options)
 {
   return {gradient, camera, kWholeLine, BorderTarget(), BorderTarget(), options.tracking.energy};
@@ -45,30 +37,24 @@ std::vector<ObservedTree> instantiate(const Gradient &gradient, const vpImage<fl
   return trees;
 }
 
-/// Eq. 2 with the energies of the newest image, by Newton steps on all of it together: each tree's energy is expanded
-/// about where the last step left it, until no border moves any more.
-void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
-                     Smoother &smoother)
+/// "We non-linearly optimize the relative tree parameters to maximize the true measurement likelihood before computing"
+/// the quadratic: the minimum of the tree's own energy next to \p start, in all four directions. Nothing where there is
+/// none.
+std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera, RelativeTrunk start)
 {
-  constexpr int kIterations = 12;
+  constexpr int kIterations = 30;
   constexpr double kSettled_px = 0.02;
-  const std::size_t newest = smoother.poseCount() - 1;
-  for (int i = 0; i < kIterations && !trees.empty(); ++i) {
-    double moved_px = 0;
-    for (ObservedTree &tree : trees) {
-      const RelativeTrunk before = std::exchange(tree.relative, smoother.predictedRelative(tree.smoother_id));
-      smoother.removeObservation(newest, tree.smoother_id);
-      if (!tree.relative.isFinite())
-        continue;
-      const Vector4d steps = pixelSteps(camera, tree.relative);
-      moved_px = std::max(moved_px, tree.relative.minus(before).cwiseQuotient(steps).cwiseAbs().maxCoeff());
-      smoother.addObservation(newest, tree.smoother_id,
-                              convexified(expandEnergy(energy, camera, tree.relative), steps));
-    }
-    if (i > 0 && moved_px < kSettled_px)
-      return;
-    smoother.update();
+  for (int i = 0; i < kIterations && start.isFinite(); ++i) {
+    const Vector4d steps = pixelSteps(camera, start);
+    const SummaryFactor summary = expandEnergy(energy, camera, start);
+    if (!summary.f.allFinite() || !summary.F.allFinite())
+      return std::nullopt;
+    const Vector4d step = -convexified(summary, steps).F.ldlt().solve(summary.f);
+    if (step.cwiseQuotient(steps).cwiseAbs().maxCoeff() < kSettled_px)
+      return isConvex(summary, steps) ? std::optional(summary) : std::nullopt;
+    start = start.plus(step);
   }
+  return std::nullopt;
 }
 
 Sighting sightingOf(const ObservedTree &tree, const TrunkEnergy &energy, const Trunk &trunk, const Viewpoint &view)
@@ -95,12 +81,11 @@ std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<Observ
     tree.relative = smoother.predictedRelative(tree.smoother_id);
     const Trunk trunk = smoother.trunk(tree.smoother_id);
     smoother.removeObservation(newest, tree.smoother_id);
-    bool is_observed = false;
-    if (tree.relative.isFinite()) {
-      const SummaryFactor summary = expandEnergy(energy, view.camera, tree.relative);
-      is_observed = isConvex(summary, pixelSteps(view.camera, tree.relative)) &&
-                    smoother.addObservation(newest, tree.smoother_id, summary) != SummaryStatus::not_finite;
-    }
+    const std::optional<SummaryFactor> summary = minimised(energy, view.camera, tree.relative);
+    const bool is_observed =
+        summary && smoother.addObservation(newest, tree.smoother_id, *summary) != SummaryStatus::not_finite;
+    if (is_observed)
+      tree.relative = summary->optimum;
     if (tree.id < 0 && !is_observed) {
       smoother.removeTrunk(tree.smoother_id);
       continue;
@@ -179,6 +164,30 @@ std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flig
   if (!turn.complete)
     return std::nullopt;
   return RotationPrior{bMc.R.transpose() * turn.R * bMc.R, bMc.R.transpose() * turn.covariance() * bMc.R};
+}
+
+void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
+                     Smoother &smoother)
+{
+  constexpr int kIterations = 12;
+  constexpr double kSettled_px = 0.02;
+  const std::size_t newest = smoother.poseCount() - 1;
+  for (int i = 0; i < kIterations && !trees.empty(); ++i) {
+    double moved_px = 0;
+    for (ObservedTree &tree : trees) {
+      const RelativeTrunk before = std::exchange(tree.relative, smoother.predictedRelative(tree.smoother_id));
+      smoother.removeObservation(newest, tree.smoother_id);
+      if (!tree.relative.isFinite())
+        continue;
+      const Vector4d steps = pixelSteps(camera, tree.relative);
+      moved_px = std::max(moved_px, tree.relative.minus(before).cwiseQuotient(steps).cwiseAbs().maxCoeff());
+      smoother.addObservation(newest, tree.smoother_id,
+                              convexified(expandEnergy(energy, camera, tree.relative), steps));
+    }
+    if (i > 0 && moved_px < kSettled_px)
+      return;
+    smoother.update();
+  }
 }
 
 std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<float> *p_background, const Viewpoint &view,

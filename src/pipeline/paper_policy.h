@@ -6,8 +6,9 @@
 ///
 /// Idea: a pair of lines that the detector finds is a tree at once (Eq. 18 to 21). The trees that the frame before
 /// observed are observed again: their energies (Eq. 3 and 4) are optimised together with the pose, all other trees and
-/// what the earlier frames left (Eq. 2, Fig. 2), and there the image becomes a summary factor for ever (Eq. 9). A tree
-/// whose energy is not convex there is observed no more: it stays in the map, and nothing is ever associated with it.
+/// what the earlier frames left (Eq. 2, Fig. 2). At the minimum of its own energy next to where that leaves it the
+/// image of a tree becomes a summary factor for ever (Eq. 9). A tree whose energy has no minimum there is observed no
+/// more: it stays in the map, and nothing is ever associated with it.
 ///
 /// Laws (each a test): at the joint optimum the gradients of the images and of all other factors cancel; a tree is
 /// confirmed in the frame that finds it; one that ends stays, and what is found in its place is another tree.
@@ -39,6 +40,20 @@ SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps);
 /// The turn of the camera since the last pose of \p flight by the gyro, where it covers it: what EM starts from.
 std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flight, const Pose &bMc,
                                       const GyroOptions &options);
+
+/// A tree whose image takes part in the joint optimisation of a frame.
+struct ObservedTree
+{
+  int id = -1; ///< in the map; -1: found in this frame
+  std::size_t smoother_id = 0;
+  RelativeTrunk relative;
+};
+
+/// Eq. 2 with the energies (Eq. 3 and 4) of the newest pose's image, by Newton steps on all of it together: the energy
+/// of each of \p trees is expanded about where the last step left it, until no border moves any more. The last
+/// expansions stay in \p smoother as views of its newest pose.
+void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
+                     Smoother &smoother);
 
 /// From the newest pose's image to the map: detects, optimises jointly, summarises.
 /// Returns what was looked for.
