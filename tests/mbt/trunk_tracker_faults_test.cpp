@@ -227,12 +227,12 @@ TEST(TrunkTrackerFaults, WithOneTrunkTheHeightAndTheTurnAboutItStayOnThePrior)
   about << -axis.cross(foot), axis * tracker.getOptions().lever_m; // in m and rad * lever_m
   for (const Vector6d &direction : {along, about}) {
     Vector6d rest = direction.normalized();
-    for (unsigned c = 0; c < U.getCols(); ++c) {
+    for (unsigned k = 0; k < U.getCols(); ++k) {
       double dot = 0;
       for (unsigned i = 0; i < 6; ++i)
-        dot += U[i][c] * rest(int(i));
+        dot += U[i][k] * rest(int(i));
       for (unsigned i = 0; i < 6; ++i)
-        rest(int(i)) -= dot * U[i][c];
+        rest(int(i)) -= dot * U[i][k];
     }
     EXPECT_LT(rest.norm(), 0.1); // it is within what is told as not observed
   }

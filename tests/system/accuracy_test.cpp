@@ -32,8 +32,9 @@ TEST_P(Accuracy, IsNotBelowThatOfToday)
   const std::string simulated = freshFolder(std::string("flight_") + flight.name),
                     folder = freshFolder(std::string("map_") + flight.name);
   const bool is_demo = *flight.scene == '\0';
-  if (!is_demo)
+  if (!is_demo) {
     ASSERT_EQ(run(std::string("simulate --frames 100 --samples 2 -q -o ") + simulated + " " + flight.scene).status, 0);
+  }
   const std::string sequence = is_demo ? kFlight : simulated;
   ASSERT_EQ(run("track " + sequence + " -o " + folder + " --no-video").status, 0);
   const bole::Evaluation evaluation = bole::evaluate(folder, sequence);
@@ -50,8 +51,9 @@ TEST_P(Accuracy, IsNotBelowThatOfToday)
   EXPECT_LE(ate, flight.ate);
   for (const char *file : {"trajectory_online.tum", "map.svg", "timing.csv", "options.yaml"})
     EXPECT_TRUE(std::filesystem::exists(folder + "/" + file)) << file;
-  if (is_demo)
+  if (is_demo) {
     EXPECT_EQ(run("solve " + folder + "/graph.g2o").status, 0);
+  }
 }
 
 // found 7 of 10, 3 of 5, 8 of 9, 3 of 6, 5 of 6; wrong 1, 0, 0, 2, 1 of 9, 5, 8, 10, 6
@@ -65,5 +67,5 @@ INSTANTIATE_TEST_SUITE_P(
                     .015, .05},
         KnownFlight{"loop", "--seed 14 --density .08 --light sun --bark mixed --path loop --exposure 15", 4, 2, .075,
                     .075}),
-    [](const auto &info) { return std::string(info.param.name); });
+    [](const auto &flight) { return std::string(flight.param.name); });
 } // namespace
