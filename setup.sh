@@ -43,7 +43,7 @@ install_packages() { # PACKAGE...
 build_command() { # CMAKE_ARGUMENT...
   # shellcheck disable=SC2086
   install_packages $BUILD_PACKAGES
-  say "building the library and the command (about eight minutes on two cores)"
+  say "building the library and the command (about three minutes on two cores)"
   cmake --preset demo "$@" >build.log || { cat build.log && exit 1; }
   rm -f build.log
   cmake --build --preset demo
@@ -51,7 +51,7 @@ build_command() { # CMAKE_ARGUMENT...
 
 case "${1:-}" in
 demo)
-  echo "This takes about ten minutes on two cores."
+  echo "This takes about six minutes on two cores, a third of it for the packages."
   build_command
   ln -sf build/demo/bole bole
   say "mapping the demonstration flight"

@@ -58,6 +58,7 @@ processor_time() {
 
 make_minimal_system
 unpack_system
+commit=$(git -C "$sources" rev-parse --short=10 HEAD)
 processor_time
 start=$SECONDS processor_start=$processor
 case "$what" in
@@ -90,6 +91,5 @@ seconds=$((SECONDS - start))
 processor_time
 versions
 echo "$suite $what: passed in $((seconds / 60)) min $((seconds % 60)) s, $((processor - processor_start)) s of processor time, on $(nproc)" \
-  "processors, $(date -u +%Y-%m-%d), load $(cut -d' ' -f1 /proc/loadavg), commit" \
-  "$(git -C "$sources" rev-parse --short=10 HEAD)"
+  "processors, $(date -u +%Y-%m-%d), load $(cut -d' ' -f1 /proc/loadavg), commit $commit"
 rm -rf "$system"
