@@ -69,7 +69,7 @@ std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prio
   trunks.push_back(trunk);
   reopenTrunk(static_cast<int>(trunks.size()) - 1);
   Variable &variable = variables[trunks.back().variable];
-  variable.delta.head<5>() = point.minus(trunks.back().point);
+  variable.delta.head<5>() = trunks.back().kept = point.minus(trunks.back().point);
   if (!poses.empty())
     rememberProbe(variable);
   return trunks.size() - 1;
@@ -83,6 +83,7 @@ void Smoother::State::reopenTrunk(int trunk)
   variable.number = trunk;
   variable.dim = 5;
   trunks[trunk].variable = static_cast<int>(variables.size());
+  trunks[trunk].kept.setZero();
   variables.push_back(std::move(variable));
   if (options.fixed_lag > 0)
     open_trunks.push_back(trunks[trunk].variable);

@@ -167,23 +167,23 @@ Trunk Smoother::State::estimate(const TrunkState &trunk) const
 {
   if (!isOpen(trunk.variable))
     return trunk.point;
-  const Vector5d step = variables[trunk.variable].delta.head<5>();
-  return trunk.point.plus(limitedTrunkStep(trunk, step));
+  return trunk.point.plus(limitedTrunkStep(trunk, variables[trunk.variable].delta.head<5>()));
 }
 
 /// A step that would throw a trunk across the camera, or change its radius manyfold, is outside
 /// what the linearisation knows: only part of it is taken, and the rest found anew from there.
-Vector5d Smoother::State::limitedTrunkStep(const TrunkState &trunk, const Vector5d &step) const
+Vector5d Smoother::State::limitedTrunkStep(const TrunkState &trunk, const Vector5d &delta) const
 {
+  const Vector5d step = delta - trunk.kept;
   const double move = step.head<2>().norm();
   const double resize = std::abs(step(2));
   if (move < 0.1 && resize < 0.5)
-    return step;
+    return delta;
   double distance = 10;
   if (!poses.empty())
     distance = (poses[trunk.last_pose].point.t.head<2>() - trunk.point.xy).norm();
   const double limit = std::max(0.1, 0.5 * distance);
-  return step * std::min({1.0, limit / std::max(move, 1e-9), 0.7 / std::max(resize, 1e-9)});
+  return trunk.kept + step * std::min({1.0, limit / std::max(move, 1e-9), 0.7 / std::max(resize, 1e-9)});
 }
 
 /// Are all neighbours by factors to be eliminated again anyway?
@@ -210,7 +210,7 @@ void Smoother::State::relinearise(int v, const Eigen::Vector3d &shift)
     TrunkState &trunk = trunks[variable.number];
     const Trunk now = trunk.point.plus(limitedTrunkStep(trunk, variable.delta.head<5>()));
     trunk.point = shifted(now, shift);
-    variable.delta.head<5>() = now.minus(trunk.point);
+    variable.delta.head<5>() = trunk.kept = now.minus(trunk.point);
   }
   rememberProbe(variable);
   touchNeighbours(v);

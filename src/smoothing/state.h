@@ -131,6 +131,7 @@ struct TrunkState
   Trunk point;
   TrunkPrior prior;
   int variable = -1;
+  Vector5d kept = Vector5d::Zero(); ///< delta when the point was chosen: the common shift of its neighbours
   int last_pose = 0;
   int observations = 0;
   bool removed = false;
@@ -188,7 +189,7 @@ public:
   Vector6d linearPrediction(const Factor &factor) const;
   Pose estimate(const PoseState &pose) const;
   Trunk estimate(const TrunkState &trunk) const;
-  Vector5d limitedTrunkStep(const TrunkState &trunk, const Vector5d &step) const;
+  Vector5d limitedTrunkStep(const TrunkState &trunk, const Vector5d &delta) const;
 
   // elimination.cpp
   void eliminate(int variable);

@@ -206,5 +206,33 @@ TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
 
   EXPECT_LT(window.smoother.trunk(0).minus(before).norm(), 0.05);
 }
+TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
+{
+  FlightOptions o;
+  o.poses = 140;
+  Flight flight = simulateFlight(o);
+  flight.first_covariance.diagonal().head<2>().setConstant(1e2);
+  Replay replay(flight, smootherFor(o));
+  while (replay.next < 60)
+    replay.step();
+  PosePrior elsewhere;
+  elsewhere.mean = replay.smoother.pose(59);
+  elsewhere.mean.t += Eigen::Vector3d(3, 0, 0); // farther than half the distance of any trunk
+  elsewhere.covariance = Matrix6d::Identity();
+  elsewhere.covariance.topLeftCorner<3, 3>() *= 1e-6;
+  replay.smoother.addPosePrior(59, elsewhere);
+
+  replay.run();
+
+  std::vector<Trunk> online;
+  for (const auto &[j, summary] : flight.views.back())
+    online.push_back(replay.smoother.trunk(replay.trunk_id[j]));
+  ASSERT_GE(online.size(), 3u);
+  replay.smoother.optimize();
+  for (std::size_t k = 0; k < online.size(); ++k) {
+    const Trunk best = replay.smoother.trunk(replay.trunk_id[flight.views.back()[k].first]);
+    EXPECT_LT((best.xy - online[k].xy).norm(), 0.05) << k;
+  }
+}
 } // namespace
 } // namespace bole
