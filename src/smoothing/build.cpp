@@ -9,6 +9,11 @@ namespace bole
 {
 double *BlockStore::allocate(std::size_t count)
 {
+  if (std::vector<double *> &free = m_free[count]; !free.empty()) {
+    double *block = free.back();
+    free.pop_back();
+    return block;
+  }
   if (m_used + count > kChunk) {
     m_chunks.emplace_back(kChunk);
     m_used = 0;
@@ -104,18 +109,33 @@ int rowCount(FactorKind kind)
   }
 }
 
+int Smoother::State::placeFactor(const Factor &factor)
+{
+  if (free_factors.empty()) {
+    factors.push_back(factor);
+    return static_cast<int>(factors.size()) - 1;
+  }
+  const int id = free_factors.back();
+  free_factors.pop_back();
+  factors[id] = factor;
+  return id;
+}
+
+std::size_t Smoother::State::blockSize(const Factor &factor) const
+{
+  const int columns = variables[factor.a].dim + (factor.b >= 0 ? variables[factor.b].dim : 0) + 1;
+  return static_cast<std::size_t>(rowCount(factor.kind)) * columns;
+}
+
 int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
 {
-  const int rows = rowCount(kind);
   Factor factor;
   factor.kind = kind;
   factor.data = data;
   factor.a = a;
   factor.b = b;
-  const int columns = variables[a].dim + (b >= 0 ? variables[b].dim : 0) + 1;
-  factor.linear = store.allocate(static_cast<std::size_t>(rows) * columns);
-  const int id = static_cast<int>(factors.size());
-  factors.push_back(factor);
+  factor.linear = store.allocate(blockSize(factor));
+  const int id = placeFactor(factor);
   variables[a].factors.push_back(id);
   touch(a);
   if (b >= 0) {
@@ -132,6 +152,7 @@ void Smoother::State::dropFactor(int factor)
   if (!gone.alive)
     return;
   gone.alive = false;
+  dropped_factors.push_back(factor);
   constant_cost -= gone.stale ? 0 : gone.cost;
   if (gone.kind == FactorKind::observation) {
     --live_observations;
@@ -147,6 +168,27 @@ void Smoother::State::dropFactor(int factor)
   }
 }
 
+/// Once nothing that is eliminated names them any more.
+void Smoother::State::freeDropped()
+{
+  for (const int id : dropped_factors) {
+    const Factor &factor = factors[id];
+    free_data[static_cast<std::size_t>(factor.kind)].push_back(factor.data);
+    if (factor.linear != nullptr)
+      store.release(factor.linear, blockSize(factor));
+    free_factors.push_back(id);
+  }
+  dropped_factors.clear();
+  for (const int id : removed_variables) {
+    Variable &variable = variables[id];
+    for (std::vector<int> *list : {&variable.factors, &variable.children, &variable.separator, &variable.assembled})
+      std::vector<int>().swap(*list);
+    for (std::vector<double> *list : {&variable.columns, &variable.contribution})
+      std::vector<double>().swap(*list);
+  }
+  removed_variables.clear();
+}
+
 void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
 {
   if (!measured.aMb.isFinite())
@@ -155,8 +197,7 @@ void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
   const int variable_a = poses[a].variable, variable_b = poses[b].variable;
   if (!isOpen(variable_a) || !isOpen(variable_b))
     return;
-  odometry.push_back({measured, S});
-  newFactor(FactorKind::odometry, static_cast<int>(odometry.size()) - 1, variable_a, variable_b);
+  newFactor(FactorKind::odometry, placeData(odometry, FactorKind::odometry, {measured, S}), variable_a, variable_b);
 }
 
 void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
@@ -171,8 +212,8 @@ void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFac
   seen.last_pose = std::max(seen.last_pose, pose);
   ++seen.observations;
   ++live_observations;
-  observations.push_back({summary, root});
-  newFactor(FactorKind::observation, static_cast<int>(observations.size()) - 1, poses[pose].variable, seen.variable);
+  newFactor(FactorKind::observation, placeData(observations, FactorKind::observation, {summary, root}),
+            poses[pose].variable, seen.variable);
 }
 
 void Smoother::State::removeTrunk(int trunk)
@@ -196,6 +237,7 @@ void Smoother::State::removeTrunk(int trunk)
   constant_cost -= variable.share;
   variable.share = 0;
   variable.life = Life::removed;
+  removed_variables.push_back(gone.variable);
 }
 
 void Smoother::State::mergeTrunks(int keep, int gone)

@@ -24,7 +24,10 @@ void Smoother::State::closeVariable(int id)
   }
   for (const int f : v.assembled) {
     Factor &factor = factors[f];
+    if (!factor.alive)
+      continue;
     factor.alive = false;
+    dropped_factors.push_back(f);
     if (factor.kind == FactorKind::observation)
       --live_observations;
     const std::vector<int> pair = {factor.a, factor.b};
@@ -52,21 +55,19 @@ void Smoother::State::closeVariable(int id)
     for (int c = 0; c < m; ++c)
       data.g(c) = *from++;
     data.g_there = data.g;
-    const int id_factor = static_cast<int>(factors.size());
+    Factor factor;
+    factor.kind = FactorKind::marginal;
+    factor.stale = false;
+    factor.a = v.separator.front();
+    factor.assembled_at = v.parent;
+    const int id_factor = placeFactor(factor);
     for (const int other : v.separator) {
       const Variable &neighbour = variables[other];
       data.poses.push_back(neighbour.is_pose ? poses[neighbour.number].point : Pose());
       data.trunks.push_back(neighbour.is_pose ? Trunk() : trunks[neighbour.number].point);
       variables[other].factors.push_back(id_factor);
     }
-    Factor factor;
-    factor.kind = FactorKind::marginal;
-    factor.stale = false;
-    factor.data = static_cast<int>(marginals.size());
-    factor.a = v.separator.front();
-    factor.assembled_at = v.parent;
-    marginals.push_back(std::move(data));
-    factors.push_back(factor);
+    factors[id_factor].data = placeData(marginals, FactorKind::marginal, std::move(data));
     Variable &parent = variables[v.parent];
     parent.assembled.push_back(id_factor);
     parent.children.erase(std::remove(parent.children.begin(), parent.children.end(), id), parent.children.end());

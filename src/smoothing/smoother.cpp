@@ -124,10 +124,10 @@ void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseM
           "relative pose, must be finite with a direction of length 1");
   if (!m_state->isOpen(variable_a) || !m_state->isOpen(variable_b))
     return;
-  m_state->relative_poses.push_back(
-      {measurement, squareRootInformation<5>(measurement.covariance, "relative pose covariance")});
-  m_state->newFactor(FactorKind::relative_pose, static_cast<int>(m_state->relative_poses.size()) - 1, variable_a,
-                     variable_b);
+  const int data =
+      m_state->placeData(m_state->relative_poses, FactorKind::relative_pose,
+                         {measurement, squareRootInformation<5>(measurement.covariance, "relative pose covariance")});
+  m_state->newFactor(FactorKind::relative_pose, data, variable_a, variable_b);
 }
 
 void Smoother::addOdometry(std::size_t a, std::size_t b, const Odometry &odometry)
@@ -143,9 +143,8 @@ void Smoother::addHeight(std::size_t pose, double z, double sigma)
   m_state->checkPose(pose);
   require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
   require(std::isfinite(z) && std::isfinite(sigma) && sigma > 0, "height, must be finite with a sigma above 0");
-  m_state->heights.push_back({z, sigma});
-  m_state->newFactor(FactorKind::height, static_cast<int>(m_state->heights.size()) - 1, m_state->poses[pose].variable,
-                     -1);
+  const int data = m_state->placeData(m_state->heights, FactorKind::height, {z, sigma});
+  m_state->newFactor(FactorKind::height, data, m_state->poses[pose].variable, -1);
 }
 
 void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)
@@ -153,9 +152,9 @@ void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)
   m_state->checkPose(pose);
   require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
   require(prior.mean.isFinite(), "pose prior, must be finite");
-  m_state->pose_priors.push_back({prior, squareRootInformation<6>(prior.covariance, "pose prior covariance")});
-  m_state->newFactor(FactorKind::pose_prior, static_cast<int>(m_state->pose_priors.size()) - 1,
-                     m_state->poses[pose].variable, -1);
+  const int data = m_state->placeData(m_state->pose_priors, FactorKind::pose_prior,
+                                      {prior, squareRootInformation<6>(prior.covariance, "pose prior covariance")});
+  m_state->newFactor(FactorKind::pose_prior, data, m_state->poses[pose].variable, -1);
 }
 
 void Smoother::removeTrunk(std::size_t trunk)

@@ -15,19 +15,22 @@
 
 #include <array>
 #include <deque>
+#include <map>
 
 namespace bole
 {
-/// Stable blocks of doubles that are only ever given back all at once.
+/// Stable blocks of doubles; a block given back is the next of its size.
 class BlockStore
 {
 public:
   double *allocate(std::size_t count);
+  void release(double *block, std::size_t count) { m_free[count].push_back(block); }
   std::size_t bytes() const { return m_chunks.size() * kChunk * sizeof(double); }
 
 private:
   static constexpr std::size_t kChunk = 1 << 15;
   std::deque<std::vector<double>> m_chunks;
+  std::map<std::size_t, std::vector<double *>> m_free; ///< by size
   std::size_t m_used = kChunk;
 };
 
@@ -163,7 +166,11 @@ public:
   std::size_t newTrunk(const Trunk &point, const TrunkPrior &prior);
   void reopenTrunk(int trunk);
   int newFactor(FactorKind kind, int data, int a, int b);
+  int placeFactor(const Factor &factor);
+  template <typename Data> int placeData(std::deque<Data> &list, FactorKind kind, Data data);
+  std::size_t blockSize(const Factor &factor) const;
   void dropFactor(int factor);
+  void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
   void addObservationFactor(int pose, int trunk, const SummaryFactor &summary, const SquareRootSummary &root);
   void removeTrunk(int trunk);
@@ -249,6 +256,9 @@ public:
   {
     int variable, depth, quiet;
   };
+  std::vector<int> dropped_factors, removed_variables; ///< still named by what is to be eliminated again
+  std::vector<int> free_factors;
+  std::array<std::vector<int>, 6> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
   std::vector<Descent> stack;
   std::vector<double> front;
@@ -264,4 +274,17 @@ public:
   int oldest_open_pose = 0;
   BlockStore store;
 };
+/// Where one was freed, or at the end.
+template <typename Data> int Smoother::State::placeData(std::deque<Data> &list, FactorKind kind, Data data)
+{
+  std::vector<int> &free = free_data[static_cast<std::size_t>(kind)];
+  if (free.empty()) {
+    list.push_back(std::move(data));
+    return static_cast<int>(list.size()) - 1;
+  }
+  const int at = free.back();
+  free.pop_back();
+  list[at] = std::move(data);
+  return at;
+}
 } // namespace bole

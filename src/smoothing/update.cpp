@@ -104,6 +104,7 @@ void Smoother::State::reeliminate(UpdateResult &result)
     constant_cost += variables[id].share;
   }
   result.eliminated += affected.size();
+  freeDropped();
 }
 
 /// Asks for the memory of poses that a visit of \p pose will soon come to: over a long flight most

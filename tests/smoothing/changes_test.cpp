@@ -234,5 +234,39 @@ TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
     EXPECT_LT((best.xy - online[k].xy).norm(), 0.05) << k;
   }
 }
+
+/// Bytes by which a smoother grows from the 100th to the 200th frame, with trunks that are given up a frame later.
+std::size_t growth(int candidates, int fixed_lag)
+{
+  FlightOptions o;
+  o.poses = 200;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions options = smootherFor(o);
+  options.fixed_lag = fixed_lag;
+  Replay replay(flight, options);
+  std::size_t at_half = 0;
+  std::vector<std::size_t> given_up;
+  for (int i = 0; i < o.poses; ++i) {
+    if (i == 100)
+      at_half = replay.smoother.memoryBytes();
+    replay.add();
+    for (const std::size_t trunk : given_up)
+      replay.smoother.removeTrunk(trunk);
+    given_up.clear();
+    for (int k = 0; k < candidates && i > 20; ++k) {
+      const SummaryFactor &summary = flight.views[i].front().second;
+      const Pose wMc = replay.smoother.pose(i) * options.bMc;
+      given_up.push_back(replay.smoother.addTrunk(trunkFromRelative(wMc, summary.optimum, 0.15)));
+      for (int back = 0; back < 10; ++back)
+        replay.smoother.addObservation(i - back, given_up.back(), summary);
+    }
+    replay.smoother.update();
+  }
+  return replay.smoother.memoryBytes() - at_half;
+}
+
+TEST(Changes, TrunksThatAreGivenUpGiveTheirMemoryBack) { EXPECT_LT(growth(3, 0), 1.5 * growth(0, 0)); }
+
+TEST(Changes, TheLagGivesMemoryBack) { EXPECT_LT(growth(0, 40), 0.2 * growth(0, 0)); }
 } // namespace
 } // namespace bole
