@@ -5,8 +5,8 @@
 
 #include "input/truth.h"
 #include <bole/camera.h>
-#include <bole/report.h>
 #include <bole/pose.h>
+#include <bole/report.h>
 
 #include <string>
 #include <vector>

@@ -25,8 +25,8 @@
 
 #include <bole/graph.h>
 #include <bole/options.h>
-#include <bole/report.h>
 #include <bole/pose.h>
+#include <bole/report.h>
 
 #include <memory>
 #include <vector>

@@ -19,11 +19,11 @@ namespace bole
 {
 struct LineDetectorOptions
 {
-  bool either_polarity = true;     ///< false: dark trunks on bright background only, the paper's
+  bool either_polarity = true;                 ///< false: dark trunks on bright background only, the paper's
   double border_a = -200, border_b = 4;        ///< of Q for the mean gradient along a border (Eq. 19)
   double foreground_a = -12, foreground_b = 3; ///< of Q for the mean of 1 - p(background) along it (Eq. 20)
-  double inhibition_px = 6;        ///< sigma_R of Eq. 21, 0.5 to 100
-  double threshold = 0.75;         ///< on the probability of each border, 0 to 1; the paper's value
+  double inhibition_px = 6;                    ///< sigma_R of Eq. 21, 0.5 to 100
+  double threshold = 0.75;                     ///< on the probability of each border, 0 to 1; the paper's value
   double turning_threshold = 0.12; ///< the same for a camera that only turns: a pan blurs, and there is no saliency to
                                    ///< keep out what is not near, only how evenly borders run (MapOptions)
   double width_min_px = 6;         ///< of a trunk in the image, 2 to 1000

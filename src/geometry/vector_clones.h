@@ -2,7 +2,8 @@
 #pragma once
 /// \file
 /// Loops that are compiled twice: for the least machine of the architecture and for one with AVX2. The loader takes the
-/// one that the machine can run. Neither contracts products and sums, so that results differ by the order of sums alone.
+/// one that the machine can run. Neither contracts products and sums, so that results differ by the order of sums
+/// alone.
 
 #include <climits> // glibc's version
 

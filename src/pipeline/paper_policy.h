@@ -15,8 +15,8 @@
 
 #include "pipeline/adoption.h"
 #include "saliency/rotation_em.h"
-#include <bole/report.h>
 #include <bole/pose.h>
+#include <bole/report.h>
 
 namespace bole
 {

@@ -59,9 +59,9 @@ private:
   int m_rows, m_window_rows;
   std::size_t m_first_near = 0; ///< first step nearer than near_range
   float m_prior_log_odds;
-  std::vector<float> m_rho;       ///< [1/m], rising from 0
-  std::vector<float> m_log_prior; ///< of each step
-  std::vector<float> m_evidence;  ///< row by row, pixel by pixel, all steps of each
+  std::vector<float> m_rho;                                     ///< [1/m], rising from 0
+  std::vector<float> m_log_prior;                               ///< of each step
+  std::vector<float> m_evidence;                                ///< row by row, pixel by pixel, all steps of each
   std::vector<float> m_scratch, m_residuals, m_line, m_squares; ///< kept for their memory
 };
 

@@ -7,8 +7,8 @@
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
-#include <bole/graph.h>
 #include "support/shell.h"
+#include <bole/graph.h>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
