@@ -4,8 +4,8 @@
 /// What no command may make a drone do: the laws that vpRobotArDrone and the simulated drone keep.
 ///
 /// Idea: the laws stand in the robot's own loop, behind whoever sends velocities, and need nothing but the drone's own
-/// sensors and a clock. A velocity towards a limit is cut to what the way to it allows a drone that needs stopping_s
-/// times its speed to stop; what leads away from a limit is never cut.
+/// sensors and a clock. A velocity towards a limit is cut to what is left of the way to it when the drone has coasted
+/// to rest; what leads away from a limit is never cut.
 
 #include <Eigen/Core>
 
@@ -21,7 +21,7 @@ struct FlightLawOptions
   double lowest = 0.4;        ///< over the ground [m], 0 to 5: the sonar is blind below 0.3
   double highest = 4;         ///< over the ground [m], more than lowest, to 100
   double least_battery = 0.1; ///< share of full below which it lands, 0 to 1
-  double stopping_s = 1;      ///< way to stop over the speed [s], 0.1 to 5: lags of radio, tilt and velocity
+  double coast_s = 0.6;       ///< way on which it comes to rest over its speed [s], 0.1 to 5: lags of radio and tilt
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
@@ -29,10 +29,11 @@ struct FlightLawOptions
 /// By the drone's own sensors.
 struct OwnState
 {
-  Eigen::Vector2d place = Eigen::Vector2d::Zero(); ///< [m], any axes that do not turn
-  double yaw = 0;                                  ///< in these [rad]
-  double height = 0;                               ///< over the ground [m], 0 while the sonar is blind
-  double battery = 1;                              ///< share of full
+  Eigen::Vector2d place = Eigen::Vector2d::Zero();    ///< [m], any axes that do not turn
+  double yaw = 0;                                     ///< in these [rad]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< of the body [m/s]
+  double height = 0;                                  ///< over the ground [m], 0 while the sonar is blind
+  double battery = 1;                                 ///< share of full
 };
 
 struct FlightOrder

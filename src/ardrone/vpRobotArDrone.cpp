@@ -72,7 +72,7 @@ struct vpRobotArDrone::State
     }
     std::optional<bole::OwnState> own;
     if (body)
-      own = {body->wMb.t.head<2>(), bole::yawOf(body->wMb), body->height, body->battery};
+      own = {body->wMb.t.head<2>(), bole::yawOf(body->wMb), body->velocity, body->height, body->battery};
     const bole::FlightOrder order = laws.apply(now_s(), has_wanted ? std::optional(wanted) : std::nullopt, own);
     law = order.law;
     if (order.kind == bole::FlightOrder::Kind::lands) {

@@ -13,8 +13,11 @@ namespace
 {
 constexpr double kComeBack = 0.5; ///< from beyond a limit, no faster [m/s]
 
-/// Speed towards a limit that is \p way ahead.
-double towardsLimit(double way, double stopping_s) { return std::max(way / stopping_s, -kComeBack); }
+/// Speed that may be ordered towards a limit \p way ahead, by a drone that flies there at \p speed.
+double towardsLimit(double way, double speed, double coast_s)
+{
+  return std::max((way - coast_s * speed) / coast_s, -kComeBack);
+}
 } // namespace
 
 void FlightLawOptions::validate() const
@@ -25,7 +28,7 @@ void FlightLawOptions::validate() const
   requireRange("lowest", lowest, 0, 5);
   requireRange("highest", highest, lowest, 100);
   requireRange("least_battery", least_battery, 0, 1);
-  requireRange("stopping_s", stopping_s, 0.1, 5);
+  requireRange("coast_s", coast_s, 0.1, 5);
 }
 
 FlightLaws::FlightLaws(const FlightLawOptions &options) : m_options(options) { m_options.validate(); }
@@ -70,15 +73,16 @@ Eigen::Vector4d FlightLaws::limited(const Eigen::Vector4d &wanted, const OwnStat
   const double away = from_home.norm();
   if (away > 1e-6) {
     const Eigen::Vector2d out = Eigen::Rotation2Dd(-own.yaw) * Eigen::Vector2d(from_home / away);
-    const double too_fast = velocity.head<2>().dot(out) - towardsLimit(m_options.fence - away, m_options.stopping_s);
+    const double most = towardsLimit(m_options.fence - away, own.velocity.head<2>().dot(out), m_options.coast_s);
+    const double too_fast = velocity.head<2>().dot(out) - most;
     if (too_fast > 0) {
       velocity.head<2>() -= too_fast * out;
       law = "fence";
     }
   }
   if (own.height > 0) {
-    const double up = towardsLimit(m_options.highest - own.height, m_options.stopping_s),
-                 down = towardsLimit(own.height - m_options.lowest, m_options.stopping_s);
+    const double climb = own.velocity.z(), up = towardsLimit(m_options.highest - own.height, climb, m_options.coast_s),
+                 down = towardsLimit(own.height - m_options.lowest, -climb, m_options.coast_s);
     velocity.z() = std::clamp(velocity.z(), std::min(-down, up), up);
   }
   else

@@ -61,7 +61,6 @@ TEST(StageOptions, ThePaperPresetHasTheSaliencyAsPrinted)
   EXPECT_NE(valuesOf(paper.saliency), valuesOf(SaliencyOptions()));
   EXPECT_EQ(paper.tracking.energy.form, EnergyForm::paper);
   EXPECT_EQ(paper.tracking.energy.paper_alpha, 1000);
-  EXPECT_FALSE(paper.tracking.scan);
   EXPECT_TRUE(paper.gradient.split);
   EXPECT_FALSE(paper.lines.either_polarity);
   EXPECT_FALSE(paper.flow.use_points);

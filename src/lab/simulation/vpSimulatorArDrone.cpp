@@ -106,7 +106,12 @@ struct vpSimulatorArDrone::State
       return std::nullopt;
     const bole::Pose wMb = body.pose();
     const double height = wMb.t.z() - forest.terrain.height(wMb.t.x(), wMb.t.y());
-    return bole::OwnState{reckoned, bole::yawOf(wMb), height, std::max(0.0, 1 - time() / options.battery_s)};
+    const Eigen::Vector2d level = body.measuredVelocity();
+    return bole::OwnState{reckoned,
+                          bole::yawOf(wMb),
+                          {level.x(), level.y(), body.velocity().z()},
+                          height,
+                          std::max(0.0, 1 - time() / options.battery_s)};
   }
 
   void tick()

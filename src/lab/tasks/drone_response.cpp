@@ -15,6 +15,16 @@ void ResponseOptions::validate() const
   requireRange("turn_lag", turn_lag, 0, 3);
 }
 
+/// Of one of its lags: two for a velocity, one for the turn.
+double DroneResponse::lagOf(int axis) const { return axis == 3 ? m_options.turn_lag : 0.5 * m_options.speed_lag; }
+
+Eigen::Vector4d DroneResponse::coast() const
+{
+  Eigen::Vector4d path = m_options.turn_lag * m_velocity;
+  path.head<3>() = lagOf(0) * (m_velocity + m_push).head<3>();
+  return path;
+}
+
 DroneResponse::DroneResponse(const ResponseOptions &options) : m_options(options) { m_options.validate(); }
 
 void DroneResponse::send(double frame_time_s, const Eigen::Vector4d &velocity)
@@ -38,10 +48,11 @@ Eigen::Vector4d DroneResponse::advance(double time_s)
       until = std::min(until, m_sent[acts ? 1 : 0].first);
     const double dt = until - m_time_s;
     for (int axis = 0; axis < 4; ++axis) {
-      const double lag = axis == 3 ? m_options.turn_lag : m_options.speed_lag;
-      const double keep = lag > 0 ? std::exp(-dt / lag) : 0, ahead = m_velocity(axis) - wanted(axis);
-      path(axis) += wanted(axis) * dt + ahead * lag * (1 - keep);
-      m_velocity(axis) = wanted(axis) + ahead * keep;
+      const double lag = lagOf(axis), keep = lag > 0 ? std::exp(-dt / lag) : 0;
+      const double ahead = m_velocity(axis) - wanted(axis), push = axis == 3 ? 0 : m_push(axis) - wanted(axis);
+      path(axis) += wanted(axis) * dt + (ahead + push) * lag * (1 - keep) - push * dt * keep;
+      m_velocity(axis) = wanted(axis) + (ahead + (lag > 0 ? push * dt / lag : 0)) * keep;
+      m_push(axis) = wanted(axis) + push * keep;
     }
     m_time_s = until;
   }

@@ -103,8 +103,7 @@ std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::V
   return best;
 }
 
-GapTask::GapTask(const GapTaskOptions &options)
-    : ServoTask(options.safety), m_options(options), m_response(options.response)
+GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety, options.response), m_options(options)
 {
   m_options.validate();
 }
@@ -179,16 +178,11 @@ TaskCommand GapTask::fly(std::vector<Obstacle> surfaces, const Pose &wMb)
   const auto is_seen = [&](double x, double y) {
     return around().isSeen(m_gap->middle + axes.transpose() * Eigen::Vector2d(x, y));
   };
-  m_way = planWay(surfaces, axes * (m_response.rest() - m_gap->middle), goal, m_options.way, m_way, is_seen);
-  const Eigen::Vector2d velocity = axes.transpose() * (m_way.speed / m_response.obeyed() * m_way.ahead);
+  m_way = planWay(surfaces, axes * (response().rest() - m_gap->middle), goal, m_options.way, m_way, is_seen);
+  const Eigen::Vector2d velocity = axes.transpose() * (m_way.speed / response().obeyed() * m_way.ahead);
   const Eigen::Vector2d look =
       m_ahead < -kStopsTurning ? m_gap->middle - wMb.t.head<2>() : m_gap->along; // keeps both in view
   return {false, towards(wMb, velocity, std::atan2(look.y(), look.x())), m_way.is_open ? "flies" : "no way"};
-}
-
-void GapTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
-{
-  m_response.send(Eigen::Rotation2Dd(yawOf(report.wMb)) * velocity.head<2>());
 }
 
 /// It may stand between trunks now, and the last search was straight behind: sweeps less.
@@ -202,7 +196,6 @@ void GapTask::giveUpTarget()
 
 TaskCommand GapTask::act(const FrameReport &report)
 {
-  m_response.see(report.wMb.t.head<2>(), 1e-9 * static_cast<double>(report.stamp_ns));
   if (!m_gap)
     return search(report);
   const std::vector<Obstacle> surfaces = around().surfaces(report, 20, kViews);

@@ -9,7 +9,6 @@
 /// moves the way, and what was not known when the gap was chosen is kept clear of. When the trunks leave the image on
 /// both sides the map and the points carry the last metre.
 
-#include "lab/tasks/plane_response.h"
 #include "lab/tasks/servo_task.h"
 #include "lab/tasks/way_planner.h"
 
@@ -63,7 +62,6 @@ protected:
   bool sees(const FrameReport &report) const override;
   void giveUpTarget() override;
   TaskCommand act(const FrameReport &report) override;
-  void sent(const Eigen::Vector4d &velocity, const FrameReport &report) override;
 
 private:
   TaskCommand search(const FrameReport &report);
@@ -72,7 +70,6 @@ private:
 
   GapTaskOptions m_options;
   Sidestep m_sidestep{0.8, 9};
-  PlaneResponse m_response; ///< in world axes
   std::optional<Gap> m_gap;
   Way m_way;
   double m_across = 0, m_ahead = -100; ///< of the drone, from the gap's axis and middle [m]

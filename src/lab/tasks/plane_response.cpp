@@ -32,7 +32,7 @@ void PlaneResponse::see(const Eigen::Vector2d &place, double time_s)
   m_time_s = time_s;
   DroneResponse ahead = m_response;
   const Eigen::Vector2d late = ahead.advance(time_s + m_response.options().delay).head<2>();
-  m_rest = place + obeyed() * (late + m_response.options().speed_lag * ahead.velocity().head<2>());
+  m_rest = place + obeyed() * (late + ahead.coast().head<2>());
 }
 
 void PlaneResponse::send(const Eigen::Vector2d &velocity)

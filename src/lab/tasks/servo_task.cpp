@@ -32,9 +32,14 @@ const char *toString(TaskPhase phase)
   return "?";
 }
 
-ServoTask::ServoTask(const SafetyOptions &safety) : m_safety(safety) { m_safety.validate(); }
+ServoTask::ServoTask(const SafetyOptions &safety, const ResponseOptions &response)
+    : m_safety(safety), m_response(response)
+{
+  m_safety.validate();
+}
 
-TaskCommand ServoTask::step(const FrameReport &report)
+/// What the task wants, where it may want anything.
+TaskCommand ServoTask::decide(const FrameReport &report)
 {
   const bool is_ok = report.frame_status == FrameStatus::ok;
   const bool is_seen = is_ok && sees(report);
@@ -67,13 +72,24 @@ TaskCommand ServoTask::step(const FrameReport &report)
       return hover;
     }
   m_around.see(report);
-  TaskCommand command = act(report);
-  if (command.is_hovering)
-    return command;
+  return act(report);
+}
+
+TaskCommand ServoTask::step(const FrameReport &report)
+{
   const Eigen::Rotation2Dd heading(yawOf(report.wMb));
-  command.velocity.head<2>() =
-      heading.inverse() * safeVelocity(heading * Eigen::Vector2d(command.velocity.head<2>()), report.wMb.t.head<2>(),
-                                       m_around.surfaces(report, kGuarded, 1), m_around, m_safety);
+  const Eigen::Vector2d place = report.wMb.t.head<2>();
+  m_response.see(place, 1e-9 * static_cast<double>(report.stamp_ns));
+  TaskCommand command = decide(report);
+  if (command.is_hovering) {
+    m_response.send(Eigen::Vector2d::Zero());
+    return command;
+  }
+  const Eigen::Vector2d safe =
+      safeVelocity(heading * Eigen::Vector2d(command.velocity.head<2>()), place, m_response.rest(),
+                   m_around.surfaces(report, kGuarded, 1), m_around, m_safety);
+  m_response.send(safe);
+  command.velocity.head<2>() = heading.inverse() * safe;
   sent(command.velocity, report);
   return command;
 }

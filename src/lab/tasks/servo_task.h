@@ -13,6 +13,7 @@
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
 #include "geometry/yaw.h"
+#include "lab/tasks/plane_response.h"
 #include "lab/tasks/surroundings.h"
 #include <bole/report.h>
 
@@ -46,7 +47,7 @@ class ServoTask
 public:
   using Values = std::vector<std::pair<std::string, double>>;
 
-  explicit ServoTask(const SafetyOptions &safety = {});
+  explicit ServoTask(const SafetyOptions &safety = {}, const ResponseOptions &response = {});
   virtual ~ServoTask() = default;
 
   TaskCommand step(const FrameReport &report);
@@ -65,11 +66,15 @@ protected:
   /// What of act()'s velocity is sent.
   virtual void sent(const Eigen::Vector4d &, const FrameReport &) {}
   const Surroundings &around() const { return m_around; }
+  const PlaneResponse &response() const { return m_response; } ///< in the world's axes
   void enter(TaskPhase phase) { m_phase = phase; }
 
 private:
+  TaskCommand decide(const FrameReport &report);
+
   SafetyOptions m_safety;
   Surroundings m_around;
+  PlaneResponse m_response;
   std::string m_failure; ///< of a sensor
   TaskPhase m_phase = TaskPhase::searching;
   bool m_is_lost = false;

@@ -33,9 +33,8 @@ void SlalomTaskOptions::validate() const
 }
 
 SlalomTask::SlalomTask(const SlalomTaskOptions &options)
-    : ServoTask(options.safety),
+    : ServoTask(options.safety, options.response),
       m_options(options),
-      m_response(options.response),
       m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
   m_options.validate();
@@ -65,13 +64,6 @@ void SlalomTask::locate(const FrameReport &report)
   m_lead += std::max(0.0, kSwingOn * (time_s - m_time_s) - (place.x() - m_place.x()));
   m_place = place;
   m_time_s = time_s;
-  m_response.see(place, time_s);
-}
-
-void SlalomTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
-{
-  const double heading = yawOf(report.wMb) - yawOf(m_start);
-  m_response.send(Eigen::Rotation2Dd(heading) * velocity.head<2>());
 }
 
 TaskCommand SlalomTask::act(const FrameReport &report)
@@ -98,8 +90,8 @@ TaskCommand SlalomTask::act(const FrameReport &report)
   goal.y_high = std::max(m_options.reach, std::abs(m_place.y()) + 1);
   goal.y_low = -goal.y_high;
   goal.detour = [this](double x, double y) { return m_options.off_line * std::abs(y - line(x)); };
-  m_way = planWay(surfaces, m_response.rest(), goal, m_options.way, m_way, is_seen);
-  const Eigen::Vector2d velocity = m_way.speed / m_response.obeyed() * m_way.ahead;
+  m_way = planWay(surfaces, axes * (response().rest() - m_start.t.head<2>()), goal, m_options.way, m_way, is_seen);
+  const Eigen::Vector2d velocity = m_way.speed / response().obeyed() * m_way.ahead;
   const Eigen::Vector2d look = m_way.lookedAt(m_place, kLookAt);
   const double turned = std::clamp(std::atan2(look.y(), look.x()), -kLargestLook, kLargestLook);
   return {false, towards(report.wMb, axes.transpose() * velocity, yawOf(m_start) + turned),

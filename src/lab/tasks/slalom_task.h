@@ -9,7 +9,6 @@
 /// is not in the map. The line swings on where the drone is held up, since what is no trunk shows itself as such from
 /// another side. The camera looks where the way leads.
 
-#include "lab/tasks/plane_response.h"
 #include "lab/tasks/servo_task.h"
 #include "lab/tasks/way_planner.h"
 
@@ -42,7 +41,6 @@ public:
 protected:
   bool sees(const FrameReport &) const override { return true; }
   TaskCommand act(const FrameReport &report) override;
-  void sent(const Eigen::Vector4d &velocity, const FrameReport &report) override;
 
 private:
   void locate(const FrameReport &report);
@@ -54,7 +52,6 @@ private:
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< along, across (left) [m]
   double m_lead = 0; ///< by how much the swing of the line is ahead, since it goes on where the drone does not [m]
   double m_time_s = 0;
-  PlaneResponse m_response;
   Sidestep m_sidestep;
   Way m_way;
 };

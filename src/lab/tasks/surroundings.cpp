@@ -33,7 +33,7 @@ std::vector<Obstacle> Surroundings::surfaces(const FrameReport &report, double r
   return surfaces;
 }
 
-Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p,
+Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p, const Eigen::Vector2d &rest,
                              const std::vector<Obstacle> &surfaces, const Surroundings &around,
                              const SafetyOptions &options)
 {
@@ -45,15 +45,17 @@ Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vecto
     if (!surface.is_confirmed || surface.evidence < 0 || distance < 1e-6)
       continue;
     const Eigen::Vector2d u = w / distance;
-    const double way = distance - surface.radius - options.hull - options.least_free;
+    const double way = distance - surface.radius - options.hull - options.least_free - std::max(0.0, (rest - p).dot(u));
     safe -= std::max(0.0, safe.dot(u) - std::max(0.0, way / options.stopping_s)) * u;
   }
   const double speed = safe.norm();
   if (speed <= options.unseen_speed)
     return safe;
+  const Eigen::Vector2d ahead = safe / speed;
+  const double coast = std::max(0.0, (rest - p).dot(ahead)), wanted = coast + speed * options.stopping_s;
   double free = options.hull; // where it is, it is
-  while (free < speed * options.stopping_s && around.isSeen(p + free / speed * safe))
+  while (free < wanted && around.isSeen(p + free * ahead))
     free += kLook;
-  return safe * (std::clamp(free / options.stopping_s, options.unseen_speed, speed) / speed);
+  return safe * (std::clamp((free - coast) / options.stopping_s, options.unseen_speed, speed) / speed);
 }
 } // namespace bole

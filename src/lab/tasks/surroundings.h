@@ -14,7 +14,7 @@ struct SafetyOptions
   int patience_frames = 40;  ///< good frames without it before it looks for another, 1 to 10000
   double hull = 0.28;        ///< radius of the drone [m], 0.05 to 2
   double least_free = 0.12;  ///< between hull and what is believed to be bark [m], 0 to 2: what the drone errs
-  double stopping_s = 1;     ///< way to stop over the speed [s]: lags of video, radio, tilt and velocity, 0.1 to 5
+  double stopping_s = 0.5;   ///< over which what is left of a way is flown [s], 0.1 to 5: a gain of 2/s, as hold's
   double unseen_speed = 0.5; ///< into what was not seen to be free [m/s], 0.02 to 3: a bump that breaks nothing
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
@@ -35,11 +35,11 @@ private:
   SeenSpace m_seen;
 };
 
-/// \p velocity [m/s, world] at \p p, cut to what the laws allow:
+/// \p velocity [m/s, world] at \p p, cut to what the laws allow a drone that would coast to \p rest:
 /// - towards a believed surface (confirmed trunks that are rather trunks than none, upright points) no faster than lets
 ///   the drone stop least_free before it; nothing pushes back: what is no trunk must not drive the drone into one;
 /// - no faster than lets it stop within what was seen to be free, or at unseen_speed.
-Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p,
+Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p, const Eigen::Vector2d &rest,
                              const std::vector<Obstacle> &surfaces, const Surroundings &around,
                              const SafetyOptions &options);
 } // namespace bole

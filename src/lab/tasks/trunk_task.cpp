@@ -19,9 +19,9 @@ constexpr double kChoiceEvidence = 2;    ///< nor, at first, those of lower log 
 constexpr int kChoiceViews = 25;         ///< a trunk seen less often is not chosen yet: what is none is given up sooner
 constexpr double kBearingNoise = 0.0015; ///< of a tracked trunk in one image [rad]: a third of a pixel
 constexpr double kRatioNoise = 0.025;    ///< of its log r/d: half a pixel on a width of 20
-constexpr double kUnrest =
-    0.15;                     ///< how fast the velocity that nobody ordered changes [m/s per root of a second]: gusts
-constexpr double kSway = 0.8; ///< largest speed of swaying, where a distance is asked for [m/s]
+constexpr double kUnrest = 0.15;         ///< of the velocity sideways that nobody ordered [m/s per root of a second]
+constexpr double kApproachUnrest = 0.05; ///< and of that ahead: learnt no faster than delay and lags let it be mended
+constexpr double kSway = 0.8;            ///< largest speed of swaying, where a distance is asked for [m/s]
 constexpr double kSwayClimb = 0.4;       ///< largest rate of climb meanwhile [m/s]
 constexpr double kSwayPeriod_s = 6;      ///< 0.76 m to either side: 15 degrees of parallax at 3 m
 constexpr double kPause_s = 0.25;        ///< without a command it hovered: what was sent before is over
@@ -52,7 +52,7 @@ void TrunkTaskOptions::validate() const
 }
 
 TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
-    : ServoTask(options.safety),
+    : ServoTask(options.safety, options.response),
       m_bMc(bMc),
       m_options(options),
       m_sidestep(0.7, kSidestep_s),
@@ -266,7 +266,7 @@ void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
   if (m_has_feature) {
     const Eigen::Vector2d moved = interactionOf(feature) * path;
     m_bearing.predict(moved(0), dt, kUnrest / d);
-    m_log_ratio.predict(moved(1), dt, kUnrest / d);
+    m_log_ratio.predict(moved(1), dt, kApproachUnrest / d);
     m_bearing.correct(feature.bearing(), kBearingNoise);
     m_log_ratio.correct(feature.logRatio(), kRatioNoise);
   }
@@ -288,9 +288,11 @@ Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, do
   const Eigen::Vector2d drift(std::clamp(m_bearing.drift(), -most, most), std::clamp(m_log_ratio.drift(), -most, most));
   DroneResponse ahead = m_response;
   const Eigen::Vector2d there = J * ahead.advance(time_s + response.delay) + response.delay * drift;
-  const Eigen::Vector2d rate = J * ahead.velocity() + drift;
-  m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * rate(0), feature.inclination(), feature.tip(),
-                      m_log_ratio.value() + there(1) + response.speed_lag * rate(1), radius);
+  Eigen::Vector4d approach = response.speed_lag * ahead.velocity(); // what leads on sideways does not end
+  approach.x() = ahead.coast().x();
+  m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * (J.row(0).dot(ahead.velocity()) + drift(0)),
+                      feature.inclination(), feature.tip(),
+                      m_log_ratio.value() + there(1) + J.row(1).dot(approach) + response.speed_lag * drift(1), radius);
   ahead.send(time_s, {0, round, 0, 0});
   ahead.advance(time_s + response.delay + response.turn_lag); // the turn lags too: it is to match what is flown then
   return drift + J.col(1) * ahead.velocity().y();

@@ -38,7 +38,7 @@ struct TrunkTaskOptions
   double distance = 3;        ///< camera to axis, where no ratio is given [m], 0.5 to 20
   double bearing = 0;         ///< to be kept, positive right [rad], -0.5 to 0.5
   double speed = 0;           ///< round the trunk, positive to the left [m/s], -2 to 2; 0 holds
-  double gain = 2;            ///< of vpServo [1/s], 0.05 to 3
+  double gain = 1.6;          ///< of vpServo [1/s], 0.05 to 3: leaves a modulus margin of .5
   double largest_speed = 0.9; ///< [m/s], 0.05 to 3
   double free_way = 0.5;      ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
   double search_s = 40;       ///< gives up after [s], 1 to 600

@@ -229,9 +229,7 @@ Way planWay(const std::vector<Obstacle> &surfaces, const Eigen::Vector2d &from, 
     if (next == k)
       break;
     if (field.clearance(next) <= field.clearance(k)) // what leads away need not slow down
-      way.speed =
-          std::min(way.speed, field.speed(next) + std::max(0.0, flown + (field.place(next) - here).norm() - kGrid) /
-                                                      options.stopping_s);
+      way.speed = std::min(way.speed, field.speed(next) + std::max(0.0, flown - kGrid) / options.stopping_s);
     k = next;
   }
   if ((aim - from).norm() > 1e-6)

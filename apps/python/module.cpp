@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The Python module: frames, reports, trunks and trajectories as numpy arrays. What users import is src/python/bole,
+// The Python module: frames, reports, trunks and trajectories as numpy arrays. What users import is apps/python/bole,
 // which adds the reading of a run's folder.
 #include <bole/config.h>
 #include <bole/open_source.h>
