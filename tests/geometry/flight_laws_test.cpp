@@ -97,11 +97,7 @@ TEST(FlightLaws, ItStopsBeforeTheFenceWhereverItHeads)
     laws.takeOff(0);
     double farthest = 0;
     const Eigen::Vector2d end = flown(laws, {1, 0.4, 0, 0}, yaw, 60, farthest);
-<<<<<<< HEAD
-    EXPECT_LT(farthest, 5.12);  // what the lag of half a second costs
-=======
     EXPECT_LT(farthest, 5.02);
->>>>>>> servo
     EXPECT_GT(end.norm(), 4.8); // and it does fly up to it
   }
 }
