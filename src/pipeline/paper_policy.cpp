@@ -14,6 +14,8 @@ namespace bole
 {
 namespace
 {
+constexpr double kNoCurvature = 1e-6; ///< of an energy without borders, by rounding [1/px^2]
+
 TrunkEnergy energyOf(const Gradient &gradient, const PinholeCamera &camera, const StageOptions &options)
 {
   return {gradient, camera, kWholeLine, BorderTarget(), BorderTarget(), options.tracking.energy};
@@ -139,16 +141,16 @@ SummaryFactor expandEnergy(const TrunkEnergy &energy, const PinholeCamera &camer
 bool isConvex(const SummaryFactor &summary, const Vector4d &steps)
 {
   const Matrix4d F = steps.asDiagonal() * summary.F * steps.asDiagonal();
-  return F.allFinite() && Eigen::SelfAdjointEigenSolver<Matrix4d>(F).eigenvalues()(0) > 0;
+  return F.allFinite() && Eigen::SelfAdjointEigenSolver<Matrix4d>(F).eigenvalues()(0) > kNoCurvature;
 }
 
 SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps)
 {
   constexpr double kMost_px = 1;
-  constexpr double kLeast = 1e-6; // curvature [1/px^2]: nothing
   const Eigen::SelfAdjointEigenSolver<Matrix4d> eigen(steps.asDiagonal() * summary.F * steps.asDiagonal());
   const Vector4d slope = eigen.eigenvectors().transpose() * steps.cwiseProduct(summary.f);
-  const Vector4d curvature = eigen.eigenvalues().cwiseAbs().cwiseMax(slope.cwiseAbs() / kMost_px).cwiseMax(kLeast);
+  const Vector4d curvature =
+      eigen.eigenvalues().cwiseAbs().cwiseMax(slope.cwiseAbs() / kMost_px).cwiseMax(kNoCurvature);
   const Matrix4d V = steps.cwiseInverse().asDiagonal() * eigen.eigenvectors();
   summary.F = V * curvature.asDiagonal() * V.transpose();
   return summary;

@@ -120,30 +120,6 @@ TEST(PaperPolicy, AWideningBaselineFindsTheRange)
   EXPECT_NEAR(trunk.radius(), 0.2, 0.04);
 }
 
-TEST(PaperPolicy, ATreeWhoseEnergyIsNotConvexEndsAndStaysInTheMap)
-{
-  Mapping mapping;
-  mapping.see(kOneTree);
-  const auto seen = mapping.see({});
-  ASSERT_EQ(seen.size(), 1u);
-  EXPECT_FALSE(seen[0].is_tracked);
-  EXPECT_STREQ(seen[0].outcome, "negative curvature");
-  EXPECT_TRUE(mapping.map.active().empty());
-  EXPECT_EQ(mapping.confirmed(), 1);
-  EXPECT_TRUE(mapping.map.review(1e6).changes.empty());
-  EXPECT_TRUE(mapping.map.reviewAll().changes.empty());
-}
-
-TEST(PaperPolicy, WhatIsFoundAgainIsAnotherTree)
-{
-  Mapping mapping;
-  mapping.see(kOneTree);
-  mapping.see({});
-  mapping.see(kOneTree);
-  EXPECT_EQ(mapping.confirmed(), 2);
-  EXPECT_EQ(mapping.map.active().size(), 1u);
-}
-
 TEST(PaperPolicy, ATreeThatIsObservedKeepsOthersOut)
 {
   Mapping mapping;
