@@ -1,28 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
 
-#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
-namespace
-{
-/// The odometry at a stamp; before its first pose, by no more than a step of it, as it began to move.
-std::optional<Pose> odometryAt(const Trajectory &odometry, std::int64_t stamp_ns, std::int64_t max_gap_ns)
-{
-  if (odometry.size() < 2 || stamp_ns >= odometry[0].stamp_ns)
-    return interpolate(odometry, stamp_ns, max_gap_ns);
-  const std::int64_t early_ns = odometry[0].stamp_ns - stamp_ns, step_ns = odometry[1].stamp_ns - odometry[0].stamp_ns;
-  if (early_ns > std::min(step_ns, max_gap_ns))
-    return std::nullopt;
-  const double part = -static_cast<double>(early_ns) / static_cast<double>(step_ns);
-  return odometry[0].wMb.plus(part * odometry[1].wMb.minus(odometry[0].wMb));
-}
-} // namespace
-
 FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
     : m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
@@ -51,7 +35,7 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
   frame.status = file.status;
   frame.message = std::move(file.message);
   frame.image = std::move(file.image);
-  frame.wMb_odometry = odometryAt(m_recording.odometry, stamp_ns, m_max_gap_ns);
+  frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns, m_max_gap_ns);
   frame.wMb_truth = interpolate(m_recording.truth, stamp_ns, m_max_gap_ns);
 
   const auto &gyro = m_recording.gyro;
