@@ -353,7 +353,7 @@ def reliability(trunks, runs):
                     k = sum(t["kind"] == "matched" for t in some)
                     a, b = wilson(k, len(some))
                     x = sum(float(t["probability"]) for t in some) / len(some)
-                    axes.errorbar([x], [k / len(some)], [[k / len(some) - a], [b - k / len(some)]], color=colour, marker="o", capsize=3,
+                    axes.errorbar([x], [k / len(some)], [[max(0, k / len(some) - a)], [max(0, b - k / len(some))]], color=colour, marker="o", capsize=3,
                                   label=run if f"{run}" not in axes.get_legend_handles_labels()[1] else None)
         if not axes.has_data():
             return False

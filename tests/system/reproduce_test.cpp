@@ -29,24 +29,6 @@ struct ReproduceCommand : testing::Test
   }
 };
 
-TEST_F(ReproduceCommand, DrawsEveryFigureOnOnePageThatNeedsNothingElse)
-{
-  simulate();
-  const Outcome outcome = run("reproduce -q -o " + folder + "/figures " + folder + "/short");
-  ASSERT_EQ(outcome.status, 0) << outcome.text;
-  std::ifstream file(folder + "/figures/index.html");
-  std::stringstream page;
-  page << file.rdbuf();
-  for (const char *figure : {"Fig. 5", "Fig. 6", "7 a", "7 b", "7 c", "7 d: no parallax", "7 d: a far trunk", "Fig. 8"})
-    EXPECT_THAT(page.str(), HasSubstr(figure));
-  for (const char *method : {"paper, alpha 1000", "paper, calibrated", "default"})
-    EXPECT_THAT(page.str(), HasSubstr(method));
-  EXPECT_THAT(page.str(), Not(HasSubstr("src=\"figure")));
-  for (const char *name :
-       {"figure-5.svg", "figure-6.svg", "figure-7a.png", "figure-7a-map.svg", "figure-8a-saliency.png"})
-    EXPECT_GT(fs::file_size(folder + "/figures/short/" + name), 500u) << name;
-}
-
 TEST_F(ReproduceCommand, PrintsTheStatisticsThatTheDetectorsThresholdsComeFrom)
 {
   simulate();
