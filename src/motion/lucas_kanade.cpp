@@ -5,15 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/video/tracking.hpp>
 
 namespace bole
 {
 namespace
 {
-constexpr float kLeastTexture = 0.1f; ///< mean square of the gradient in its weakest direction [grey levels^2/px^2]
-constexpr float kSettled_px = 0.01f;  ///< a step below this is the last
-constexpr float kSwinging_px = 0.01f; ///< two steps that undo each other to this end the search half-way
+constexpr float kLeastTexture = 1e-4f;   ///< of the window, in its weakest direction, as OpenCV measures it
+constexpr float kUnit = 1.f / (1 << 20); ///< of the sums of products, OpenCV's
+constexpr float kSettled_px = 0.01f;     ///< a step below this is the last
+constexpr float kSwinging_px = 0.01f;    ///< two steps that undo each other to this end the search half-way
 
 GreyPlane plane(const cv::Mat &level)
 {
@@ -33,10 +35,10 @@ bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f
     return false;
   Window window;
   cutWindow(first, from.x, from.y, window);
-  const float half_sum = 0.5f * (window.xx + window.yy), half_difference = 0.5f * (window.xx - window.yy);
-  const float weakest = half_sum - std::hypot(half_difference, window.xy);
-  const float determinant = window.xx * window.yy - window.xy * window.xy;
-  if (weakest < kLeastTexture * kWindow_px * kWindow_px || !(determinant > 0))
+  const float xx = kUnit * window.xx, xy = kUnit * window.xy, yy = kUnit * window.yy;
+  const float weakest = (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy)) / (2 * kWindow_px * kWindow_px);
+  const float determinant = xx * yy - xy * xy;
+  if (weakest < kLeastTexture || determinant < std::numeric_limits<float>::epsilon())
     return false;
   const float inverse = 1 / determinant;
   cv::Point2f before(0, 0);
@@ -45,8 +47,9 @@ bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f
       return false;
     float by_x, by_y;
     mismatch(second, to.x, to.y, window, by_x, by_y);
-    const cv::Point2f step((window.xy * by_y - window.yy * by_x) * inverse,
-                           (window.xy * by_x - window.xx * by_y) * inverse);
+    by_x *= kUnit;
+    by_y *= kUnit;
+    const cv::Point2f step((xy * by_y - yy * by_x) * inverse, (xy * by_x - xx * by_y) * inverse);
     to += step;
     if (step.dot(step) <= kSettled_px * kSettled_px)
       break;

@@ -4,8 +4,8 @@
 /// Where small windows of one image are in the next: pyramidal Lucas-Kanade.
 ///
 /// The method, its pyramid and its limits are those of cv::calcOpticalFlowPyrLK (J.-Y. Bouguet, Pyramidal
-/// implementation of the Lucas Kanade feature tracker), in floats, a row of the window at a time: a third of the
-/// instructions.
+/// implementation of the Lucas Kanade feature tracker), a row of the window at a time: a third of the
+/// instructions, and the same to the rounding of sums.
 
 #include <opencv2/core.hpp>
 #include <vector>

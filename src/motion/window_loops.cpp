@@ -11,59 +11,92 @@ namespace bole
 namespace
 {
 constexpr int kLanes = kWindowLanes, kSide = kWindow_px;
+constexpr int kWeightBits = 14, kGreyBits = 5; // of the weights of four pixels, and below a grey level
 
-/// Rows of an image from pixel (x, y) on, linear between columns; returns how far y is from its row.
-template <int kRows> inline float rowsAt(const GreyPlane &image, float x, float y, float *__restrict rows)
+/// A place between four pixels: the first of them, and their weights.
+struct Between
 {
-  const float left = std::floor(x), top = std::floor(y), a = x - left;
-  const unsigned char *p =
-      image.pixels + static_cast<std::ptrdiff_t>(top) * image.stride + static_cast<std::ptrdiff_t>(left);
-  for (int i = 0; i < kRows; ++i, p += image.stride)
+  Between(const GreyPlane &image, float x, float y)
+      : left(static_cast<int>(std::floor(x))),
+        top(static_cast<int>(std::floor(y))),
+        pixel(image.pixels + top * image.stride + left)
+  {
+    const float a = x - static_cast<float>(left), b = y - static_cast<float>(top), unit = 1 << kWeightBits;
+    w00 = static_cast<int>(std::lrint((1 - a) * (1 - b) * unit));
+    w01 = static_cast<int>(std::lrint(a * (1 - b) * unit));
+    w10 = static_cast<int>(std::lrint((1 - a) * b * unit));
+    w11 = (1 << kWeightBits) - w00 - w01 - w10;
+  }
+
+  int left, top;
+  const unsigned char *pixel;
+  int w00, w01, w10, w11;
+};
+
+constexpr int rounded(int value, int bits) { return (value + (1 << (bits - 1))) >> bits; }
+
+/// Rows of pixels, a line of lanes each, and zeros after them.
+template <int kRows> inline void copyRows(const unsigned char *pixels, std::ptrdiff_t stride, int *__restrict rows)
+{
+  for (int i = 0; i < kRows; ++i, pixels += stride)
 #pragma omp simd
-    for (int k = 0; k < kLanes; ++k) {
-      const float here = static_cast<float>(p[k]), next = static_cast<float>(p[k + 1]);
-      rows[i * kLanes + k] = here + a * (next - here);
-    }
-  return y - top;
+    for (int k = 0; k < kLanes; ++k)
+      rows[i * kLanes + k] = pixels[k];
+  std::fill_n(rows + kRows * kLanes, kLanes, 0);
 }
 } // namespace
 
 BOLE_VECTOR_CLONES
 void cutWindow(const GreyPlane &image, float x, float y, Window &window)
 {
-  constexpr int kOuter = kSide + 2, kSize = kSide * kLanes;
-  float rows[(kOuter + 1) * kLanes], grey[(kOuter + 1) * kLanes];
-  const float b = rowsAt<kOuter + 1>(image, x - 1, y - 1, rows);
-  for (int k = 0; k < kOuter * kLanes; ++k)
-    grey[k] = rows[k] + b * (rows[k + kLanes] - rows[k]);
-  std::fill_n(grey + kOuter * kLanes, kLanes, 0.f);
-  // Scharr's derivative, a grey level a pixel
-  constexpr float kMiddle = 10.f / 32, kSideways = 3.f / 32;
-  float down[kSize + kLanes], across[kSize + kLanes];
-  for (int k = 0; k < kSize; ++k) {
-    down[k] = kMiddle * grey[k + kLanes] + kSideways * (grey[k] + grey[k + 2 * kLanes]);
-    across[k] = grey[k + 2 * kLanes] - grey[k];
+  constexpr int kOuter = kSide + 1, kSize = kSide * kLanes, kOuterSize = kOuter * kLanes;
+  const Between at(image, x, y);
+  int raw[(kOuter + 3) * kLanes]; // from the pixel before the first on
+  copyRows<kOuter + 2>(at.pixel - image.stride - 1, image.stride, raw);
+  int down[kOuterSize + kLanes], across[kOuterSize + kLanes];
+  for (int k = 0; k < kOuterSize; ++k) {
+    down[k] = 3 * (raw[k] + raw[k + 2 * kLanes]) + 10 * raw[k + kLanes];
+    across[k] = raw[k + 2 * kLanes] - raw[k];
   }
-  std::fill_n(down + kSize, kLanes, 0.f);
-  std::fill_n(across + kSize, kLanes, 0.f);
-  float is_inside[kLanes];
+  std::fill_n(down + kOuterSize, kLanes, 0);
+  std::fill_n(across + kOuterSize, kLanes, 0);
+  int is_column[kLanes], is_lane[kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    is_column[k] = at.left + k >= 0 && at.left + k < image.width ? 1 : 0;
+    is_lane[k] = k < kSide ? 1 : 0;
+  }
+  int dx[kOuterSize + kLanes], dy[kOuterSize + kLanes]; // Scharr's derivatives
+  for (int i = 0; i < kOuter; ++i) {
+    const int is_row = at.top + i >= 0 && at.top + i < image.height ? 1 : 0;
 #pragma omp simd
-  for (int k = 0; k < kLanes; ++k)
-    is_inside[k] = k < kSide ? 1.f : 0.f;
+    for (int k = 0; k < kLanes; ++k) {
+      const int j = i * kLanes + k, is_inside = is_row * is_column[k];
+      dx[j] = is_inside * (down[j + 2] - down[j]);
+      dy[j] = is_inside * (3 * (across[j] + across[j + 2]) + 10 * across[j + 1]);
+    }
+  }
+  std::fill_n(dx + kOuterSize, kLanes, 0);
+  std::fill_n(dy + kOuterSize, kLanes, 0);
   for (int i = 0; i < kSide; ++i)
 #pragma omp simd
     for (int k = 0; k < kLanes; ++k) {
-      const int at = i * kLanes + k;
-      window.grey[at] = grey[at + kLanes + 1];
-      window.gradient_x[at] = is_inside[k] * (down[at + 2] - down[at]);
-      window.gradient_y[at] = is_inside[k] * (kMiddle * across[at + 1] + kSideways * (across[at] + across[at + 2]));
+      const int j = i * kLanes + k;
+      const int *p = raw + kLanes + 1;
+      window.grey[j] = rounded(p[j] * at.w00 + p[j + 1] * at.w01 + p[j + kLanes] * at.w10 + p[j + kLanes + 1] * at.w11,
+                               kWeightBits - kGreyBits);
+      window.gradient_x[j] = is_lane[k] * rounded(dx[j] * at.w00 + dx[j + 1] * at.w01 + dx[j + kLanes] * at.w10 +
+                                                      dx[j + kLanes + 1] * at.w11,
+                                                  kWeightBits);
+      window.gradient_y[j] = is_lane[k] * rounded(dy[j] * at.w00 + dy[j + 1] * at.w01 + dy[j + kLanes] * at.w10 +
+                                                      dy[j + kLanes + 1] * at.w11,
+                                                  kWeightBits);
     }
   float xx = 0, xy = 0, yy = 0;
 #pragma omp simd reduction(+ : xx, xy, yy)
   for (int k = 0; k < kSize; ++k) {
-    xx += window.gradient_x[k] * window.gradient_x[k];
-    xy += window.gradient_x[k] * window.gradient_y[k];
-    yy += window.gradient_y[k] * window.gradient_y[k];
+    xx += static_cast<float>(window.gradient_x[k] * window.gradient_x[k]);
+    xy += static_cast<float>(window.gradient_x[k] * window.gradient_y[k]);
+    yy += static_cast<float>(window.gradient_y[k] * window.gradient_y[k]);
   }
   window.xx = xx;
   window.xy = xy;
@@ -73,14 +106,19 @@ void cutWindow(const GreyPlane &image, float x, float y, Window &window)
 BOLE_VECTOR_CLONES
 void mismatch(const GreyPlane &image, float x, float y, const Window &window, float &by_x, float &by_y)
 {
-  float rows[(kSide + 1) * kLanes];
-  const float b = rowsAt<kSide + 1>(image, x, y, rows);
+  const Between at(image, x, y);
+  const int w00 = at.w00, w01 = at.w01, w10 = at.w10, w11 = at.w11;
+  int rows[(kSide + 2) * kLanes];
+  copyRows<kSide + 1>(at.pixel, image.stride, rows);
   float sum_x = 0, sum_y = 0;
 #pragma omp simd reduction(+ : sum_x, sum_y)
   for (int k = 0; k < kSide * kLanes; ++k) {
-    const float difference = rows[k] + b * (rows[k + kLanes] - rows[k]) - window.grey[k];
-    sum_x += difference * window.gradient_x[k];
-    sum_y += difference * window.gradient_y[k];
+    const int difference =
+        rounded(rows[k] * w00 + rows[k + 1] * w01 + rows[k + kLanes] * w10 + rows[k + kLanes + 1] * w11,
+                kWeightBits - kGreyBits) -
+        window.grey[k];
+    sum_x += static_cast<float>(difference * window.gradient_x[k]);
+    sum_y += static_cast<float>(difference * window.gradient_y[k]);
   }
   by_x = sum_x;
   by_y = sum_y;

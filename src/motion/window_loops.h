@@ -19,14 +19,15 @@ struct GreyPlane
   int width = 0, height = 0;
 };
 
-/// A window of the image that is searched for, with its gradient; 0 in the lanes that are none of it.
+/// A window of the image that is searched for, with its gradient; 0 in the lanes that are none of it. In whole numbers,
+/// as OpenCV has them: 32 for a grey level and for a grey level a pixel.
 struct Window
 {
-  float grey[kWindow_px * kWindowLanes], gradient_x[kWindow_px * kWindowLanes], gradient_y[kWindow_px * kWindowLanes];
+  int grey[kWindow_px * kWindowLanes], gradient_x[kWindow_px * kWindowLanes], gradient_y[kWindow_px * kWindowLanes];
   float xx = 0, xy = 0, yy = 0; ///< sums of the products of the gradient
 };
 
-/// The window whose first pixel is (x, y), which may be outside by kWindow_px.
+/// The window whose first pixel is (x, y), which may be outside by kWindow_px; beyond the image there is no gradient.
 void cutWindow(const GreyPlane &image, float x, float y, Window &window);
 
 /// Sums of the difference between \p image at (x, y) and \p window, times the gradient of the window.
