@@ -259,6 +259,38 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
   return update;
 }
 
+void TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
+{
+  for (MapTrunk &trunk : m_trunks) {
+    trunk.removed = true;
+    if (trunk.status == TrunkStatus::confirmed) {
+      trunk.status = TrunkStatus::lost;
+      trunk.fate = TrunkFate::doubted;
+    }
+  }
+  for (const TrunkDecision &decision : decisions) {
+    MapTrunk &trunk = m_trunks[static_cast<std::size_t>(decision.id)];
+    trunk.final_odds = decision.log_odds;
+    if (!decision.is_trunk) {
+      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.confirm_evidence)
+        trunk.fate = TrunkFate::outdone;
+      continue;
+    }
+    if (decision.found) {
+      trunk.smoother_id = decision.found->smoother_id;
+      trunk.trunk = decision.found->trunk;
+      trunk.covariance = decision.found->covariance;
+      trunk.observations = 0;
+      for (const TrunkView &view : decision.found->views)
+        addView(trunk, view);
+    }
+    trunk.status = TrunkStatus::confirmed;
+    trunk.fate = TrunkFate::none;
+    trunk.removed = trunk.inactive = false;
+  }
+  keepActive();
+}
+
 MapUpdate TrunkMap::forgetUnranged()
 {
   MapUpdate update;

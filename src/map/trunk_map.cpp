@@ -151,7 +151,7 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
     record.xy = trunk.trunk.axisAt(breast_z).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
-    record.probability = 1 / (1 + std::exp(-evidence(trunk)));
+    record.probability = 1 / (1 + std::exp(-trunk.final_odds.value_or(evidence(trunk))));
     Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
     J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
     J(2, 2) = record.radius;

@@ -77,6 +77,7 @@ struct MapTrunk
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
+  std::optional<double> final_odds;     ///< log-odds by all frames, where they were judged: see TrunkMap::decide()
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
 
@@ -144,6 +145,15 @@ struct TrunkEstimate
   std::optional<Matrix5d> covariance; ///< where it was asked for
 };
 
+/// A hypothesis in the light of the whole flight.
+struct TrunkDecision
+{
+  int id = 0;
+  double log_odds = 0;           ///< that it is a trunk
+  bool is_trunk = false;
+  std::optional<NewTrunk> found; ///< with all its views, where they were looked for anew
+};
+
 /// A change of the status of one trunk.
 struct MapChange
 {
@@ -200,6 +210,9 @@ public:
   MapUpdate review(double now_s, bool has_ranges = true);
   /// The same for the end of a flight: inactive candidates take part again.
   MapUpdate reviewAll(bool has_ranges = true);
+  /// The last word: those decided on are the trunks of the map, with their new views; nothing else stays in the
+  /// smoother.
+  void decide(const std::vector<TrunkDecision> &decisions);
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 

@@ -7,7 +7,7 @@
 /// The stages are functions of plain values in this folder. The engine holds what lives from frame to frame (motion
 /// source, saliency, smoother, window, map) and hands the result of one stage to the next.
 
-#include "pipeline/adoption.h"
+#include "pipeline/final_pass.h"
 #include "pipeline/motion_source.h"
 #include "pipeline/units.h"
 #include "saliency/saliency.h"
@@ -43,6 +43,9 @@ private:
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);
+  std::vector<LevelView> levelViews() const;
+  std::vector<Adoption> followAll(const std::vector<Judged> &chosen) const;
+  void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);
   std::vector<KnownTrunk> known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
@@ -59,6 +62,7 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;
   Trajectory m_online;                    ///< in units of the motion
   Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/final_pass.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+void Album::add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
+                const ElevationRange &range)
+{
+  constexpr std::size_t kMostBytes = std::size_t(256) << 20; // of pictures
+  if (m_last && (at.wMc.t - *m_last).norm() < spacing)
+    return;
+  m_last = at.wMc.t;
+  if (m_offered++ % m_every != 0)
+    return;
+  m_frames.push_back({pose, at.time_s, image, computeLevelImage(image, at.camera, at.wMc.R, range)});
+  if (m_frames.size() * image.getSize() <= kMostBytes)
+    return;
+  m_every *= 2;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < m_frames.size(); i += 2, ++kept)
+    if (kept != i)
+      m_frames[kept] = std::move(m_frames[i]);
+  m_frames.resize(kept);
+}
+
+double logOdds(const ColumnEvidence &evidence, double online)
+{
+  constexpr double kBias = 3.30, kOwn = -0.79, kBackground = 1.16, kBeyond = 0.81, kLeft = 0.5, kRight = 0.5,
+                   kBestAtOwn = 1.17, kOnline = 0.85;
+  constexpr double kShading = 0.2; // of the difference beside a border: below it the trunk goes on there
+  return kBias - 3.23 + kOwn * evidence.own + kBackground * std::clamp(evidence.background, -1.0, 2.0) +
+         kBeyond * std::clamp(evidence.beyond, -1.0, 2.0) + kLeft * std::min(evidence.left - kShading, 0.0) +
+         kRight * std::min(evidence.right - kShading, 0.0) + kBestAtOwn * evidence.is_best_at_own + kOnline * online;
+}
+
+std::optional<Judged> judge(int id, const Trunk &trunk, double online, const std::vector<LevelView> &views,
+                            double farthest)
+{
+  const auto evidence = columnEvidence(trunk, views, farthest);
+  if (!evidence)
+    return std::nullopt;
+  return Judged{id, trunk, *evidence, logOdds(*evidence, online)};
+}
+
+namespace
+{
+/// Two hypotheses that fill the same columns in most of the views that show both are made of the same lines.
+bool fillSameColumns(const Trunk &a, const Trunk &b, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr int kLeastShared = 4;
+  constexpr double kMostly = 0.6; // of the narrower one; of the views
+  int both = 0, same = 0;
+  for (const LevelView &view : views) {
+    const auto at_a = locate(a, view, farthest), at_b = locate(b, view, farthest);
+    if (!at_a || !at_b)
+      continue;
+    ++both;
+    const double left = std::min(at_a->bearing + at_a->half_angle, at_b->bearing + at_b->half_angle);
+    const double right = std::max(at_a->bearing - at_a->half_angle, at_b->bearing - at_b->half_angle);
+    same += left - right > kMostly * 2 * std::min(at_a->half_angle, at_b->half_angle);
+  }
+  return both >= kLeastShared && same > kMostly * both;
+}
+} // namespace
+
+std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,
+                              const std::vector<LevelView> &views, double farthest)
+{
+  judged.erase(std::remove_if(judged.begin(), judged.end(), [&](const Judged &one) { return one.log_odds < least; }),
+               judged.end());
+  std::sort(judged.begin(), judged.end(), [](const Judged &a, const Judged &b) { return a.log_odds > b.log_odds; });
+  std::vector<Judged> chosen;
+  for (const Judged &one : judged)
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const Judged &better) {
+          const double between = (one.trunk.axisAt(kBreastHeight) - better.trunk.axisAt(kBreastHeight)).head<2>().norm();
+          return between < one.trunk.radius() + better.trunk.radius() + apart ||
+                 fillSameColumns(one.trunk, better.trunk, views, farthest);
+        }))
+      chosen.push_back(one);
+  return chosen;
+}
+} // namespace bole
