@@ -125,7 +125,7 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
 bool compare(const LevelView &view, const Columns &columns, const std::vector<std::size_t> &partners,
              const std::vector<LevelView> &views, Curves &curves)
 {
-  constexpr double kUnit = 0.25;  // of the contrast of the image: how much one place differs between two frames
+  constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008; // [full scale] noise of the camera
   Curves here;
   for (std::size_t i = 0; i < columns.angle.size(); ++i) {
@@ -179,8 +179,7 @@ std::optional<TrunkInLevelView> locate(const Trunk &trunk, const LevelView &view
   return at;
 }
 
-std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views,
-                                             double farthest)
+std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
   constexpr int kLeastViews = 3;
   std::vector<Seen> all;
@@ -193,8 +192,8 @@ std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vect
   for (std::size_t i = 0; i < n; ++i) {
     const Seen &seen = all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0];
     const std::vector<std::size_t> partners = partnersOf(seen, all, views);
-    if (!partners.empty() &&
-        compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), partners, views, curves))
+    if (!partners.empty() && compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step),
+                                     partners, views, curves))
       ++evidence.views;
   }
   if (evidence.views < kLeastViews)
@@ -209,7 +208,8 @@ std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vect
   evidence.background = from(0, kBackground, kScales.size(), evidence.own);
   evidence.is_best_at_own = curves.least(0, kOwn - 1, kOwn + 2) <= curves.least(0, 0, kScales.size());
   const auto beside = [&](std::size_t kind) {
-    return std::isfinite(curves.mean(kind, kOwn)) ? -from(kind, kBeyond + 1, kScales.size(), curves.mean(kind, kOwn)) : 0;
+    return std::isfinite(curves.mean(kind, kOwn)) ? -from(kind, kBeyond + 1, kScales.size(), curves.mean(kind, kOwn))
+                                                  : 0;
   };
   evidence.left = beside(1);
   evidence.right = beside(2);

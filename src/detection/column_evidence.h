@@ -49,6 +49,5 @@ struct ColumnEvidence
 };
 
 /// None where fewer than three views have a parallax.
-std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views,
-                                             double farthest);
+std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
 } // namespace bole

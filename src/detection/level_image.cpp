@@ -103,8 +103,8 @@ LevelImage computeLevelImage(const vpImage<unsigned char> &image, const PinholeC
   constexpr int kLeast = 5, kMost = 16; // samples of a band
   LevelImage level;
   const Vector3d forward = wRc.col(2);
-  level.cRl = wRc.transpose() *
-              Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()).toRotationMatrix();
+  level.cRl =
+      wRc.transpose() * Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()).toRotationMatrix();
   level.step = std::max(1 / camera.fx, kFinest);
   const double q_max = 1.1 * std::max(camera.cx, camera.width - camera.cx) / camera.fx;
   const int half = static_cast<int>(q_max / level.step);

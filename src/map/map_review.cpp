@@ -259,9 +259,28 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
   return update;
 }
 
-void TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
+TrunkMap TrunkMap::withTrunks(const std::vector<int> &ids) const
 {
+  std::vector<MapTrunk> trunks = m_trunks;
+  for (MapTrunk &trunk : trunks) {
+    trunk.removed = std::find(ids.begin(), ids.end(), trunk.id) == ids.end();
+    trunk.inactive = false;
+    trunk.status = trunk.removed ? TrunkStatus::lost : TrunkStatus::confirmed;
+  }
+  return {m_options, std::move(trunks)};
+}
+
+std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
+{
+  std::vector<std::size_t> forgotten;
+  std::vector<bool> stays(m_trunks.size(), false);
+  for (const TrunkDecision &decision : decisions)
+    stays[static_cast<std::size_t>(decision.id)] = decision.is_trunk && !decision.found;
   for (MapTrunk &trunk : m_trunks) {
+    if (stays[static_cast<std::size_t>(trunk.id)])
+      continue;
+    if (!trunk.removed)
+      forgotten.push_back(trunk.smoother_id);
     trunk.removed = true;
     if (trunk.status == TrunkStatus::confirmed) {
       trunk.status = TrunkStatus::lost;
@@ -272,7 +291,7 @@ void TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
     MapTrunk &trunk = m_trunks[static_cast<std::size_t>(decision.id)];
     trunk.final_odds = decision.log_odds;
     if (!decision.is_trunk) {
-      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.confirm_evidence)
+      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.final_odds)
         trunk.fate = TrunkFate::outdone;
       continue;
     }
@@ -289,6 +308,16 @@ void TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
     trunk.removed = trunk.inactive = false;
   }
   keepActive();
+  return forgotten;
+}
+
+void TrunkMap::doubtPlaces()
+{
+  for (MapTrunk &trunk : m_trunks)
+    if (trunk.status == TrunkStatus::confirmed && trunk.positionSigma() > m_options.confirm_position_sigma) {
+      trunk.status = TrunkStatus::candidate;
+      trunk.fate = TrunkFate::undecided;
+    }
 }
 
 MapUpdate TrunkMap::forgetUnranged()

@@ -17,6 +17,7 @@ void MapOptions::validate() const
   requireRange("map.confirm_evidence", confirm_evidence, -20, 20);
   requireRange("map.turning_evenness", turning_evenness, 0, 1);
   requireRange("map.turning_contrast", turning_contrast, 0, 0.5);
+  requireRange("map.final_odds", final_odds, -20, 20);
   requireRange("map.doubt_observations", doubt_observations, 3, 1000);
   requireRange("map.doubt_candidate", doubt_candidate, -50, 0);
   requireRange("map.doubt_confirmed", doubt_confirmed, -50, 0);

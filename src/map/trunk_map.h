@@ -33,6 +33,7 @@ struct MapOptions
   double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
                                    ///< does: how evenly its borders run along their length, 0 to 1,
   double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
+  double final_odds = 0;           ///< log odds by all frames at which it is one, -20 to 20
   int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
   double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
@@ -149,7 +150,7 @@ struct TrunkEstimate
 struct TrunkDecision
 {
   int id = 0;
-  double log_odds = 0;           ///< that it is a trunk
+  double log_odds = 0; ///< that it is a trunk
   bool is_trunk = false;
   std::optional<NewTrunk> found; ///< with all its views, where they were looked for anew
 };
@@ -210,9 +211,13 @@ public:
   MapUpdate review(double now_s, bool has_ranges = true);
   /// The same for the end of a flight: inactive candidates take part again.
   MapUpdate reviewAll(bool has_ranges = true);
-  /// The last word: those decided on are the trunks of the map, with their new views; nothing else stays in the
-  /// smoother.
-  void decide(const std::vector<TrunkDecision> &decisions);
+  /// The same map in which \p ids are the confirmed trunks, and what else was is none.
+  TrunkMap withTrunks(const std::vector<int> &ids) const;
+  /// The last word: those decided on are the trunks of the map, with their new views. Returns what the smoother is to
+  /// forget: nothing else stays in it.
+  std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
+  /// Trunks whose place is not known well enough are candidates again.
+  void doubtPlaces();
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 

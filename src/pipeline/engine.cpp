@@ -328,15 +328,12 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
 
 void Engine::finish()
 {
-  constexpr double kSettled = 1e-6; // of the cost: no view notices
   if (m_smoother.poseCount() == 0)
     return;
   m_smoother.optimize(kSettled);
   refreshWholeMap();
   if (m_units.flow.final_pass && m_motion->hasRanges()) {
     decideByAllFrames();
-    m_smoother.optimize(kSettled);
-    refreshWholeMap();
     reviewScale(0, true);
     return;
   }

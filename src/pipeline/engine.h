@@ -31,7 +31,21 @@ public:
 
   const TrunkMap &trunks() const { return m_map; } ///< in units of the motion
 
+  /// What the columns of all frames say of every hypothesis.
+  std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
+  std::vector<LevelView> levelViews() const;
+
 private:
+  static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
+
+  /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
+  struct Reading
+  {
+    std::optional<Judged> judged;
+    std::optional<Adoption> views;
+    bool is_seen = false;
+  };
+
   Motion move(const Frame &frame);
   Viewpoint extend(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
@@ -43,8 +57,9 @@ private:
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);
-  std::vector<LevelView> levelViews() const;
-  std::vector<Adoption> followAll(const std::vector<Judged> &chosen) const;
+  double farthestJudged() const;
+  std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const;
+  std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views) const;
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);

@@ -4,16 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
-#include <set>
 
 namespace bole
 {
 namespace
 {
 constexpr int kLeastViews = 4; ///< of a hypothesis that is judged
+
+std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
+{
+  std::vector<int> ids;
+  for (const Judged &one : judged)
+    if (one.log_odds >= least)
+      ids.push_back(one.id);
+  return ids;
 }
+} // namespace
 
 std::vector<LevelView> Engine::levelViews() const
 {
@@ -23,15 +30,32 @@ std::vector<LevelView> Engine::levelViews() const
   return views;
 }
 
-/// Tracks \p chosen through all frames that were kept, from where each is thought to stand.
-std::vector<Adoption> Engine::followAll(const std::vector<Judged> &chosen) const
+std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views) const
+{
+  std::vector<Judged> all;
+  for (const MapTrunk &trunk : m_map.trunks())
+    if (trunk.observations >= kLeastViews && trunk.fate != TrunkFate::unranged)
+      if (const auto one = judge({trunk.id, trunk.trunk, m_map.evidence(trunk)}, views, farthestJudged()))
+        all.push_back(*one);
+  return all;
+}
+
+double Engine::farthestJudged() const
+{
+  constexpr double kFarthest_m = 14; // columns of what stands beyond are too few
+  return kFarthest_m / m_metres;
+}
+
+/// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
+/// \p map: what may hide them.
+std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const
 {
   constexpr int kRounds = 2; // what the first finds tells the second where else to look
   std::vector<Adoption> found;
-  for (const Judged &one : chosen) {
+  for (const Hypothesis &one : hypotheses) {
     Adoption start;
     start.trunk.trunk = one.trunk;
-    start.trunk.covariance.setZero();
+    start.trunk.covariance = one.covariance;
     found.push_back(start);
   }
   for (int round = 0; round < kRounds; ++round) {
@@ -44,75 +68,103 @@ std::vector<Adoption> Engine::followAll(const std::vector<Judged> &chosen) const
       const Viewpoint at{m_camera, wMb * m_bMc, true, m_motion->groundZ(), frame.time_s};
       for (std::size_t i = 0; i < followers.size(); ++i)
         if ((found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t).head<2>().norm() < m_units.flow.track_range)
-          followers[i].look(gradient, frame.pose, wMb, at, m_map, chosen[i].id, m_units);
+          followers[i].look(gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
     }
-    for (std::size_t i = 0; i < followers.size(); ++i) {
-      Adoption next = followers[i].fitted(m_map.trunk(chosen[i].id).first_seen_s, m_camera, m_units);
-      if (!next.views.empty())
+    for (std::size_t i = 0; i < followers.size(); ++i)
+      if (Adoption next = followers[i].fitted(m_map.trunk(hypotheses[i].id).first_seen_s, m_camera, m_units);
+          !next.views.empty())
         found[i] = std::move(next);
-    }
   }
   return found;
 }
 
-/// Every hypothesis in the light of all frames. The likely ones are tracked anew, and judged where that puts them; what
-/// the smoother still holds keeps its views unless the new ones are better.
+/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds keeps its views unless
+/// the new ones are better.
+std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely,
+                                               const std::vector<LevelView> &views) const
+{
+  constexpr double kBetter = 0.3; // log-odds by which new views must be better than those at hand
+  const TrunkMap map = m_map.withTrunks(idsOf(likely, m_units.map.final_odds));
+  const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
+    std::vector<Reading> readings;
+    std::vector<Adoption> followed = followAll(hypotheses, map);
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      const auto refit =
+          judge({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestJudged());
+      Reading reading;
+      reading.is_seen = !followed[i].views.empty();
+      if (refit && followed[i].views.size() >= kLeastViews) {
+        reading.judged = *refit;
+        reading.views = std::move(followed[i]);
+      }
+      readings.push_back(std::move(reading));
+    }
+    return readings;
+  };
+  std::vector<Hypothesis> hypotheses;
+  for (const Judged &one : likely)
+    hypotheses.push_back({one.id, one.trunk, one.online});
+  std::vector<Reading> readings = read(hypotheses);
+  for (std::size_t i = 0; i < likely.size(); ++i) {
+    Reading &reading = readings[i];
+    const bool is_held = !m_map.trunk(likely[i].id).removed && reading.is_seen;
+    if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
+      reading.judged = likely[i];
+      reading.views.reset();
+    }
+  }
+  // one border may be the edge of a shadow on the bark
+  std::vector<Hypothesis> wider;
+  std::vector<std::size_t> of;
+  for (std::size_t i = 0; i < readings.size(); ++i)
+    if (readings[i].judged)
+      if (const auto one = widerReading(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
+        wider.push_back(*one);
+        of.push_back(i);
+      }
+  std::vector<Reading> widened = read(wider);
+  for (std::size_t k = 0; k < wider.size(); ++k) {
+    Reading &before = readings[of[k]];
+    if (widened[k].views && isSilhouetteOf(*widened[k].judged, *before.judged))
+      before = std::move(widened[k]);
+  }
+  return readings;
+}
+
+/// Every hypothesis in the light of all frames.
 void Engine::decideByAllFrames()
 {
-  constexpr double kLikely = -1.5;    // log-odds at which a hypothesis is tracked again
-  constexpr double kBetter = 0.3;     // log-odds by which new views must be better than those at hand
-  constexpr double kFarthest_m = 14;  // columns of what stands beyond are too few
+  constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
   const std::vector<LevelView> views = levelViews();
-  const double farthest = kFarthest_m / m_metres, apart = m_units.map.merge_distance;
-  const auto judged = [&](const MapTrunk &trunk, const Trunk &place) {
-    return judge(trunk.id, place, m_map.evidence(trunk), views, farthest);
-  };
-  std::vector<Judged> all;
-  for (const MapTrunk &trunk : m_map.trunks())
-    if (trunk.observations >= kLeastViews && trunk.fate != TrunkFate::unranged)
-      if (const auto one = judged(trunk, trunk.trunk))
-        all.push_back(*one);
-  const std::vector<Judged> likely = chooseSet(all, kLikely, apart, views, farthest);
-  const std::vector<Adoption> followed = followAll(likely);
+  const double apart = m_units.map.merge_distance;
+  const std::vector<Judged> all = judgeAll(views);
+  std::vector<Reading> readings = readAgain(chooseSet(all, kLikely, apart, views, farthestJudged()), views);
   std::vector<Judged> again;
-  std::map<int, const Adoption *> anew;
-  for (std::size_t i = 0; i < likely.size(); ++i) {
-    const MapTrunk &trunk = m_map.trunk(likely[i].id);
-    const auto refit = judged(trunk, followed[i].trunk.trunk);
-    const bool is_seen = refit && followed[i].views.size() >= kLeastViews;
-    if (is_seen && (trunk.removed || refit->log_odds > likely[i].log_odds + kBetter)) {
-      again.push_back(*refit);
-      anew[trunk.id] = &followed[i];
-    }
-    else if (!trunk.removed)
-      again.push_back(likely[i]);
-    if (std::getenv("BOLE_FINAL"))
-      std::fprintf(stderr, "F %d %.3f %.3f r %.3f odds %.2f -> %.3f %.3f r %.3f odds %.2f views %zu was %s%s\n", likely[i].id,
-                   likely[i].trunk.xy.x(), likely[i].trunk.xy.y(), likely[i].trunk.radius(), likely[i].log_odds,
-                   followed[i].trunk.trunk.xy.x(), followed[i].trunk.trunk.xy.y(), followed[i].trunk.trunk.radius(),
-                   refit ? refit->log_odds : -99., followed[i].views.size(), toString(m_map.trunk(likely[i].id).status), trunk.removed?" removed":"");
-  }
-  const std::vector<Judged> chosen = chooseSet(again, m_units.map.confirm_evidence, apart, views, farthest);
-  std::vector<TrunkDecision> decisions;
+  for (const Reading &reading : readings)
+    if (reading.judged)
+      again.push_back(*reading.judged);
+  const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
+  std::map<int, TrunkDecision> decisions;
   for (const Judged &one : all)
-    decisions.push_back({one.id, one.log_odds, false, std::nullopt});
-  std::set<int> stays;
-  for (const Judged &one : chosen) {
-    const auto found = anew.find(one.id);
-    if (found == anew.end()) {
-      stays.insert(one.id);
-      decisions.push_back({one.id, one.log_odds, true, std::nullopt});
+    decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
+  for (const Judged &one : chosen)
+    decisions[one.id] = {one.id, one.log_odds, true, std::nullopt};
+  for (Reading &reading : readings) {
+    if (!reading.judged || !reading.views || !decisions[reading.judged->id].is_trunk)
       continue;
-    }
-    NewTrunk trunk = found->second->trunk;
-    trunk.smoother_id = m_smoother.addTrunk(one.trunk, priorOf(one.trunk, m_units.smoothing));
-    for (const AdoptedView &view : found->second->views)
+    NewTrunk trunk = reading.views->trunk;
+    trunk.smoother_id = m_smoother.addTrunk(trunk.trunk, priorOf(trunk.trunk, m_units.smoothing));
+    for (const AdoptedView &view : reading.views->views)
       m_smoother.addObservation(view.pose, trunk.smoother_id, view.summary);
-    decisions.push_back({one.id, one.log_odds, true, trunk});
+    decisions[reading.judged->id].found = trunk;
   }
-  for (const MapTrunk &trunk : m_map.trunks())
-    if (!trunk.removed && stays.count(trunk.id) == 0)
-      m_smoother.removeTrunk(trunk.smoother_id);
-  m_map.decide(decisions);
+  std::vector<TrunkDecision> list;
+  for (auto &[id, decision] : decisions)
+    list.push_back(std::move(decision));
+  for (const std::size_t gone : m_map.decide(list))
+    m_smoother.removeTrunk(gone);
+  m_smoother.optimize(kSettled);
+  refreshWholeMap();
+  m_map.doubtPlaces();
 }
 } // namespace bole

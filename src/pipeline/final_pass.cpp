@@ -36,13 +36,55 @@ double logOdds(const ColumnEvidence &evidence, double online)
          kRight * std::min(evidence.right - kShading, 0.0) + kBestAtOwn * evidence.is_best_at_own + kOnline * online;
 }
 
-std::optional<Judged> judge(int id, const Trunk &trunk, double online, const std::vector<LevelView> &views,
-                            double farthest)
+std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest)
 {
-  const auto evidence = columnEvidence(trunk, views, farthest);
+  const auto evidence = columnEvidence(hypothesis.trunk, views, farthest);
   if (!evidence)
     return std::nullopt;
-  return Judged{id, trunk, *evidence, logOdds(*evidence, online)};
+  return Judged{hypothesis.id, hypothesis.trunk, hypothesis.online, *evidence, logOdds(*evidence, hypothesis.online)};
+}
+
+bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
+{
+  constexpr double kGain = 0.25, kWorse = 0.5; // of the difference beside the borders; log-odds
+  const auto worst = [](const Judged &one) { return std::min({one.evidence.left, one.evidence.right, 0.0}); };
+  return wider.trunk.log_radius > narrow.trunk.log_radius && worst(wider) > worst(narrow) + kGain &&
+         wider.log_odds > narrow.log_odds - kWorse;
+}
+
+std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                       double radius_max)
+{
+  constexpr double kGoesOn = -0.25; // of the difference beside a border
+  const ColumnEvidence &evidence = judged.evidence;
+  if (std::min(evidence.left, evidence.right) > kGoesOn)
+    return std::nullopt;
+  Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
+  for (const LevelView &view : views)
+    if (locate(judged.trunk, view, farthest))
+      toward += (judged.trunk.axisAt(view.z).head<2>() - view.position).normalized();
+  const Eigen::Vector2d left = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
+  const double radius = judged.trunk.radius();
+  std::optional<Judged> best = judged;
+  for (const double more : {0.25, 0.5, 0.75, 1.0, 1.5, 2.0})
+    for (const int side : {1, -1}) {
+      if ((side > 0 ? evidence.left : evidence.right) > kGoesOn || (1 + more) * radius > radius_max)
+        continue;
+      Trunk wider = judged.trunk;
+      wider.xy += side * more * radius * left;
+      wider.log_radius += std::log(1 + more);
+      const auto one = judge({judged.id, wider, judged.online}, views, farthest);
+      if (one && one->log_odds > best->log_odds)
+        best = one;
+    }
+  if (best->trunk.log_radius == judged.trunk.log_radius)
+    return std::nullopt;
+  constexpr double kStep = 0.15; // standard deviation, of the radius: the steps above are as fine
+  Hypothesis guess{judged.id, best->trunk, judged.online};
+  const double sigma = kStep * best->trunk.radius();
+  guess.covariance.topLeftCorner<2, 2>() = sigma * sigma * left * left.transpose();
+  guess.covariance(2, 2) = kStep * kStep;
+  return guess;
 }
 
 namespace
@@ -51,7 +93,7 @@ namespace
 bool fillSameColumns(const Trunk &a, const Trunk &b, const std::vector<LevelView> &views, double farthest)
 {
   constexpr int kLeastShared = 4;
-  constexpr double kMostly = 0.6; // of the narrower one; of the views
+  constexpr double kMostly = 0.5; // of what either fills; of the views
   int both = 0, same = 0;
   for (const LevelView &view : views) {
     const auto at_a = locate(a, view, farthest), at_b = locate(b, view, farthest);
@@ -60,7 +102,8 @@ bool fillSameColumns(const Trunk &a, const Trunk &b, const std::vector<LevelView
     ++both;
     const double left = std::min(at_a->bearing + at_a->half_angle, at_b->bearing + at_b->half_angle);
     const double right = std::max(at_a->bearing - at_a->half_angle, at_b->bearing - at_b->half_angle);
-    same += left - right > kMostly * 2 * std::min(at_a->half_angle, at_b->half_angle);
+    const double either = 2 * (at_a->half_angle + at_b->half_angle) - (left - right);
+    same += left - right > kMostly * either;
   }
   return both >= kLeastShared && same > kMostly * both;
 }
@@ -75,7 +118,8 @@ std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double a
   std::vector<Judged> chosen;
   for (const Judged &one : judged)
     if (std::none_of(chosen.begin(), chosen.end(), [&](const Judged &better) {
-          const double between = (one.trunk.axisAt(kBreastHeight) - better.trunk.axisAt(kBreastHeight)).head<2>().norm();
+          const double between =
+              (one.trunk.axisAt(kBreastHeight) - better.trunk.axisAt(kBreastHeight)).head<2>().norm();
           return between < one.trunk.radius() + better.trunk.radius() + apart ||
                  fillSameColumns(one.trunk, better.trunk, views, farthest);
         }))

@@ -40,11 +40,21 @@ private:
   std::optional<Eigen::Vector3d> m_last;
 };
 
+/// A place where a trunk may stand.
+struct Hypothesis
+{
+  int id = 0; ///< in the map
+  Trunk trunk;
+  double online = 0;                      ///< log-odds by TrunkMap::evidence
+  Matrix5d covariance = Matrix5d::Zero(); ///< of the place, given the poses: how far its borders are looked for
+};
+
 /// A hypothesis with the odds that all frames give it.
 struct Judged
 {
   int id = 0; ///< in the map
   Trunk trunk;
+  double online = 0;
   ColumnEvidence evidence;
   double log_odds = 0; ///< that it is a trunk
 };
@@ -52,9 +62,15 @@ struct Judged
 /// Log-odds that a hypothesis is a trunk: \p online is what they were by TrunkMap::evidence.
 double logOdds(const ColumnEvidence &evidence, double online);
 
-/// What the columns of all frames say of \p trunk; none where too few views have a parallax.
-std::optional<Judged> judge(int id, const Trunk &trunk, double online, const std::vector<LevelView> &views,
-                            double farthest);
+/// What the columns of all frames say of \p hypothesis; none where too few views have a parallax.
+std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest);
+
+/// Where columns beside a border stand at the range of the trunk: the best guess of the silhouette that takes them in.
+/// None where there is none, or none up to \p radius_max.
+std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                       double radius_max);
+/// Whether \p wider takes in what stood beside a border of \p narrow, and is no worse as a trunk.
+bool isSilhouetteOf(const Judged &wider, const Judged &narrow);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.
