@@ -63,9 +63,8 @@ bool isAnotherVisit(const MapTrunk &a, const MapTrunk &b)
 /// What was seen of \p gone was seen of \p keep.
 void absorb(MapTrunk &keep, const MapTrunk &gone)
 {
-  const double apart = std::remainder(gone.bearing_first - keep.bearing_first, 2 * M_PI);
-  keep.bearing_low = std::min(keep.bearing_low, apart + gone.bearing_low);
-  keep.bearing_high = std::max(keep.bearing_high, apart + gone.bearing_high);
+  keep.left.add(gone.left);
+  keep.right.add(gone.right);
   if (gone.last_seen_s > keep.last_seen_s) {
     keep.misses_in_a_row = gone.misses_in_a_row;
     keep.left_contrast = gone.left_contrast;

@@ -112,6 +112,20 @@ void TrunkMap::record(const PointCount &points)
   trunk.points_behind += points.behind;
 }
 
+void BearingSpread::add(double bearing)
+{
+  const double turned = std::remainder(bearing - first, 2 * M_PI);
+  low = std::min(low, turned);
+  high = std::max(high, turned);
+}
+
+void BearingSpread::add(const BearingSpread &other)
+{
+  const double apart = std::remainder(other.first - first, 2 * M_PI);
+  low = std::min(low, apart + other.low);
+  high = std::max(high, apart + other.high);
+}
+
 void blendContrast(std::optional<double> &mean, double now)
 {
   if (now != 0)
@@ -122,12 +136,12 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
 {
   constexpr int kMemory = 30; // views of the running means
   if (trunk.observations == 0) {
-    trunk.bearing_first = view.bearing;
+    trunk.left.begin(view.bearing + view.half_angle);
+    trunk.right.begin(view.bearing - view.half_angle);
     trunk.first_seen_s = trunk.last_seen_s = view.time_s;
   }
-  const double rotated = std::remainder(view.bearing - trunk.bearing_first, 2 * M_PI);
-  trunk.bearing_low = std::min(trunk.bearing_low, rotated);
-  trunk.bearing_high = std::max(trunk.bearing_high, rotated);
+  trunk.left.add(view.bearing + view.half_angle);
+  trunk.right.add(view.bearing - view.half_angle);
   trunk.first_seen_s = std::min(trunk.first_seen_s, view.time_s);
   trunk.last_seen_s = std::max(trunk.last_seen_s, view.time_s);
   trunk.seen_from = view.camera;

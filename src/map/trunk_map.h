@@ -14,6 +14,7 @@
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -54,6 +55,17 @@ struct MapOptions
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
+/// Extremes of a bearing in the world.
+struct BearingSpread
+{
+  double first = 0;         ///< [rad]
+  double low = 0, high = 0; ///< from the first one [rad]
+
+  void begin(double bearing) { *this = {bearing, 0, 0}; }
+  void add(double bearing);
+  void add(const BearingSpread &other);
+};
+
 /// A trunk of the map with its history. Only the map writes it.
 struct MapTrunk
 {
@@ -72,8 +84,7 @@ struct MapTrunk
   double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
-  double bearing_first = 0;                            ///< world bearing of the first view [rad]
-  double bearing_low = 0, bearing_high = 0;            ///< extremes of the bearing from the first one [rad]
+  BearingSpread left, right;                           ///< of its borders over its views
   double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
@@ -82,7 +93,8 @@ struct MapTrunk
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
 
-  double parallax() const { return bearing_high - bearing_low; }
+  /// By how much the bearing of a border changed [rad]: sideways motion moves both, approach moves them apart.
+  double parallax() const { return std::max(left.high - left.low, right.high - right.low); }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
   double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
@@ -96,6 +108,7 @@ struct TrunkView
 {
   double time_s = 0;
   double bearing = 0;                           ///< of the trunk from the camera, world [rad]
+  double half_angle = 0;                        ///< of its silhouette [rad]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
   double evenness = 0;                          ///< of the borders along their length, 0 to 1
   double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], divided by

@@ -46,10 +46,11 @@ std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<Leve
 
 bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
 {
-  constexpr double kGain = 0.25, kWorse = 0.5; // of the difference beside the borders; log-odds
+  constexpr double kGain = 0.25;                   // of the difference beside the borders
+  constexpr double kWorse = 0.5, kLeastOdds = 1.0; // log-odds
   const auto worst = [](const Judged &one) { return std::min({one.evidence.left, one.evidence.right, 0.0}); };
   return wider.trunk.log_radius > narrow.trunk.log_radius && worst(wider) > worst(narrow) + kGain &&
-         wider.log_odds > narrow.log_odds - kWorse;
+         wider.log_odds > std::max(narrow.log_odds - kWorse, kLeastOdds);
 }
 
 std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
