@@ -31,11 +31,12 @@ public:
 
   const TrunkMap &trunks() const { return m_map; } ///< in units of the motion
 
-  /// What the columns of all frames say of every hypothesis.
-  std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
-  std::vector<LevelView> levelViews() const;
+  /// What the columns of all frames said of every hypothesis, after finish().
+  const std::vector<Judged> &judged() const { return m_judged; }
 
 private:
+  std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
+  std::vector<LevelView> levelViews() const;
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
 
   /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
@@ -79,6 +80,7 @@ private:
   DetectionWindow m_window;
   Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;
+  std::vector<Judged> m_judged;
   Trajectory m_online;                    ///< in units of the motion
   Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion
 };

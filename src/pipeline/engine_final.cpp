@@ -137,15 +137,15 @@ void Engine::decideByAllFrames()
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
   const std::vector<LevelView> views = levelViews();
   const double apart = m_units.map.merge_distance;
-  const std::vector<Judged> all = judgeAll(views);
-  std::vector<Reading> readings = readAgain(chooseSet(all, kLikely, apart, views, farthestJudged()), views);
+  m_judged = judgeAll(views);
+  std::vector<Reading> readings = readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views);
   std::vector<Judged> again;
   for (const Reading &reading : readings)
     if (reading.judged)
       again.push_back(*reading.judged);
   const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
   std::map<int, TrunkDecision> decisions;
-  for (const Judged &one : all)
+  for (const Judged &one : m_judged)
     decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
   for (const Judged &one : chosen)
     decisions[one.id] = {one.id, one.log_odds, true, std::nullopt};

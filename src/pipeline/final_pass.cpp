@@ -26,14 +26,19 @@ void Album::add(const vpImage<unsigned char> &image, std::size_t pose, const Vie
   m_frames.resize(kept);
 }
 
-double logOdds(const ColumnEvidence &evidence, double online)
+OddsTerms oddsTerms(const ColumnEvidence &evidence, double online)
 {
-  constexpr double kBias = 3.30, kOwn = -0.79, kBackground = 1.16, kBeyond = 0.81, kLeft = 0.5, kRight = 0.5,
-                   kBestAtOwn = 1.17, kOnline = 0.85;
-  constexpr double kShading = 0.2; // of the difference beside a border: below it the trunk goes on there
-  return kBias - 3.23 + kOwn * evidence.own + kBackground * std::clamp(evidence.background, -1.0, 2.0) +
-         kBeyond * std::clamp(evidence.beyond, -1.0, 2.0) + kLeft * std::min(evidence.left - kShading, 0.0) +
-         kRight * std::min(evidence.right - kShading, 0.0) + kBestAtOwn * evidence.is_best_at_own + kOnline * online;
+  OddsTerms terms;
+  terms << 1, evidence.own, std::clamp(std::min(evidence.background, evidence.nearer), -1.0, 2.0),
+      evidence.is_best_at_own, online;
+  return terms;
+}
+
+OddsTerms oddsWeights()
+{
+  OddsTerms weights;
+  weights << -0.02, -0.93, 1.21, 1.24, 0.71;
+  return weights;
 }
 
 std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest)
@@ -41,8 +46,20 @@ std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<Leve
   const auto evidence = columnEvidence(hypothesis.trunk, views, farthest);
   if (!evidence)
     return std::nullopt;
-  return Judged{hypothesis.id, hypothesis.trunk, hypothesis.online, *evidence, logOdds(*evidence, hypothesis.online)};
+  return Judged{hypothesis.id, hypothesis.trunk, hypothesis.online, *evidence,
+                oddsWeights().dot(oddsTerms(*evidence, hypothesis.online))};
 }
+
+namespace
+{
+/// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts.
+double silhouette(const Judged &judged)
+{
+  constexpr double kShading = 0.2; // of the difference beside a border: below it the trunk goes on there
+  const auto beside = [](double difference) { return std::min(difference - kShading, 0.0); };
+  return judged.log_odds + 0.5 * (beside(judged.evidence.left) + beside(judged.evidence.right));
+}
+} // namespace
 
 bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
 {
@@ -75,7 +92,7 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
       wider.xy += side * more * radius * left;
       wider.log_radius += std::log(1 + more);
       const auto one = judge({judged.id, wider, judged.online}, views, farthest);
-      if (one && one->log_odds > best->log_odds)
+      if (one && silhouette(*one) > silhouette(*best))
         best = one;
     }
   if (best->trunk.log_radius == judged.trunk.log_radius)

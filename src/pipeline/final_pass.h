@@ -59,8 +59,13 @@ struct Judged
   double log_odds = 0; ///< that it is a trunk
 };
 
-/// Log-odds that a hypothesis is a trunk: \p online is what they were by TrunkMap::evidence.
-double logOdds(const ColumnEvidence &evidence, double online);
+/// What the decision rests on: 1, how much its columns differ at its range, by how much more they do at the best range
+/// nearer or behind, whether its range is the best, and the log-odds that the frames gave it one by one.
+using OddsTerms = Eigen::Matrix<double, 5, 1>;
+constexpr std::array<const char *, 5> kOddsNames = {"1", "own", "elsewhere", "best_at_own", "online"};
+OddsTerms oddsTerms(const ColumnEvidence &evidence, double online);
+/// Fitted by `bole fit-odds` to the simulated flights of seeds 300 to 323 and three rendered ones.
+OddsTerms oddsWeights();
 
 /// What the columns of all frames say of \p hypothesis; none where too few views have a parallax.
 std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest);
