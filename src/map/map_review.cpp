@@ -310,10 +310,15 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
   return forgotten;
 }
 
+bool TrunkMap::isPlaced(const Matrix5d &covariance) const
+{
+  return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= m_options.confirm_position_sigma;
+}
+
 void TrunkMap::doubtPlaces()
 {
   for (MapTrunk &trunk : m_trunks)
-    if (trunk.status == TrunkStatus::confirmed && trunk.positionSigma() > m_options.confirm_position_sigma) {
+    if (trunk.status == TrunkStatus::confirmed && !isPlaced(trunk.covariance)) {
       trunk.status = TrunkStatus::candidate;
       trunk.fate = TrunkFate::undecided;
     }

@@ -229,6 +229,8 @@ public:
   /// The last word: those decided on are the trunks of the map, with their new views. Returns what the smoother is to
   /// forget: nothing else stays in it.
   std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
+  /// Whether a place with this covariance is known well enough for a trunk of the map.
+  bool isPlaced(const Matrix5d &covariance) const;
   /// Trunks whose place is not known well enough are candidates again.
   void doubtPlaces();
   /// Gives up all that is active: their ranges were guesses.

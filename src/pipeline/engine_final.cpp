@@ -84,7 +84,8 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
                                                const std::vector<LevelView> &views) const
 {
   constexpr double kBetter = 0.3; // log-odds by which new views must be better than those at hand
-  const TrunkMap map = m_map.withTrunks(idsOf(likely, m_units.map.final_odds));
+  constexpr double kHides = 1.5;  // log-odds at which one may hide what stands behind it
+  const TrunkMap map = m_map.withTrunks(idsOf(likely, kHides));
   const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
     std::vector<Reading> readings;
     std::vector<Adoption> followed = followAll(hypotheses, map);
@@ -140,9 +141,14 @@ void Engine::decideByAllFrames()
   m_judged = judgeAll(views);
   std::vector<Reading> readings = readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views);
   std::vector<Judged> again;
-  for (const Reading &reading : readings)
-    if (reading.judged)
+  for (const Reading &reading : readings) {
+    if (!reading.judged)
+      continue;
+    const Matrix5d &covariance =
+        reading.views ? reading.views->trunk.covariance : m_map.trunk(reading.judged->id).covariance;
+    if (m_map.isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
       again.push_back(*reading.judged);
+  }
   const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
   std::map<int, TrunkDecision> decisions;
   for (const Judged &one : m_judged)
