@@ -57,7 +57,7 @@ InertialScale::InertialScale(const Pose &bMc, const InertialScaleOptions &option
 
 void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
-  if (!collect(frame) || !frame.wMb_odometry || !m_anchor) {
+  if (!collect(frame) || !m_anchor || (!m_started && !frame.wMb_odometry)) {
     restart(frame);
     return;
   }
@@ -73,14 +73,17 @@ void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion
     restart(frame);
     return;
   }
-  compareTilt(*frame.wMb_odometry);
-  compareOdometry(*frame.wMb_odometry, duration);
+  if (frame.wMb_odometry)
+    compareTilt(*frame.wMb_odometry);
+  if (frame.wMb_odometry && m_anchor->wMb) {
+    compareOdometry(*frame.wMb_odometry, duration);
+    ++m_compared;
+  }
   if (seen != motions.end()) {
     if (seen->points.hasDirection())
       compareDirection(*seen);
     compareRotation(*seen, duration);
   }
-  ++m_compared;
   begin(frame);
 }
 
@@ -113,7 +116,7 @@ void InertialScale::restart(const Frame &frame)
 
 void InertialScale::begin(const Frame &frame)
 {
-  m_anchor = Anchor{frame.stamp_ns, frame.index, *frame.wMb_odometry};
+  m_anchor = Anchor{frame.stamp_ns, frame.index, frame.wMb_odometry};
   if (m_samples.size() > 1)
     m_samples.erase(m_samples.begin(), m_samples.end() - 1);
   m_moved.setZero();
@@ -126,8 +129,8 @@ void InertialScale::begin(const Frame &frame)
 void InertialScale::start(const Frame &frame)
 {
   const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
-  m_wRb = m_anchor->wMb.R;
-  m_velocity = (frame.wMb_odometry->t - m_anchor->wMb.t) / duration;
+  m_wRb = m_anchor->wMb->R;
+  m_velocity = (frame.wMb_odometry->t - m_anchor->wMb->t) / duration;
   const double tilt2 = std::pow(m_options.tilt_sigma, 2), velocity_sigma = 0.3 + 0.3 * m_velocity.norm();
   m_covariance.diagonal().segment<3>(kAttitude) << tilt2, tilt2, 1e-6;
   m_covariance.diagonal().segment<3>(kVelocity).setConstant(velocity_sigma * velocity_sigma);
@@ -172,13 +175,15 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   F.block<3, 3>(kMoved, kAttitude) = 0.5 * dt * by_attitude;
   F.block<3, 3>(kMoved, kForce) = -0.5 * dt * dt * m_wRb;
   m_covariance = (F * m_covariance * F.transpose()).eval();
-  const auto white = [&](int at, double density) {
-    m_covariance.diagonal().segment<3>(at).array() += density * density * dt;
+  const auto white = [&](int at, double density, double longer) {
+    m_covariance.diagonal().segment<3>(at).array() += density * density * dt * longer;
   };
-  white(kAttitude, m_gyro.noise_density);
-  white(kVelocity, m_options.accelerometer_noise);
-  white(kGyro, m_gyro.bias_walk);
-  white(kForce, m_options.accelerometer_bias_walk);
+  constexpr double kRate = 200; // [Hz], of the densities: a sample that stands for longer has its noise for all of it
+  const double longer = std::max(1.0, kRate * dt);
+  white(kAttitude, m_gyro.noise_density, longer);
+  white(kVelocity, m_options.accelerometer_noise, longer);
+  white(kGyro, m_gyro.bias_walk, 1);
+  white(kForce, m_options.accelerometer_bias_walk, 1);
 
   const Vector3d acceleration = m_wRb * specific + kGravityVector;
   m_moved += dt * m_velocity + 0.5 * dt * dt * acceleration;
@@ -220,7 +225,7 @@ void InertialScale::compareTilt(const Pose &wMb)
 /// The displacement by the odometry, in the heading of this filter: its horizontal part has the scale.
 void InertialScale::compareOdometry(const Pose &wMb, double duration)
 {
-  const Vector3d in_body = wMb.R.transpose() * (wMb.t - m_anchor->wMb.t);
+  const Vector3d in_body = wMb.R.transpose() * (wMb.t - m_anchor->wMb->t);
   const double scale = std::exp(m_log_scale);
   const Vector3d factor(scale, scale, 1);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
@@ -259,6 +264,48 @@ void InertialScale::compareRotation(const RelativeMotion &motion, double duratio
   const Matrix3d noise = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose() +
                          std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
   update(H, logSo3(m_turned.transpose() * aRb), noise);
+}
+
+std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64_t from_ns) const
+{
+  if (!m_started || !m_force_varies || !m_anchor || from_ns < m_anchor->stamp_ns)
+    return std::nullopt;
+  std::vector<GyroSample> samples = m_samples;
+  samples.insert(samples.end(), frame.gyro.begin(), frame.gyro.end());
+  Matrix3d R = m_wRb, R_from = m_wRb;
+  Vector3d velocity = m_velocity, moved = Vector3d::Zero(), moved_from = Vector3d::Zero();
+  std::int64_t at_ns = m_anchor->stamp_ns;
+  for (const GyroSample &sample : samples) {
+    if (!sample.force || seconds(std::min(sample.stamp_ns, frame.stamp_ns) - at_ns) > kMostGap_s)
+      return std::nullopt;
+    for (const std::int64_t end_ns : {std::min(from_ns, sample.stamp_ns), std::min(frame.stamp_ns, sample.stamp_ns)}) {
+      if (end_ns <= at_ns)
+        continue;
+      const double dt = seconds(end_ns - at_ns);
+      const Vector3d acceleration = R * (*sample.force - m_force_bias) + kGravityVector;
+      moved += dt * velocity + 0.5 * dt * dt * acceleration;
+      velocity += dt * acceleration;
+      R = R * expSo3((sample.rate - m_gyro_bias) * dt);
+      at_ns = end_ns;
+      if (at_ns == from_ns) {
+        R_from = R;
+        moved_from = moved;
+      }
+    }
+  }
+  if (seconds(frame.stamp_ns - at_ns) > kMostGap_s)
+    return std::nullopt;
+  const double since = seconds(frame.stamp_ns - m_anchor->stamp_ns), dt = seconds(frame.stamp_ns - from_ns);
+  const double tilt2 = m_covariance.diagonal().segment<2>(kAttitude).mean();
+  const double speed2 =
+      m_covariance.diagonal().segment<3>(kVelocity).mean() + kGravity * kGravity * tilt2 * since * since;
+  constexpr double kLasts_s = 2;       // an error of the velocity does not average out for so long
+  constexpr double kLeastStep = 0.003; // [m]
+  const double scale = std::exp(m_log_scale);
+  InertialStep step;
+  step.moved = R_from.transpose() * Vector3d(scale, scale, 1).cwiseProduct(moved - moved_from);
+  step.sigma = std::hypot(kLeastStep, std::sqrt(speed2 * dt * kLasts_s));
+  return step;
 }
 
 std::optional<LogScale> InertialScale::scale(double prior_sigma) const

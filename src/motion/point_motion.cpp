@@ -51,11 +51,6 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
       motions.push_back(relativeTo(back));
     }
   }
-  if (!motions.empty()) {
-    learnBias(*std::max_element(motions.begin(), motions.end(), [](const RelativeMotion &x, const RelativeMotion &y) {
-      return x.frames_back < y.frames_back;
-    }));
-  }
   return motions;
 }
 
@@ -101,8 +96,13 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
   return step;
 }
 
-void PointMotion::learnBias(const RelativeMotion &step)
+void PointMotion::learn(const std::vector<RelativeMotion> &motions)
 {
+  if (motions.empty())
+    return;
+  const RelativeMotion &step =
+      *std::max_element(motions.begin(), motions.end(),
+                        [](const RelativeMotion &x, const RelativeMotion &y) { return x.frames_back < y.frames_back; });
   if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns) {
     return;
   }

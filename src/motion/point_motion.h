@@ -67,6 +67,8 @@ public:
   /// One RelativeMotion for each entry of frames_back that the video reaches. Frames that are not
   /// ok are passed over: the next one is tracked from the last good one.
   std::vector<RelativeMotion> process(const Frame &frame);
+  /// Learns the bias of the gyro from the last result of process(), once nothing speaks against it.
+  void learn(const std::vector<RelativeMotion> &motions);
 
   /// Follows the points alone, where nobody asks for a motion.
   void track(const Frame &frame);
@@ -86,7 +88,6 @@ private:
   };
   std::optional<GyroRotation> gyroSince(std::int64_t from_ns, std::int64_t to_ns) const;
   RelativeMotion relativeTo(int frames_back) const;
-  void learnBias(const RelativeMotion &step);
 
   PinholeCamera m_camera;
   Pose m_bMc;

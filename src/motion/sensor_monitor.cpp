@@ -40,33 +40,85 @@ SensorMonitor::SensorMonitor(const Pose &bMc, const SensorMonitorOptions &option
 void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
   collect(frame);
+  std::fill(std::begin(m_wrong_now), std::end(m_wrong_now), false);
   checkGyroSamples(frame);
   checkSteps(frame, motions);
   for (const RelativeMotion &motion : motions)
     if (motion.points.hasRotation())
       compare(frame, motion);
+  judgeFrame(frame);
   checkRotations();
+  checkReturn(Sensor::gyro);
+  checkReturn(Sensor::odometry);
   checkDirection();
   checkTilt(frame);
+}
+
+Frame SensorMonitor::withoutLiars(const Frame &frame) const
+{
+  Frame result = frame;
+  if (!trusts(Sensor::gyro))
+    result.gyro.clear();
+  if (!trusts(Sensor::odometry))
+    result.wMb_odometry.reset();
+  return result;
 }
 
 Frame SensorMonitor::trusted(const Frame &frame) const
 {
   Frame result = frame;
-  if (!trusts(Sensor::gyro))
+  if (!trustsNow(Sensor::gyro))
     result.gyro.clear();
-  if (!trustsStep())
+  if (!trustsNow(Sensor::odometry))
     result.wMb_odometry.reset();
   return result;
 }
 
-void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, bool lasts)
+void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts)
 {
-  bool &distrusted = m_distrusted[static_cast<int>(sensor)];
-  if (distrusted)
+  const int s = static_cast<int>(sensor);
+  if (m_distrusted[s])
     return;
-  distrusted = lasts;
+  m_distrusted[s] = lasts != Lasts::no;
+  if (lasts == Lasts::until_agree)
+    m_may_return[s] = m_verdicts.size();
   m_verdicts.push_back({toString(sensor), kind, since_s, text});
+}
+
+/// A sensor that was silent or stuck agrees with the points again.
+void SensorMonitor::checkReturn(Sensor sensor)
+{
+  const int s = static_cast<int>(sensor);
+  const auto window = static_cast<std::size_t>(m_options.window);
+  if (!has(sensor) || !m_may_return[s] || m_comparisons.size() < window)
+    return;
+  const bool is_gyro = sensor == Sensor::gyro;
+  for (auto c = m_comparisons.end() - static_cast<std::ptrdiff_t>(window); c != m_comparisons.end(); ++c)
+    if (is_gyro ? !c->gyro || c->gyro_points > 0.5 * m_options.limit_points
+                : !c->odometry || c->odometry_points > 0.5 * m_options.limit_odometry)
+      return;
+  const std::int64_t back_ns = (m_comparisons.end() - static_cast<std::ptrdiff_t>(window))->a_ns;
+  if (is_gyro && (!m_gyro_changed_ns || inSeconds(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * m_options.stuck_s))
+    return;
+  if (!is_gyro && std::any_of(m_steps.begin(), m_steps.end(),
+                              [back_ns](const Step &step) { return step.stamp_ns > back_ns && step.is_held; }))
+    return;
+  m_distrusted[s] = false;
+  m_verdicts[*m_may_return[s]].text += fmt::format(" until {:.1f} s", inSeconds(back_ns));
+  m_may_return[s].reset();
+}
+
+/// A sensor that two others contradict in this frame has no say in it.
+void SensorMonitor::judgeFrame(const Frame &frame)
+{
+  for (auto c = m_comparisons.rbegin(); c != m_comparisons.rend() && c->b_ns == frame.stamp_ns; ++c) {
+    if (!c->gyro || !c->odometry || c->gyro_points < m_options.limit_points)
+      continue;
+    if (c->odometry_points < 0.5 * m_options.limit_odometry && trusts(Sensor::odometry))
+      m_wrong_now[static_cast<int>(Sensor::gyro)] = true;
+    else if (c->odometry_points > m_options.limit_odometry && c->gyro_odometry < 0.5 * m_options.limit_odometry)
+      m_wrong_now[static_cast<int>(Sensor::images)] = true;
+  }
 }
 
 void SensorMonitor::collect(const Frame &frame)
@@ -110,22 +162,22 @@ void SensorMonitor::checkGyroSamples(const Frame &frame)
     return;
   if (inSeconds(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
     raise(Sensor::gyro, "ended", inSeconds(m_last_gyro_ns),
-          fmt::format("gyro: nothing since {:.1f} s", inSeconds(m_last_gyro_ns)));
+          fmt::format("gyro: nothing since {:.1f} s", inSeconds(m_last_gyro_ns)), Lasts::until_agree);
   const bool moves = std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.parallax_px > 1; });
   if (moves && m_gyro_changed_ns && inSeconds(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
     raise(Sensor::gyro, "stuck", inSeconds(*m_gyro_changed_ns),
-          fmt::format("gyro: repeats its value since {:.1f} s", inSeconds(*m_gyro_changed_ns)));
+          fmt::format("gyro: repeats its value since {:.1f} s", inSeconds(*m_gyro_changed_ns)), Lasts::until_agree);
 }
 
 /// The odometry from frame to frame.
 void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
   const double time_s = inSeconds(frame.stamp_ns);
-  m_step_jumped = false;
+  bool &is_wrong = m_wrong_now[static_cast<int>(Sensor::odometry)];
   if (!frame.wMb_odometry) {
     if (m_had_odometry && inSeconds(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
       raise(Sensor::odometry, "ended", inSeconds(m_last_odometry_ns),
-            fmt::format("odometry: nothing since {:.1f} s", inSeconds(m_last_odometry_ns)));
+            fmt::format("odometry: nothing since {:.1f} s", inSeconds(m_last_odometry_ns)), Lasts::until_agree);
     m_steps.clear();
     return;
   }
@@ -141,6 +193,8 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
     const Step &before = m_steps.back();
     const double dt = std::max(1e-3, inSeconds(step.stamp_ns - before.stamp_ns));
     step.velocity = (step.wMb.t - before.wMb.t) / dt;
+    step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
+    is_wrong = step.is_held || before.is_held; // the step after a pause makes up for it
     if (m_steps.size() > 1) {
       const Vector3d change = (step.velocity - before.velocity) * dt;
       constexpr double kAcceleration = 3; // that flights reach for long [m/s^2]
@@ -148,11 +202,11 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
       step.scatter = 0.5 * change.head<2>().squaredNorm() / expected;
       const double extent = change.head<2>().norm();
       if (extent > m_options.jump + 10 * dt * dt) {
-        m_step_jumped = true;
+        is_wrong = true;
         step.velocity = before.velocity;
         step.scatter = 0;
         raise(Sensor::odometry, "jump", time_s, fmt::format("odometry: jump of {:.1f} m at {:.1f} s", extent, time_s),
-              false);
+              Lasts::no);
       }
     }
   }
@@ -175,7 +229,8 @@ void SensorMonitor::checkStandingStill(double time_s)
     since_s = inSeconds((step + 1)->stamp_ns);
   }
   if (frames >= 3 && moves)
-    raise(Sensor::odometry, "stuck", since_s, fmt::format("odometry: frozen since {:.1f} s", since_s));
+    raise(Sensor::odometry, "stuck", since_s, fmt::format("odometry: frozen since {:.1f} s", since_s),
+          Lasts::until_agree);
 }
 
 /// White noise on the positions, by the change from step to step.
@@ -351,14 +406,21 @@ void SensorMonitor::checkDirection()
 void SensorMonitor::checkTilt(const Frame &frame)
 {
   constexpr std::size_t kLeast = 20; // steps
-  if (m_steps.size() < kLeast || !frame.wMb_odometry)
-    return;
+  if (m_steps.size() < kLeast || !frame.wMb_odometry || m_samples.empty() ||
+      inSeconds(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
+      inSeconds(m_samples.front().stamp_ns - m_steps[1].stamp_ns) > kMostGap_s ||
+      std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.is_held; }))
+    return; // force and velocity would be of different times
   Vector3d sum = Vector3d::Zero();
   int count = 0;
   bool varies = false;
   auto step = m_steps.begin() + 1;
   const Vector3d *first = nullptr;
+  std::int64_t before_ns = m_samples.front().stamp_ns;
   for (const GyroSample &sample : m_samples) {
+    if (inSeconds(sample.stamp_ns - before_ns) > kMostGap_s)
+      return;
+    before_ns = sample.stamp_ns;
     while (step != m_steps.end() && step->stamp_ns < sample.stamp_ns)
       ++step;
     if (step == m_steps.end())

@@ -9,6 +9,10 @@
 /// or flies askew to the points' direction; a gyro that repeats its value or ends. A pair fails when at least
 /// `of_window` of the last `window` comparisons exceed a limit, so that one false match raises no alarm.
 ///
+/// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
+/// taken, and nothing wrong enters the map before the alarm. A sensor that was silent or repeated itself is trusted
+/// again once all of a window agrees with the points.
+///
 /// False alarms: three rotations of normal errors exceed the limit of 25 once in 60,000 comparisons; four of six do so
 /// once in 10^17. What decides in practice are errors that are not normal: see the limits of the options.
 ///
@@ -65,9 +69,11 @@ public:
   const std::vector<SensorVerdict> &verdicts() const { return m_verdicts; }
   /// Whether a sensor has a verdict that lasts.
   bool trusts(Sensor sensor) const { return !m_distrusted[static_cast<int>(sensor)]; }
-  /// Whether the odometry's motion from the frame before the newest to the newest may be used.
-  bool trustsStep() const { return trusts(Sensor::odometry) && !m_step_jumped; }
-  /// \p frame without what is not trusted.
+  /// Whether what a sensor says of the motion to the newest frame may be used.
+  bool trustsNow(Sensor sensor) const { return trusts(sensor) && !m_wrong_now[static_cast<int>(sensor)]; }
+  /// \p frame without the sensors whose verdict lasts: for a frame that is yet to be processed.
+  Frame withoutLiars(const Frame &frame) const;
+  /// The frame processed last, without what is not trusted in it.
   Frame trusted(const Frame &frame) const;
 
 private:
@@ -87,6 +93,7 @@ private:
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< world [m/s]
     double scatter = 0;                                 ///< squared change of the horizontal step over what is expected
     double parallax_px = 0;
+    bool is_held = false; ///< the pose before once more, while the points moved
   };
 
   void collect(const Frame &frame);
@@ -95,13 +102,21 @@ private:
   void checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions);
   void checkStandingStill(double time_s);
   void checkScatter();
+  void judgeFrame(const Frame &frame);
   void checkRotations();
+  void checkReturn(Sensor sensor);
   void checkDirection();
   void checkTilt(const Frame &frame);
   void nameGyro();
   std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
   std::optional<Eigen::Matrix3d> gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const;
-  void raise(Sensor sensor, const char *kind, double since_s, const std::string &text, bool lasts = true);
+  enum class Lasts
+  {
+    no,          ///< a moment
+    until_agree, ///< until the sensor agrees with the others again
+    yes
+  };
+  void raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts = Lasts::yes);
   bool has(Sensor sensor) const { return m_distrusted[static_cast<int>(sensor)]; }
 
   Pose m_bMc;
@@ -111,8 +126,10 @@ private:
   std::deque<Step> m_steps;
   std::optional<std::int64_t> m_gyro_changed_ns; ///< when the gyro's value was last another one
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;
-  bool m_had_gyro = false, m_had_odometry = false, m_step_jumped = false;
+  bool m_had_gyro = false, m_had_odometry = false;
   std::vector<SensorVerdict> m_verdicts;
   bool m_distrusted[3] = {false, false, false};
+  bool m_wrong_now[3] = {false, false, false};               ///< in the newest frame
+  std::optional<std::size_t> m_may_return[3] = {{}, {}, {}}; ///< number of the verdict that an agreement ends
 };
 } // namespace bole

@@ -178,7 +178,7 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
     const Pose pMc = cameraAt(newest() - 1).inverse() * cameraAt(newest());
     if (motion.is_rotation_seen)
       rotation = RotationPrior{pMc.R, kRotation * kRotation * Eigen::Matrix3d::Identity()};
-    if (motion.step.step_from_odometry)
+    if (motion.step.is_step_measured)
       translation = TranslationPrior{pMc.t, kTranslation * kTranslation * Eigen::Matrix3d::Identity()};
   }
   return m_saliency.update(frame.image, rotation, translation);
@@ -322,7 +322,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   report.wMb = wMb;
   report.wMc = wMb * m_bMc;
   report.pose_covariance = m_smoother.currentPoseCovariance();
-  report.is_translation_seen = motion.step.step_from_odometry;
+  report.is_translation_seen = motion.step.is_step_measured;
   report.has_ranges = m_motion->hasRanges();
   report.verdicts = m_motion->verdicts();
   toMetres(report, m_bMc, m_metres);

@@ -229,7 +229,7 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
   ++m_frame;
   motion.is_rotation_seen = true;
   motion.step = expected(frame, wMa, velocity);
-  motion.step.step_from_odometry = false;
+  motion.step.is_step_measured = false;
   if (motion.step.turn_from_gyro)
     m_points.process(frame); // for the bias that it teaches
   else
@@ -272,7 +272,7 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
   }
   else
     motion.odometry.push_back({last_placed, m_frame, odometry});
-  motion.step.step_from_odometry = m_has_unit && placed.status == PointOdometryStatus::ok;
+  motion.step.is_step_measured = m_has_unit && placed.status == PointOdometryStatus::ok;
   if (up()) { // frames share the lean of their trunks: the sum over frames must not know more than the filter
     const double sigma = upSigma() * std::sqrt(std::min(30.0, double(m_frames_with_up)));
     motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), sigma);

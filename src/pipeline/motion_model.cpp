@@ -64,7 +64,8 @@ PosePrior MotionModel::first(const Frame &frame) const
   return prior;
 }
 
-MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias &bias, const Vector6d &velocity)
+MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias &bias, const Vector6d &velocity,
+                             const std::optional<InertialStep> &inertial)
 {
   MotionStep step;
   const double dt = 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns);
@@ -89,13 +90,18 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
 
   Vector3d sigma;
   if (odometry) {
-    step.step_from_odometry = true;
+    step.is_step_measured = true;
     step.aMb.t = filter.t;
     const double along = m_options.step_scale_sigma * filter.t.norm();
     sigma << std::hypot(m_options.step_sigma, along), std::hypot(m_options.step_sigma, along),
         std::hypot(m_options.step_sigma_vertical, along);
     if (!m_options.relative_alone)
       step.absolute = levelPrior(*frame.wMb_odometry, wMa.R * step.aMb.R, m_options.height_sigma, m_options.tilt_sigma);
+  }
+  else if (inertial && inertial->sigma < m_options.free_step_sigma) {
+    step.is_step_measured = true;
+    step.aMb.t = inertial->moved;
+    sigma.setConstant(inertial->sigma);
   }
   else {
     step.aMb.t = velocity.head<3>() * dt;

@@ -11,7 +11,7 @@
 ///
 /// Frames: a the body at the frame before, b the body now, w world.
 
-#include "motion/gyro.h"
+#include "motion/inertial_scale.h"
 #include "smoothing/factors.h"
 #include <bole/frame.h>
 
@@ -43,7 +43,7 @@ struct MotionStep
   Matrix6d covariance = Matrix6d::Identity(); ///< of (rho, phi) at aMb
   std::optional<PosePrior> absolute;          ///< height, roll and pitch of b in the world
   bool turn_from_gyro = false;
-  bool step_from_odometry = false;
+  bool is_step_measured = false; ///< by the pose filter, the accelerometer or points
 };
 
 class MotionModel
@@ -55,8 +55,10 @@ public:
   PosePrior first(const Frame &frame) const;
 
   /// The step from the frame of the last call (or of first()) to \p frame. \p wMa: the pose there as it is known now;
-  /// \p velocity: of the body in its own frame as it is known, for what nothing measured.
-  MotionStep step(const Frame &frame, const Pose &wMa, const GyroBias &bias, const Vector6d &velocity);
+  /// \p velocity: of the body in its own frame as it is known, for what nothing measured; \p inertial: what stands in
+  /// for a pose filter that is silent.
+  MotionStep step(const Frame &frame, const Pose &wMa, const GyroBias &bias, const Vector6d &velocity,
+                  const std::optional<InertialStep> &inertial = {});
 
   /// Remembers \p frame as the one the next step starts from.
   void advance(const Frame &frame);

@@ -19,6 +19,17 @@ Odometry rotationAlone(const RelativePoseEstimate &estimate, const Pose &bMc)
       bMc.R * estimate.covariance.topLeftCorner<3, 3>() * bMc.R.transpose() + kLeast * Eigen::Matrix3d::Identity();
   return odometry;
 }
+
+/// What the points say without a gyro that is not trusted.
+std::vector<RelativeMotion> pointsAlone(std::vector<RelativeMotion> seen)
+{
+  for (RelativeMotion &motion : seen)
+    if (motion.gyro) {
+      motion.estimate = motion.points;
+      motion.gyro.reset();
+    }
+  return seen;
+}
 } // namespace
 
 OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, bool has_odometry,
@@ -50,9 +61,16 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   if (m_odometry_alone)
     return seen;
   if (m_use_points)
-    seen = m_points.process(m_monitor.trusted(frame));
-  m_inertial.process(frame, seen);
+    seen = m_points.process(m_monitor.withoutLiars(frame));
   m_monitor.process(frame, seen);
+  if (!m_monitor.trustsNow(Sensor::gyro))
+    seen = pointsAlone(std::move(seen));
+  else if (m_monitor.trustsNow(Sensor::images))
+    m_points.learn(seen);
+  const Frame trusted = m_monitor.trusted(frame);
+  m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
+  m_inertial.process(trusted, seen);
+  m_last_ns = frame.stamp_ns;
   return seen;
 }
 
@@ -62,9 +80,9 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
   const std::vector<RelativeMotion> seen = observe(frame);
   const Frame trusted = m_monitor.trusted(frame);
-  motion.step = m_model.step(trusted, wMa, bias, velocity);
-  motion.is_rotation_seen = motion.step.step_from_odometry || !trusted.gyro.empty();
-  if (m_monitor.trusts(Sensor::images))
+  motion.step = m_model.step(trusted, wMa, bias, velocity, m_inertial_step);
+  motion.is_rotation_seen = motion.step.is_step_measured || !trusted.gyro.empty();
+  if (m_monitor.trustsNow(Sensor::images))
     addPoints(motion, seen);
   m_model.advance(frame);
   return motion;

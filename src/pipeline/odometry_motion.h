@@ -11,8 +11,8 @@
 namespace bole
 {
 /// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames. The
-/// scale of the pose filter comes from the accelerometer where there is one. A sensor that contradicts the others is
-/// left out from then on.
+/// scale of the pose filter comes from the accelerometer where there is one, and so do its steps while it is silent. A
+/// sensor that contradicts the others is left out until it agrees with them again.
 class OdometryMotion : public MotionSource
 {
 public:
@@ -35,7 +35,9 @@ private:
   bool m_has_odometry, m_use_points, m_odometry_alone;
   double m_scale_sigma;
   MotionModel m_model;
-  InertialScale m_inertial; ///< of the pose filter, by the accelerometer
+  InertialScale m_inertial;                    ///< of the pose filter, by the accelerometer
+  std::optional<InertialStep> m_inertial_step; ///< to the frame at hand, where the pose filter is silent
   SensorMonitor m_monitor;
+  std::int64_t m_last_ns = 0; ///< stamp of the frame before
 };
 } // namespace bole

@@ -71,4 +71,35 @@ TEST(InertialScale, AnOdometryAThirdTooLongContradictsWhatWasExpected)
   EXPECT_TRUE(scale->contradicts_prior);
   EXPECT_NEAR(scale->mean, std::log(1.33), 0.02);
 }
+
+TEST(InertialScale, TwoSecondsWithoutOdometryAreBridgedWithinThreeStandardDeviations)
+{
+  MadeFlight made;
+  made.odometry_noise = 0.012;
+  made.force_noise = 0.1;
+  made.force_bias = {0.05, -0.08, 0.04};
+  made.factor = 1.1;
+  InertialScale inertial(forwardCamera());
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();
+  double variance = 0;
+  int bridged = 0;
+  for (std::size_t i = 0; i < 100; ++i) {
+    Frame frame = made.frame(i);
+    if (i >= 80) {
+      frame.wMb_odometry.reset();
+      const double from = 0.1 * static_cast<double>(i - 1), to = 0.1 * static_cast<double>(i);
+      const auto step = inertial.stepTo(frame, MadeFlight::nanoseconds(from));
+      ASSERT_TRUE(step) << i;
+      const Pose a = made.truth(from), b = made.truth(to);
+      const Eigen::Vector3d moved = (b.t - a.t).cwiseProduct(Eigen::Vector3d(made.factor, made.factor, 1));
+      error += a.R * step->moved - moved;
+      variance += step->sigma * step->sigma;
+      ++bridged;
+    }
+    inertial.process(frame, made.seen(i));
+  }
+  EXPECT_EQ(bridged, 20);
+  EXPECT_LT(error.norm(), 3 * std::sqrt(3 * variance)) << error.transpose() << " +- " << std::sqrt(variance);
+  EXPECT_LT(error.norm(), 0.3) << error.transpose(); // of two metres
+}
 } // namespace bole

@@ -119,10 +119,65 @@ TEST(SensorMonitor, EachFaultIsNamedWithItsSensor)
       EXPECT_EQ(verdict.kind, fault.kind) << fault.name << ": " << verdict.text;
     }
     EXPECT_TRUE(monitor.trusts(Sensor::images)) << fault.name;
-    if (std::string(fault.name) != "silent") { // with the gyro gone the odometry stands alone against the points
-      EXPECT_TRUE(monitor.trusts(fault.sensor == Sensor::gyro ? Sensor::odometry : Sensor::gyro)) << fault.name;
-    }
+    EXPECT_TRUE(monitor.trusts(fault.sensor == Sensor::gyro ? Sensor::odometry : Sensor::gyro)) << fault.name;
   }
+}
+
+TEST(SensorMonitor, ASensorThatAgreesAgainAfterASilenceIsTrustedAgain)
+{
+  const auto isSilent = [](const Frame &frame) {
+    return frame.stamp_ns >= MadeFlight::nanoseconds(3) && frame.stamp_ns < MadeFlight::nanoseconds(5);
+  };
+  const SensorMonitor gyro = fly([&](Frame &f) {
+    if (isSilent(f))
+      f.gyro.clear();
+  });
+  const SensorMonitor odometry = fly([&](Frame &f) {
+    if (isSilent(f))
+      f.wMb_odometry.reset();
+  });
+  const SensorMonitor held = fly([&, last = Pose()](Frame &f) mutable {
+    if (!isSilent(f))
+      last = *f.wMb_odometry;
+    f.wMb_odometry = last;
+  });
+  for (const SensorMonitor *monitor : {&gyro, &odometry, &held}) {
+    ASSERT_EQ(monitor->verdicts().size(), 1u);
+    EXPECT_NE(monitor->verdicts().front().text.find("until"), std::string::npos) << monitor->verdicts().front().text;
+    EXPECT_TRUE(monitor->trusts(Sensor::gyro) && monitor->trusts(Sensor::odometry));
+  }
+}
+
+TEST(SensorMonitor, AHeldPoseIsNoStepFromItsFirstFrameOn)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  Pose last;
+  for (std::size_t i = 0; i < 40; ++i) {
+    Frame frame = flight.frame(i);
+    const bool is_held = i == 30 || i == 31;
+    if (is_held)
+      frame.wMb_odometry = last;
+    last = *frame.wMb_odometry;
+    monitor.process(frame, flight.seen(i));
+    EXPECT_EQ(monitor.trustsNow(Sensor::odometry), i < 30 || i > 32) << i; // the step after it makes up for the pause
+  }
+}
+
+TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 31; ++i) {
+    Frame frame = flight.frame(i);
+    if (i == 30)
+      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 1)); });
+    monitor.process(frame, flight.seen(i));
+    EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30) << i;
+    EXPECT_EQ(monitor.trusted(frame).gyro.empty(), i == 0 || i == 30) << i;
+  }
+  EXPECT_TRUE(monitor.verdicts().empty());
+  EXPECT_TRUE(monitor.trusts(Sensor::gyro));
 }
 
 TEST(SensorMonitor, AFaultIsDatedWithinHalfASecond)
