@@ -8,6 +8,7 @@
 #include "track_arguments.h"
 #include "track_output.h"
 
+#include "motion/sensor_calibration.h"
 #include "output/progress.h"
 #include "report/report_page.h"
 #include <bole/ardrone_source.h>
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
@@ -29,7 +31,7 @@ namespace bole::apps
 namespace
 {
 /// A video without a camera file is looked through for a pan that tells its field of view.
-std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSummary &made)
+std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
   auto source = openSource(arguments.input, arguments.source);
   made.note = source->note();
@@ -39,9 +41,8 @@ std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSumma
   const FieldOfView view = fieldOfView(arguments.input, arguments.source);
   if (view.degrees == 0)
     return source;
-  SourceOptions options = arguments.source;
-  options.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
-  source = openSource(arguments.input, options);
+  arguments.source.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
+  source = openSource(arguments.input, arguments.source);
   made.is_camera_known = true;
   made.note = fmt::format(
       "no camera file: the camera rotates as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
@@ -49,13 +50,35 @@ std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSumma
   return source;
 }
 
-std::unique_ptr<FrameSource> openInput(const TrackArguments &arguments, RunSummary &made)
+/// A recording, without the constant errors of its sensors.
+std::unique_ptr<FrameSource> openRecording(TrackArguments arguments, const Options &options, RunSummary &made,
+                                           SensorCalibration &calibration)
+{
+  auto source = openVideo(arguments, made);
+  if (!options.stages.calibration || !options.stages.points || !source->isCameraKnown())
+    return source;
+  calibration = calibrateSensors(*source, !arguments.is_without_gyro, !arguments.is_without_odometry);
+  made.calibration = calibration.constants;
+  arguments.source.calibration = calibration;
+  return openSource(arguments.input, arguments.source);
+}
+
+/// What is left open of the constants that were taken out.
+void widen(Options::Odometry &odometry, const SensorCalibration &calibration)
+{
+  odometry.tilt = std::hypot(odometry.tilt, calibration.odometry_rotation_sigma);
+  odometry.turn = std::hypot(odometry.turn, calibration.odometry_rotation_sigma);
+  odometry.scale = std::hypot(odometry.scale, calibration.odometry_scale_sigma);
+}
+
+std::unique_ptr<FrameSource> openInput(const TrackArguments &arguments, const Options &options, RunSummary &made,
+                                       SensorCalibration &calibration)
 {
   if (!ArDroneSource::accepts(arguments.input))
-    return openVideo(arguments, made);
-  ArDroneSource::Options options;
-  options.give_up_s = arguments.give_up_s;
-  return std::make_unique<ArDroneSource>(arguments.input, options);
+    return openRecording(arguments, options, made, calibration);
+  ArDroneSource::Options link;
+  link.give_up_s = arguments.give_up_s;
+  return std::make_unique<ArDroneSource>(arguments.input, link);
 }
 
 Options readOptions(const TrackArguments &arguments, bool is_compressed)
@@ -189,18 +212,24 @@ std::size_t fly(const TrackArguments &arguments, FrameSource &source, bool is_li
 
 } // namespace
 
-void track(const TrackArguments &arguments)
+void track(const TrackArguments &asked_for)
 {
+  TrackArguments arguments = asked_for;
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
     throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
-  readOptions(arguments, false); // a mistake in them is said before the input is waited for
+  const Options asked = readOptions(arguments, false); // a mistake in them is said before the input is waited for
   RunSummary made = describeRun(arguments);
-  const auto source = openInput(arguments, made);
+  SensorCalibration calibration;
+  const auto source = openInput(arguments, asked, made, calibration);
+  for (const SensorVerdict &verdict : calibration.verdicts)
+    (verdict.sensor == "gyro" ? arguments.is_without_gyro : arguments.is_without_odometry) = true;
+  made.sensors = calibration.verdicts;
   Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
   made.preset = arguments.config.empty() ? "default" : arguments.config;
   made.options = toYaml(options);
+  widen(options.odometry, calibration);
   if (!made.note.empty() && !arguments.is_quiet)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
 

@@ -45,6 +45,7 @@ TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSou
                          bool has_pictures)
     : m_folder(run), m_summary(std::move(made)), m_bMc(source.bMc()), m_has_pictures(has_pictures)
 {
+  m_sensors_before = m_summary.sensors;
   m_summary.camera = source.camera();
   m_summary.has_odometry = source.hasOdometry();
   m_summary.has_gyro = source.hasGyro();
@@ -67,7 +68,8 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
   ++m_summary.frames[frame.status];
   if (frame.status != FrameStatus::ok && !frame.message.empty())
     m_summary.reasons.emplace(frame.status, frame.message);
-  m_summary.sensors = report.verdicts;
+  m_summary.sensors = m_sensors_before;
+  m_summary.sensors.insert(m_summary.sensors.end(), report.verdicts.begin(), report.verdicts.end());
   m_first_ns = m_is_begun ? m_first_ns : frame.stamp_ns;
   m_is_begun = true;
   m_last_ns = frame.stamp_ns;

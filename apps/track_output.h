@@ -58,6 +58,7 @@ private:
 
   RunFolder m_folder;
   RunSummary m_summary;
+  std::vector<SensorVerdict> m_sensors_before; ///< that were left out from the start
   MapPicture m_picture;
   FlightTrace m_trace; ///< of all hypotheses until the end
   BestViews m_best_views;

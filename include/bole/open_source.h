@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace bole
 {
@@ -37,6 +38,31 @@ Pose forwardCamera();
 /// "file: ..." for a camera that cannot be one (field of view, distortion that folds the picture, place in the body).
 MountedCamera readCamera(const std::string &path, int width = 0, int height = 0);
 
+/// A constant of a sensor, as it was measured.
+struct CalibratedConstant
+{
+  std::string name;  ///< for programs: gyro_late_s, gyro_bias, odometry_late_s, odometry_rotation, odometry_scale
+  double value = 0;  ///< [s], [rad/s], [s], [rad] or [1]; of a vector its length
+  double sigma = 0;  ///< standard deviation
+  bool used = false; ///< false: as stated by the sensor to what can be measured, and read so
+  std::string text;  ///< for the user: "gyro: clock 31 +- 2 ms late"
+};
+
+/// Constant errors of the motion sensors of a recording: what the sensors say is corrected by them as it is read.
+/// o: the body as the odometry has it.
+struct SensorCalibration
+{
+  double gyro_late_s = 0;                              ///< stamps of the gyro less the true times
+  double odometry_late_s = 0;                          ///< stamps of the odometry less the true times
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(); ///< [rad/s]
+  Eigen::Matrix3d bRo = Eigen::Matrix3d::Identity();   ///< rotation of the odometry's body in the body
+  double odometry_scale = 1;                           ///< horizontal lengths of the odometry over the true ones
+  double odometry_rotation_sigma = 0, odometry_scale_sigma = 0; ///< what is left open of the two [rad], [1]
+  std::vector<CalibratedConstant> constants;                    ///< all that were measured
+  std::vector<SensorVerdict>
+      verdicts; ///< sensors that contradict the others from the start on, for which no constant helps
+};
+
 /// Options of every frame source. validate() throws vpException "name = value, must be ...".
 struct SourceOptions
 {
@@ -55,6 +81,8 @@ struct SourceOptions
   /// [degrees], 10 to 150: horizontal field of view that is assumed, and said, where no camera is
   /// given. Default 65: between a phone's video and an action camera's.
   double field_of_view_deg = 65;
+  /// Errors of gyro and odometry that are taken out. Default: none.
+  SensorCalibration calibration;
 
   /// \throws vpException where a value is out of range, with what is allowed
   void validate() const;

@@ -34,7 +34,7 @@ MapOfRun readMapOfRun(const std::string &run)
     throw vpException(vpException::badValue, "%s: the camera only rotated, so that there is no map to be exported",
                       run.c_str());
   map.name = std::filesystem::path(run).lexically_normal().filename().string();
-  map.camera = readCamera(run + "/summary.json");
+  map.camera = readCameraOfRun(run + "/summary.json");
   map.trunks = readTrunks(run + "/trunks.csv");
   map.trajectory = readTumTrajectory(run + "/trajectory.tum");
   map.bMc = readG2o(run + "/graph.g2o").bMc;

@@ -7,10 +7,31 @@
 
 namespace bole
 {
+Recording corrected(Recording recording, const SensorCalibration &calibration)
+{
+  const auto gyro_late_ns = static_cast<std::int64_t>(std::llround(calibration.gyro_late_s * 1e9));
+  const auto odometry_late_ns = static_cast<std::int64_t>(std::llround(calibration.odometry_late_s * 1e9));
+  for (GyroSample &sample : recording.gyro) {
+    sample.stamp_ns -= gyro_late_ns;
+    sample.rate -= calibration.gyro_bias;
+  }
+  const bool is_scaled = calibration.odometry_scale != 1, is_turned = !calibration.bRo.isIdentity(0);
+  const Eigen::Vector2d first =
+      recording.odometry.empty() ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(recording.odometry.front().wMb.t.head<2>());
+  for (StampedPose &pose : recording.odometry) { // what is as stated keeps its bits
+    pose.stamp_ns -= odometry_late_ns;
+    if (is_turned)
+      pose.wMb.R = pose.wMb.R * calibration.bRo.transpose();
+    if (is_scaled)
+      pose.wMb.t.head<2>() = first + (pose.wMb.t.head<2>() - first) / calibration.odometry_scale;
+  }
+  return recording;
+}
+
 FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
     : m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
-      m_recording(std::move(recording)),
+      m_recording(corrected(std::move(recording), options.calibration)),
       m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9)),
       m_health(camera.model.pinhole, camera.bMc)
 {

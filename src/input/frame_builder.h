@@ -23,6 +23,9 @@ struct Recording
   std::vector<GyroSample> gyro;
 };
 
+/// \p recording without the constant errors of its sensors.
+Recording corrected(Recording recording, const SensorCalibration &calibration);
+
 /// Adds what the motion sensors measured, judges the images (FrameHealth) and rectifies them.
 class FrameBuilder
 {

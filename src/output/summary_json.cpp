@@ -125,6 +125,13 @@ std::string toJson(const RunSummary &summary)
   json["ranges"] = summary.reference.has_ranges;
   json["motion"] = motionJson(summary);
   json["frames"] = framesJson(summary.frames);
+  json["calibration"] = Json::array();
+  for (const CalibratedConstant &constant : summary.calibration)
+    json["calibration"].push_back({{"name", constant.name},
+                                   {"value", constant.value},
+                                   {"sigma", constant.sigma},
+                                   {"used", constant.used},
+                                   {"text", constant.text}});
   json["sensors"] = Json::array();
   for (const SensorVerdict &sensor : summary.sensors)
     json["sensors"].push_back(
@@ -176,7 +183,7 @@ WorldReference readReference(const std::string &path)
   return reference;
 }
 
-PinholeCamera readCamera(const std::string &path)
+PinholeCamera readCameraOfRun(const std::string &path)
 {
   const Json json = readObject(path);
   try {

@@ -6,6 +6,7 @@
 #include "output/digest.h"
 #include "output/timing_csv.h"
 #include <bole/frame.h>
+#include <bole/open_source.h>
 #include <bole/trunk_record.h>
 #include <bole/world_reference.h>
 
@@ -30,8 +31,9 @@ struct RunSummary
   bool has_odometry = false, has_gyro = false;
 
   // what came of it
-  bool is_complete = true;  ///< false: the run was stopped, this is what was known by then
-  WorldReference reference; ///< where scale and gravity come from
+  std::vector<CalibratedConstant> calibration; ///< what was measured of the sensors before the run
+  bool is_complete = true;                     ///< false: the run was stopped, this is what was known by then
+  WorldReference reference;                    ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
   std::map<FrameStatus, std::string> reasons; ///< the first message of each status
   std::vector<SensorVerdict> sensors;         ///< sensors that contradict the others
@@ -51,7 +53,7 @@ std::string toJson(const RunSummary &summary);
 /// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
 WorldReference readReference(const std::string &path);
 /// The camera of a summary.json, likewise.
-PinholeCamera readCamera(const std::string &path);
+PinholeCamera readCameraOfRun(const std::string &path);
 /// toJson(), written atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
 } // namespace bole

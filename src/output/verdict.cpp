@@ -72,6 +72,9 @@ void addFacts(Verdict &verdict, const RunSummary &summary)
     verdict.facts.push_back(fmt::format("{:.1f} s; {}", summary.duration_s, framesText(summary)));
   verdict.facts.push_back(fmt::format("{}; field of view: {:.1f} degrees, {}", describe(summary.reference), view,
                                       summary.is_camera_known ? "calibrated" : "a guess"));
+  for (const CalibratedConstant &constant : summary.calibration)
+    if (constant.used)
+      verdict.facts.push_back(fmt::format("{}: measured and taken out", constant.text));
   if (has_ranges)
     verdict.facts.push_back(
         fmt::format("{} trunk{}, median sigma {} in place and {} in radius; {} other hypotheses", confirmed,

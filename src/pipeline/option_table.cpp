@@ -101,6 +101,9 @@ std::vector<OptionEntry> optionTable(Options &o)
 
       {"stages.points", &o.stages.points, 0, 1, "", "relative poses from point features"},
       {"stages.saliency", &o.stages.saliency, 0, 1, "", "motion saliency; off: what is far may be taken for a trunk"},
+      {"stages.calibration", &o.stages.calibration, 0, 1, "",
+       "`bole track` finds constant errors of gyro, odometry and clocks in the first seconds of a recording and takes "
+       "them out"},
       {"stages.final_pass", &o.stages.final_pass, 0, 1, "",
        "at the end every hypothesis is judged by all frames; off: the map as it was known in flight"},
       {"stages.servoing", &o.stages.servoing, 0, 1, "",

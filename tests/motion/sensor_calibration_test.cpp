@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/sensor_calibration.h"
+
+#include "motion/made_flight.h"
+
+#include <functional>
+#include <gtest/gtest.h>
+
+namespace bole
+{
+namespace
+{
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using test::MadeFlight;
+
+MadeFlight noisy()
+{
+  MadeFlight flight;
+  flight.odometry_noise = 0.012;
+  flight.force_noise = 0.1;
+  return flight;
+}
+
+/// Eight seconds, the stamps of the sensors late by these times; \p damage changes a frame before it is looked at.
+SensorCalibration fly(
+    MadeFlight flight, const std::function<void(Frame &)> &damage = [](Frame &) {}, double gyro_late_s = 0,
+    double odometry_late_s = 0)
+{
+  SensorCalibrator calibrator(forwardCamera());
+  const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
+  std::mt19937 random(3);
+  std::normal_distribution<double> turn(0, 0.003);
+  std::vector<GyroSample> waiting;
+  for (std::size_t i = 0; i < 80; ++i) {
+    Frame frame = flight.frame(i);
+    const double t = 0.1 * static_cast<double>(i) - odometry_late_s;
+    frame.wMb_odometry->R = flight.truth(t).R * expSo3({turn(random), turn(random), turn(random)});
+    damage(frame);
+    for (GyroSample sample : frame.gyro) {
+      sample.stamp_ns += gyro_late_ns;
+      waiting.push_back(sample);
+    }
+    frame.gyro.clear();
+    while (!waiting.empty() && waiting.front().stamp_ns <= frame.stamp_ns) {
+      frame.gyro.push_back(waiting.front());
+      waiting.erase(waiting.begin());
+    }
+    const std::vector<RelativeMotion> seen = flight.seen(i);
+    calibrator.add(frame, seen.empty() ? std::nullopt : std::optional<RelativeMotion>(seen.front()));
+  }
+  return calibrator.estimate();
+}
+
+const CalibratedConstant *constant(const SensorCalibration &calibration, const std::string &name)
+{
+  for (const CalibratedConstant &one : calibration.constants)
+    if (one.name == name)
+      return &one;
+  return nullptr;
+}
+
+void expectAsStated(const SensorCalibration &calibration)
+{
+  for (const CalibratedConstant &one : calibration.constants)
+    EXPECT_FALSE(one.used) << one.text;
+  EXPECT_EQ(calibration.gyro_late_s, 0);
+  EXPECT_EQ(calibration.odometry_late_s, 0);
+  EXPECT_EQ(calibration.gyro_bias, Vector3d(0, 0, 0));
+  EXPECT_EQ(calibration.bRo, Matrix3d(Matrix3d::Identity()));
+  EXPECT_EQ(calibration.odometry_scale, 1);
+}
+
+void turnRates(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
+{
+  for (GyroSample &sample : frame.gyro)
+    sample.rate = change(sample.rate);
+}
+} // namespace
+
+TEST(SensorCalibration, SensorsInOrderAreReadAsStated)
+{
+  expectAsStated(fly(MadeFlight()));
+  const SensorCalibration calibration = fly(noisy());
+  expectAsStated(calibration);
+  EXPECT_TRUE(constant(calibration, "gyro_bias"));
+  EXPECT_TRUE(constant(calibration, "gyro_late_s"));
+  EXPECT_TRUE(constant(calibration, "odometry_scale"));
+}
+
+TEST(SensorCalibration, ABiasOfTheGyroIsFoundWithItsSigma)
+{
+  for (const Vector3d &bias : {Vector3d(0, 0, 0.05), Vector3d(0.1, -0.05, 0.02)}) {
+    const SensorCalibration calibration =
+        fly(noisy(), [&](Frame &f) { turnRates(f, [&](const Vector3d &w) { return Vector3d(w + bias); }); });
+    const CalibratedConstant *found = constant(calibration, "gyro_bias");
+    ASSERT_TRUE(found && found->used);
+    EXPECT_LT((calibration.gyro_bias - bias).norm(), 3 * std::sqrt(3.0) * found->sigma + 1e-3);
+    EXPECT_LT(found->sigma, 0.01);
+  }
+}
+
+TEST(SensorCalibration, ALateGyroIsFoundToAFewMilliseconds)
+{
+  for (const double late_s : {-0.1, -0.03, 0.03, 0.1}) {
+    const SensorCalibration calibration = fly(
+        noisy(), [](Frame &) {}, late_s);
+    EXPECT_NEAR(calibration.gyro_late_s, late_s, 0.006);
+    EXPECT_EQ(calibration.odometry_late_s, 0) << late_s;
+  }
+}
+
+TEST(SensorCalibration, GyroAndOdometryThatAreLateTogetherAreBothFound)
+{
+  for (const double late_s : {0.06, 0.1}) { // less is less than what such an odometry shows
+    const SensorCalibration calibration = fly(
+        noisy(), [](Frame &) {}, late_s, late_s);
+    EXPECT_NEAR(calibration.gyro_late_s, late_s, 0.006);
+    EXPECT_NEAR(calibration.odometry_late_s, late_s, 0.012);
+  }
+}
+
+TEST(SensorCalibration, AScaleFarFromOneIsTakenOver)
+{
+  for (const double factor : {0.75, 1.15, 1.3}) {
+    MadeFlight flight = noisy();
+    flight.factor = factor;
+    const SensorCalibration calibration = fly(flight);
+    EXPECT_NEAR(std::log(calibration.odometry_scale), std::log(factor), 0.06) << factor;
+    EXPECT_GT(calibration.odometry_scale_sigma, 0) << factor;
+  }
+}
+
+TEST(SensorCalibration, ATurnedBodyOfTheOdometryIsFound)
+{
+  for (const Vector3d &turned : {Vector3d(0.17, 0, 0), Vector3d(0, 0.17, 0), Vector3d(0, 0, -0.17)}) {
+    const SensorCalibration calibration =
+        fly(noisy(), [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
+    EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.02) << turned.transpose();
+    EXPECT_GT(calibration.odometry_rotation_sigma, 0) << turned.transpose();
+  }
+}
+
+TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
+{
+  const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(5); };
+  expectAsStated(fly(noisy(), [&](Frame &f) {
+    if (isLate(f))
+      turnRates(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); });
+  }));
+  expectAsStated(fly(noisy(), [&](Frame &f) {
+    if (isLate(f))
+      turnRates(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
+  }));
+}
+
+TEST(SensorCalibration, AxesThatAreExchangedAreNoConstant)
+{
+  expectAsStated(
+      fly(noisy(), [](Frame &f) { turnRates(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); }));
+}
+} // namespace bole
