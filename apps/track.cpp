@@ -55,7 +55,9 @@ std::unique_ptr<FrameSource> openRecording(TrackArguments arguments, const Optio
                                            SensorCalibration &calibration)
 {
   auto source = openVideo(arguments, made);
-  if (!options.stages.calibration || !options.stages.points || !source->isCameraKnown())
+  const bool has_sensors =
+      (source->hasGyro() && !arguments.is_without_gyro) || (source->hasOdometry() && !arguments.is_without_odometry);
+  if (!has_sensors || !options.stages.calibration || !options.stages.points || !source->isCameraKnown())
     return source;
   calibration = calibrateSensors(*source, !arguments.is_without_gyro, !arguments.is_without_odometry);
   made.calibration = calibration.constants;
