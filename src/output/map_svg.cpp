@@ -95,12 +95,12 @@ SvgPoints path(const Sheet &sheet, const Trajectory &trajectory)
 void drawGrid(SvgDrawing &drawing, const Sheet &sheet)
 {
   constexpr const char *kLine = "#e4e4e4", *kLabel = "style=\"fill:#999\"";
-  for (double m = std::ceil(sheet.box.min().x()); m <= sheet.box.max().x(); ++m) {
+  for (const double m : gridBetween(sheet.box.min().x(), sheet.box.max().x())) {
     drawing.line(sheet.x(m), sheet.top, sheet.x(m), sheet.height(), kLine);
     if (std::fmod(m, 2) == 0)
       drawing.text(sheet.x(m) + 2, sheet.height() - 4, fmt::format("{:g} m", m), kLabel);
   }
-  for (double m = std::ceil(sheet.box.min().y()); m <= sheet.box.max().y(); ++m) {
+  for (const double m : gridBetween(sheet.box.min().y(), sheet.box.max().y())) {
     drawing.line(0, sheet.y(m), sheet.width(), sheet.y(m), kLine);
     if (std::fmod(m, 2) == 0)
       drawing.text(3, sheet.y(m) - 3, fmt::format("{:g} m", m), kLabel);

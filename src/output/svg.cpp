@@ -92,10 +92,23 @@ std::vector<double> ticksBetween(double low, double high)
 {
   const double raw = std::max(high - low, 1e-9) / 5, base = std::pow(10, std::floor(std::log10(raw)));
   const double step = base * (raw / base < 1.5 ? 1 : raw / base < 3.5 ? 2 : raw / base < 7.5 ? 5 : 10);
+  constexpr int kMost = 12; // far from zero a step may change nothing
+  const double first = std::ceil(low / step);
   std::vector<double> ticks;
-  for (double v = std::ceil(low / step) * step; v <= high + 1e-9 * step; v += step)
-    ticks.push_back(std::abs(v) < 1e-9 * step ? 0 : v);
+  for (int i = 0; i < kMost && (first + i) * step <= high + 1e-9 * step; ++i)
+    ticks.push_back((first + i) * step + 0.0); // no -0
   return ticks;
+}
+
+std::vector<double> gridBetween(double low, double high)
+{
+  constexpr double kMostLines = 300;
+  if (!(high - low < kMostLines))
+    return ticksBetween(low, high);
+  std::vector<double> lines;
+  for (double m = std::ceil(low); m <= high && lines.size() < kMostLines; ++m)
+    lines.push_back(m);
+  return lines;
 }
 
 void SvgAxes::draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,

@@ -51,4 +51,6 @@ struct SvgAxes
 
 /// Values of ticks between \p low and \p high, about five.
 std::vector<double> ticksBetween(double low, double high);
+/// Every metre between \p low and \p high; of a map of more than 300 m those of ticksBetween().
+std::vector<double> gridBetween(double low, double high);
 } // namespace bole

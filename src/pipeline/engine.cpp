@@ -155,7 +155,10 @@ Viewpoint Engine::extend(const Frame &frame, const Motion &motion)
     m_smoother.addOdometry(between.a, between.b, between.odometry);
   for (const DirectionBetween &between : motion.directions)
     m_smoother.addRelativePose(between.a, between.b, between.measurement);
-  m_smoother.update();
+  if (m_units.flow.as_paper)
+    m_smoother.optimize(kJointlySettled); // full smoothing, and no step that the energies do not bear out
+  else
+    m_smoother.update();
   refreshMap(seconds(frame.stamp_ns) - kLately_s);
   return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), seconds(frame.stamp_ns)};
 }

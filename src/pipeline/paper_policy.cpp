@@ -6,15 +6,15 @@
 
 #include <Eigen/Eigenvalues>
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
+#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
 constexpr double kNoCurvature = 1e-6; ///< of an energy without borders, by rounding [1/px^2]
+constexpr double kSettled_px = 0.02;  ///< a border that moves less stands
 
 TrunkEnergy energyOf(const Gradient &gradient, const PinholeCamera &camera, const StageOptions &options)
 {
@@ -40,21 +40,26 @@ std::vector<ObservedTree> instantiate(const Gradient &gradient, const vpImage<fl
 }
 
 /// "We non-linearly optimize the relative tree parameters to maximize the true measurement likelihood before computing"
-/// the quadratic: the minimum of the tree's own energy next to \p start, in all four directions. Nothing where there is
-/// none.
-std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera, RelativeTrunk start)
+/// the quadratic: the minimum of the tree's own energy below \p start, in all four directions, by Newton steps that are
+/// halved until the energy falls. Nothing where that ends on no minimum.
+std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera,
+                                       const RelativeTrunk &start)
 {
-  constexpr int kIterations = 30;
-  constexpr double kSettled_px = 0.02;
-  for (int i = 0; i < kIterations && start.isFinite(); ++i) {
-    const Vector4d steps = pixelSteps(camera, start);
-    const SummaryFactor summary = expandEnergy(energy, camera, start);
+  constexpr int kIterations = 50;
+  if (!start.isFinite())
+    return std::nullopt;
+  SummaryFactor summary = expandEnergy(energy, camera, start);
+  for (int i = 0; i < kIterations; ++i) {
+    const Vector4d steps = pixelSteps(camera, summary.optimum);
     if (!summary.f.allFinite() || !summary.F.allFinite())
       return std::nullopt;
-    const Vector4d step = -convexified(summary, steps).F.ldlt().solve(summary.f);
-    if (step.cwiseQuotient(steps).cwiseAbs().maxCoeff() < kSettled_px)
+    Vector4d step = -convexified(summary, steps).F.ldlt().solve(summary.f);
+    const auto length_px = [&] { return step.cwiseQuotient(steps).cwiseAbs().maxCoeff(); };
+    while (length_px() >= kSettled_px && !(energy.evaluate(summary.optimum.plus(step)) < summary.energy))
+      step *= 0.5;
+    if (!(length_px() >= kSettled_px))
       return isConvex(summary, steps) ? std::optional(summary) : std::nullopt;
-    start = start.plus(step);
+    summary = expandEnergy(energy, camera, summary.optimum.plus(step));
   }
   return std::nullopt;
 }
@@ -80,9 +85,7 @@ std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<Observ
   const std::size_t newest = smoother.poseCount() - 1;
   std::vector<TrunkInView> seen;
   for (ObservedTree &tree : trees) {
-    tree.relative = smoother.predictedRelative(tree.smoother_id);
     const Trunk trunk = smoother.trunk(tree.smoother_id);
-    smoother.removeObservation(newest, tree.smoother_id);
     const std::optional<SummaryFactor> summary = minimised(energy, view.camera, tree.relative);
     const bool is_observed =
         summary && smoother.addObservation(newest, tree.smoother_id, *summary) != SummaryStatus::not_finite;
@@ -110,7 +113,7 @@ std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<Observ
                     toString(is_observed ? TrackingStatus::tracked : TrackingStatus::negative_curvature), tree.relative,
                     drawn.low, drawn.high, horizontalView(view.wMc, trunk).range});
   }
-  smoother.update();
+  smoother.optimize(kJointlySettled);
   return seen;
 }
 } // namespace
@@ -171,25 +174,19 @@ std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flig
 void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
                      Smoother &smoother)
 {
-  constexpr int kIterations = 12;
-  constexpr double kSettled_px = 0.02;
+  const auto expanded = [&](const RelativeTrunk &relative) {
+    return convexified(expandEnergy(energy, camera, relative), pixelSteps(camera, relative));
+  };
   const std::size_t newest = smoother.poseCount() - 1;
-  for (int i = 0; i < kIterations && !trees.empty(); ++i) {
-    double moved_px = 0;
-    for (ObservedTree &tree : trees) {
-      const RelativeTrunk before = std::exchange(tree.relative, smoother.predictedRelative(tree.smoother_id));
-      smoother.removeObservation(newest, tree.smoother_id);
-      if (!tree.relative.isFinite())
-        continue;
-      const Vector4d steps = pixelSteps(camera, tree.relative);
-      moved_px = std::max(moved_px, tree.relative.minus(before).cwiseQuotient(steps).cwiseAbs().maxCoeff());
-      smoother.addObservation(newest, tree.smoother_id,
-                              convexified(expandEnergy(energy, camera, tree.relative), steps));
-    }
-    if (i > 0 && moved_px < kSettled_px)
-      return;
-    smoother.update();
+  for (const ObservedTree &tree : trees)
+    smoother.addImage(newest, tree.smoother_id, expanded);
+  const UpdateResult result = smoother.optimize(kJointlySettled);
+  for (ObservedTree &tree : trees) {
+    smoother.removeObservation(newest, tree.smoother_id);
+    tree.relative = smoother.predictedRelative(tree.smoother_id);
   }
+  if (!std::isfinite(result.cost))
+    throw vpException(vpException::divideByZeroError, "paper: frame %zu: the joint energy is not finite", newest);
 }
 
 std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<float> *p_background, const Viewpoint &view,
@@ -199,9 +196,6 @@ std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<floa
   for (const std::size_t i : map.active()) // observed in the frame before, or ended
     trees.push_back({map.trunks()[i].id, map.trunks()[i].smoother_id, {}});
   const TrunkEnergy energy = energyOf(gradient, view.camera, options);
-  smoother.update(); // what is new may be asked for
-  for (ObservedTree &tree : trees)
-    tree.relative = smoother.predictedRelative(tree.smoother_id);
   optimiseJointly(energy, view.camera, trees, smoother);
   return summarise(energy, trees, view, smoother, map, options);
 }

@@ -10,8 +10,9 @@
 /// image of a tree becomes a summary factor for ever (Eq. 9). A tree whose energy has no minimum there is observed no
 /// more: it stays in the map, and nothing is ever associated with it.
 ///
-/// Laws (each a test): at the joint optimum the gradients of the images and of all other factors cancel; a tree is
-/// confirmed in the frame that finds it; one that ends stays, and what is found in its place is another tree.
+/// Laws (each a test): the joint optimisation never raises the sum of the energies, and where it ends no move of a pose
+/// or a tree lowers it; a tree is confirmed in the frame that finds it; one that ends stays, and what is found in its
+/// place is another tree.
 
 #include "pipeline/adoption.h"
 #include "saliency/rotation_em.h"
@@ -24,6 +25,9 @@ namespace bole
 /// elevation.
 constexpr ElevationRange kWholeLine = {-20, 20};
 
+constexpr double kJointlySettled =
+    1e-8; ///< share of the joint energy by which its optimisation still falls when it ends
+
 /// Steps of the tangent of \p relative that move an end of one of its borders by a pixel, none longer than a tenth.
 Vector4d pixelSteps(const PinholeCamera &camera, const RelativeTrunk &relative);
 
@@ -33,8 +37,8 @@ SummaryFactor expandEnergy(const TrunkEnergy &energy, const PinholeCamera &camer
 /// Whether the quadratic has a minimum, in each direction of the tangent.
 bool isConvex(const SummaryFactor &summary, const Vector4d &steps);
 
-/// The same value and gradient with a Hessian that is positive and lets the image move a border by a pixel at most: one
-/// step towards the optimum from wherever it starts.
+/// The same value and gradient with a Hessian that is positive and lets the image move a border by a pixel at most (the
+/// basin of Eq. 3 is the blur, three pixels wide): one step downhill from wherever it starts.
 SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps);
 
 /// The turn of the camera since the last pose of \p flight by the gyro, where it covers it: what EM starts from.
@@ -49,9 +53,11 @@ struct ObservedTree
   RelativeTrunk relative;
 };
 
-/// Eq. 2 with the energies (Eq. 3 and 4) of the newest pose's image, by Newton steps on all of it together: the energy
-/// of each of \p trees is expanded about where the last step left it, until no border moves any more. The last
-/// expansions stay in \p smoother as views of its newest pose.
+/// Eq. 2 with the energies (Eq. 3 and 4) of the newest pose's image, all of it together, by Levenberg-Marquardt: a step
+/// is taken only where the sum of the energies themselves and of all other factors falls. So it ends, and what it
+/// leaves is never worse than what it was given; where the current image has no minimum it stops at the best there is.
+/// \p trees and \p smoother then stand at the joint optimum, and the images are out of \p smoother again.
+/// \throw vpException where the sum is no number
 void optimiseJointly(const TrunkEnergy &energy, const PinholeCamera &camera, std::vector<ObservedTree> &trees,
                      Smoother &smoother);
 

@@ -101,6 +101,7 @@ int rowCount(FactorKind kind)
   case FactorKind::height:
     return 1;
   case FactorKind::observation:
+  case FactorKind::image:
     return 4;
   case FactorKind::relative_pose:
     return 5;
@@ -174,6 +175,8 @@ void Smoother::State::freeDropped()
   for (const int id : dropped_factors) {
     const Factor &factor = factors[id];
     free_data[static_cast<std::size_t>(factor.kind)].push_back(factor.data);
+    if (factor.kind == FactorKind::image)
+      images[factor.data].energy = nullptr;
     if (factor.linear != nullptr)
       store.release(factor.linear, blockSize(factor));
     free_factors.push_back(id);
@@ -200,8 +203,8 @@ void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
   newFactor(FactorKind::odometry, placeData(odometry, FactorKind::odometry, {measured, S}), variable_a, variable_b);
 }
 
-void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
-                                           const SquareRootSummary &root)
+/// Opens the trunk, if need be, for what \p pose saw of it.
+void Smoother::State::see(int pose, int trunk)
 {
   TrunkState &seen = trunks[trunk];
   if (!isOpen(seen.variable)) { // closed by the lag: what was known of it is its prior now
@@ -210,10 +213,16 @@ void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFac
     reopenTrunk(trunk);
   }
   seen.last_pose = std::max(seen.last_pose, pose);
-  ++seen.observations;
+}
+
+void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
+                                           const SquareRootSummary &root)
+{
+  see(pose, trunk);
+  ++trunks[trunk].observations;
   ++live_observations;
   newFactor(FactorKind::observation, placeData(observations, FactorKind::observation, {summary, root}),
-            poses[pose].variable, seen.variable);
+            poses[pose].variable, trunks[trunk].variable);
 }
 
 void Smoother::State::removeTrunk(int trunk)

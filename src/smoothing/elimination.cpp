@@ -95,6 +95,7 @@ void Smoother::State::assemble(const Factor &factor)
     addBinary<5, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::observation:
+  case FactorKind::image:
     addBinary<4, 6, 5>(factor.linear, F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::marginal: {

@@ -46,6 +46,7 @@ Graph Smoother::State::graph() const
       graph.observations.push_back({a, b, observations[factor.data].factor});
       break;
     case FactorKind::marginal:
+    case FactorKind::image: // stays with its picture
       break;
     }
   }

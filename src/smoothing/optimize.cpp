@@ -59,9 +59,9 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   bool settled = false, anew = true;
   while (!settled && result.iterations < max_iterations) {
     solveAll(result, anew);
-    const double after = costAtEstimate();
-    if (std::isfinite(after) && after <= before * (1 + 1e-13)) {
-      settled = before - after <= tolerance * before;
+    const double after = costAtEstimate(), fall = before - after;
+    if (std::isfinite(after) && fall >= -1e-13 * std::abs(before)) { // an image's energy is below zero
+      settled = fall <= tolerance * std::abs(before);
       before = after;
       anew = true;
       damping = damping < 1e-7 ? 0 : damping / 10;
@@ -70,8 +70,8 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
       for (Variable &v : variables)
         v.delta.setZero();
       anew = false;
+      settled = damping > 1e12 || (damping == 0 && fall >= -tolerance * std::max(1.0, std::abs(before))); // rounding
       damping = damping == 0 ? 1e-6 : damping * 10;
-      settled = damping > 1e12;
     }
   }
   damping = 0; // the factorisation left behind is that of the graph itself

@@ -75,7 +75,8 @@ enum class FactorKind : unsigned char
   relative_pose,
   height,
   observation,
-  marginal
+  marginal,
+  image
 };
 
 struct Factor
@@ -112,6 +113,11 @@ struct ObservationData
 {
   SummaryFactor factor;
   SquareRootSummary root;
+};
+struct ImageData
+{
+  ImageEnergy energy;
+  SquareRootSummary root; ///< about the point of linearisation
 };
 /// What closed variables leave behind: a quadratic in the tangents at the points where it was made.
 struct MarginalData
@@ -158,6 +164,7 @@ public:
   std::deque<Height> heights;
   std::deque<ObservationData> observations;
   std::deque<MarginalData> marginals;
+  std::deque<ImageData> images;
   std::size_t live_observations = 0;
 
   // build.cpp
@@ -172,6 +179,7 @@ public:
   void dropFactor(int factor);
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
+  void see(int pose, int trunk);
   void addObservationFactor(int pose, int trunk, const SummaryFactor &summary, const SquareRootSummary &root);
   void removeTrunk(int trunk);
   void mergeTrunks(int keep, int gone);
@@ -258,7 +266,7 @@ public:
   };
   std::vector<int> dropped_factors, removed_variables; ///< still named by what is to be eliminated again
   std::vector<int> free_factors;
-  std::array<std::vector<int>, 6> free_data; ///< by kind of factor
+  std::array<std::vector<int>, 7> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
   std::vector<Descent> stack;
   std::vector<double> front;

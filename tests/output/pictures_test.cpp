@@ -325,6 +325,15 @@ TEST(MapSvg, IsXmlWhateverTheTitle)
   EXPECT_THAT(toSvg(picture), HasSubstr("frames &lt;1&gt; &amp; &quot;2&quot;"));
 }
 
+TEST(MapSvg, IsDrawnHoweverFarATrajectoryWentAstray)
+{
+  for (const double far : {1e4, 1e9, 1e33, 1e90}) {
+    MapPicture picture;
+    picture.smoothed = {{0, Pose()}, {1, Pose(Eigen::Matrix3d::Identity(), {far, -far, far})}};
+    EXPECT_LT(toSvg(picture).size(), 100'000u) << far;
+  }
+}
+
 TEST(MapSvg, OfNothingIsAPictureToo)
 {
   EXPECT_THAT(toSvg(MapPicture()), testing::AllOf(testing::StartsWith("<svg"), testing::EndsWith("</svg>\n")));

@@ -13,7 +13,6 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <random>
 
 namespace
@@ -136,6 +135,112 @@ TEST(PaperEquation9, GradientAndHessianAreTheDifferencesOfTheEnergyItself)
           << a << b;
   }
   EXPECT_DOUBLE_EQ(summary.energyAt(centre), energy.evaluate(centre));
+}
+
+/// Trees that two images showed differently, by far more than alpha allows, and that a third shows again: the joint
+/// problem of a frame as bark and leaves make it.
+struct Joint
+{
+  StageOptions options = preset();
+  Pose bMc = SmootherOptions::forwardCamera();
+  Smoother smoother{options.smoothing};
+  std::vector<ObservedTree> trees;
+  Gradient gradient = gradientAt(Pose(Eigen::Matrix3d::Identity(), {0, 0.1, 1.2}) * bMc);
+  TrunkEnergy energy{gradient, kCamera, kWholeLine, {}, {}, options.tracking.energy};
+
+  /// \p error: of the first guesses and of the earlier views, in parts of what the tests call far.
+  Joint(unsigned seed, double error)
+  {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, error);
+    smoother.addFirstPose(Pose(Eigen::Matrix3d::Identity(), {-0.3, 0, 1.2}), 1e-6 * Matrix6d::Identity());
+    for (const std::size_t k : {0, 1, 2}) {
+      const Trunk truth = trunkOf(test::smallWood()[k]);
+      const Trunk guess =
+          truth.plus((Vector5d() << 1.5 * normal(random), normal(random), 0.4 * normal(random), 0, 0).finished());
+      trees.push_back({-1, smoother.addTrunk(guess, priorOf(guess, options.smoothing)), {}});
+      for (std::size_t pose = 0; pose < 2 && error > 0.1; ++pose) {
+        if (smoother.poseCount() == pose)
+          smoother.addPose(Pose(Eigen::Matrix3d::Identity(), {0.1, 0.05, 0}), 1e-4 * Matrix6d::Identity());
+        SummaryFactor view;
+        view.optimum = relativeTrunk(smoother.pose(pose), bMc, truth)
+                           .plus(0.02 * Vector4d(normal(random), normal(random), normal(random), 10 * normal(random)));
+        view.F = Vector4d(1e4, 1e2, 2.5e7, 2.5e5).asDiagonal(); // 0.04 px
+        smoother.addObservation(pose, trees.back().smoother_id, view);
+      }
+    }
+    const Eigen::Vector3d to = Eigen::Vector3d(-0.02, 0.11, 1.21) - smoother.pose(smoother.poseCount() - 1).t;
+    smoother.addPose(Pose(expSo3({0.003, -0.002, 0.004}), to), 1e-4 * Matrix6d::Identity());
+  }
+
+  /// Eq. 2 and 4: odometry, priors and summaries are a sum of squares, the current image the energies of its trees.
+  double total(const Graph &graph) const
+  {
+    double sum = cost(graph);
+    for (const ObservedTree &tree : trees)
+      sum += energy.evaluate(relativeTrunk(graph.poses.back().wMb, bMc, graph.trunks[tree.smoother_id].trunk));
+    return sum;
+  }
+  double total() const { return total(smoother.graph()); }
+};
+
+/// By how much a number lowers the total at best, to second order, where it moves alone: g^2 / 2c.
+template <typename Move> double decrement(const Joint &joint, const Graph &graph, const Move &move)
+{
+  const auto at = [&](double d) {
+    Graph moved = graph;
+    move(moved, d);
+    return joint.total(moved);
+  };
+  const double here = at(0);
+  double h = 1e-7, plus = 0, minus = 0;
+  do { // a standard deviation given all others
+    h *= 1.5;
+    plus = at(h) - here;
+    minus = at(-h) - here;
+  } while (plus + minus < 1 && h < 1);
+  const double slope = (plus - minus) / 2, curvature = plus + minus;
+  return 0.5 * slope * slope / curvature;
+}
+
+TEST(PaperEquation2, TheEnergiesOfTheNewestImageAndTheGraphOfTheRestAreOptimalTogether)
+{
+  constexpr double kMost = 0.02; // a fifth of a standard deviation
+  for (const double error : {0.05, 0.3}) {
+    Joint joint(3, error);
+    optimiseJointly(joint.energy, kCamera, joint.trees, joint.smoother);
+    const Graph graph = joint.smoother.graph();
+    for (std::size_t i = 0; i < graph.poses.size(); ++i)
+      for (int k = 0; k < 6; ++k)
+        EXPECT_LT(decrement(joint, graph,
+                            [&](Graph &g, double d) { g.poses[i].wMb = g.poses[i].wMb.plus(d * Vector6d::Unit(k)); }),
+                  kMost)
+            << "pose " << i << ", " << k;
+    for (std::size_t j = 0; j < graph.trunks.size(); ++j)
+      for (int k = 0; k < 3; ++k)
+        EXPECT_LT(
+            decrement(joint, graph,
+                      [&](Graph &g, double d) { g.trunks[j].trunk = g.trunks[j].trunk.plus(d * Vector5d::Unit(k)); }),
+            kMost)
+            << "tree " << j << ", " << k;
+  }
+}
+
+TEST(PaperEquation2, TheJointOptimisationNeverRaisesTheEnergyHoweverFarItStarts)
+{
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Joint joint(seed, 1);
+    const double before = joint.total();
+    optimiseJointly(joint.energy, kCamera, joint.trees, joint.smoother);
+    EXPECT_LE(joint.total(), before) << seed;
+    EXPECT_EQ(joint.smoother.observationCount(), 6u) << "the current image is no summary yet";
+    joint.smoother.optimize(kJointlySettled);
+    const Graph graph = joint.smoother.graph();
+    for (const Graph::PoseVertex &pose : graph.poses)
+      EXPECT_LT(pose.wMb.t.norm(), 100) << seed;
+    for (const Graph::TrunkVertex &tree : graph.trunks)
+      EXPECT_LT(tree.trunk.xy.norm(), 1000) << seed; // the prior alone holds it within 50 m
+  }
 }
 
 /// Two images of a texture, the camera turned between them by a little more than what is known at the start.

@@ -79,6 +79,15 @@ struct Mapping
 
   std::vector<TrunkInView> see(const std::vector<Cylinder> &trees)
   {
+    return look([&](const Pose &wMc) { return test::drawTrunks(kCamera, wMc.inverse(), trees); });
+  }
+  /// An image without any gradient.
+  std::vector<TrunkInView> seeNothing()
+  {
+    return look([](const Pose &) { return vpImage<unsigned char>(240, 320, 128); });
+  }
+  template <typename Draw> std::vector<TrunkInView> look(const Draw &draw)
+  {
     const Eigen::Vector3d step(0, smoother.poseCount() % 4 < 2 ? 0.06 : -0.06, 0);
     smoother.addPose(Pose(Eigen::Matrix3d::Identity(), step), 1e-6 * Matrix6d::Identity());
     smoother.update();
@@ -86,8 +95,7 @@ struct Mapping
       map.refresh({map.trunks()[i].id, smoother.trunk(map.trunks()[i].smoother_id), std::nullopt});
     const Viewpoint view{kCamera, smoother.pose(smoother.poseCount() - 1) * kMount, true, 0.0,
                          0.1 * static_cast<double>(smoother.poseCount())};
-    const auto image = test::drawTrunks(kCamera, view.wMc.inverse(), trees);
-    return mapAsPaper(computeGradient(image, options.gradient), &all_near, view, smoother, map, options);
+    return mapAsPaper(computeGradient(draw(view.wMc), options.gradient), &all_near, view, smoother, map, options);
   }
   int confirmed() const
   {
@@ -118,6 +126,30 @@ TEST(PaperPolicy, AWideningBaselineFindsTheRange)
   const Trunk trunk = mapping.smoother.trunk(mapping.map.trunks()[0].smoother_id);
   EXPECT_LT((trunk.xy - Eigen::Vector2d(4, 0.5)).norm(), 0.2);
   EXPECT_NEAR(trunk.radius(), 0.2, 0.04);
+}
+
+TEST(PaperPolicy, ATreeWhoseEnergyIsNotConvexEndsAndStaysInTheMap)
+{
+  Mapping mapping;
+  mapping.see(kOneTree);
+  const auto seen = mapping.seeNothing();
+  ASSERT_EQ(seen.size(), 1u);
+  EXPECT_FALSE(seen[0].is_tracked);
+  EXPECT_STREQ(seen[0].outcome, "negative curvature");
+  EXPECT_TRUE(mapping.map.active().empty());
+  EXPECT_EQ(mapping.confirmed(), 1);
+  EXPECT_TRUE(mapping.map.review(1e6).changes.empty());
+  EXPECT_TRUE(mapping.map.reviewAll().changes.empty());
+}
+
+TEST(PaperPolicy, WhatIsFoundAgainIsAnotherTree)
+{
+  Mapping mapping;
+  mapping.see(kOneTree);
+  mapping.seeNothing();
+  mapping.see(kOneTree);
+  EXPECT_EQ(mapping.confirmed(), 2);
+  EXPECT_EQ(mapping.map.active().size(), 1u);
 }
 
 TEST(PaperPolicy, ATreeThatIsObservedKeepsOthersOut)
