@@ -40,8 +40,9 @@ constexpr double kTorn = 0.45;          // and most of the other
 constexpr double kBackGain = 0.1;       // correlation by which an image follows the last good one better
 constexpr double kBackLeast = 0.35;     // and that it must reach
 constexpr double kZooms[] = {1.15, 1.3, 1.5, 1.75, 2};
-constexpr int kLastsMost = 30; // frames that a fault of the picture is refused before it counts as usual
-constexpr int kJumpsMost = 5;  // frames out of order before the new place is believed
+constexpr int kLastsMost = 30;   // frames that a fault of the picture is refused before it counts as usual
+constexpr int kJumpsMost = 5;    // frames out of order or torn before they are believed
+constexpr int kTornSpacing = 30; // frames: what tears more often is in the view, as a propeller
 
 double middleOf(const std::deque<double> &values) { return medianOf({values.begin(), values.end()}); }
 
@@ -151,8 +152,9 @@ struct ImageHealth::State
   double good_repeated = 0;
   std::deque<double> noises, sharpnesses, changes; ///< of accepted images; noise over deviation
   int bad_quality = 0;
-  Suspicion odd;     ///< how the images have stood to the last accepted one since it
-  int odd_count = 0; ///< of them
+  Suspicion odd;                 ///< how the images have stood to the last accepted one since it
+  int odd_count = 0;             ///< of them
+  int since_torn = kTornSpacing; ///< frames
   std::optional<Eigen::Vector3d> gyro = Eigen::Vector3d::Zero(),
                                  odometry = Eigen::Vector3d::Zero();       ///< since `previous`
   std::optional<Eigen::Vector3d> gyro_from_last = Eigen::Vector3d::Zero(); ///< since the last accepted image
@@ -278,8 +280,11 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
   const ImageMatch moved = matchImages(previous, small);
   if (odd.fault != ImageFault::none)
     return judgeOdd(small, moved, focal);
+  ++since_torn;
   if (moved.correlation < kFlipLeast)
-    if (Suspicion other = otherwise(previous, small, moved); other.fault != ImageFault::none) {
+    if (Suspicion other = otherwise(previous, small, moved);
+        other.fault != ImageFault::none && (other.fault != ImageFault::torn || since_torn > kTornSpacing)) {
+      since_torn = other.fault == ImageFault::torn ? 0 : since_torn;
       agreement.reset();
       return begin(std::move(other));
     }
@@ -310,7 +315,8 @@ ImageFault ImageHealth::State::judgeOdd(const cv::Mat &small, const ImageMatch &
       return fault;
     }
   }
-  if (!is_back && ++odd_count <= (is_out_of_order ? kJumpsMost : kLastsMost))
+  const bool is_short = is_out_of_order || odd.fault == ImageFault::torn;
+  if (!is_back && ++odd_count <= (is_short ? kJumpsMost : kLastsMost))
     return say(odd.fault, odd.text);
   odd = {};
   return ImageFault::none;

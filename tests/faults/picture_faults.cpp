@@ -2,6 +2,7 @@
 // What cameras, their drivers and their links do to pictures.
 #include "fault_list.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
@@ -112,17 +113,20 @@ Fault noised(const std::string &name, const std::string &what, std::size_t count
           }};
 }
 
-/// Stamps of all frames off by a normal error of \p sigma_s, at most three of them.
+/// Stamps of all frames off by a normal error of \p sigma_s.
 Fault jittered(const std::string &name, const std::string &what, double sigma_s)
 {
-  return {"pictures", name, what, Duty::survive, [=](SpoiltFlight &flight) {
-            std::normal_distribution<double> error(0, sigma_s);
-            for (std::size_t i = 1; i + 1 < flight.frames(); ++i) {
-              const double off = std::min(std::max(error(flight.random), -3 * sigma_s), 3 * sigma_s);
-              flight.camera.rows[i][0] = std::to_string(
-                  flight.camera.stamp(i) + static_cast<std::int64_t>(1e9 * std::min(std::max(off, -0.045), 0.045)));
-            }
-          }};
+  Fault fault{"pictures", name, what};
+  fault.since_s = 0;
+  fault.spoil = [sigma_s](SpoiltFlight &flight) {
+    constexpr double kMost_s = 0.045; // the order is kept
+    std::normal_distribution<double> error(0, sigma_s);
+    for (std::size_t i = 1; i + 1 < flight.frames(); ++i) {
+      const double off = std::clamp(error(flight.random), -kMost_s, kMost_s);
+      flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) + static_cast<std::int64_t>(1e9 * off));
+    }
+  };
+  return fault;
 }
 
 std::vector<Fault> lightFaults()
