@@ -30,6 +30,7 @@ void addCommands(CLI::App &app)
   addExport(app);
   addOptions(app);
   addLocalise(app);
+  addFollow(app);
   addRecord(app);
   addGraph(app);
   addSolve(app);

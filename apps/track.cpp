@@ -8,6 +8,7 @@
 #include "track_arguments.h"
 #include "track_output.h"
 
+#include "input/live_video.h"
 #include "output/progress.h"
 #include "report/report_page.h"
 #include <bole/ardrone_source.h>
@@ -31,10 +32,12 @@ namespace
 /// A video without a camera file is looked through for a pan that tells its field of view.
 std::unique_ptr<FrameSource> openVideo(const TrackArguments &arguments, RunSummary &made)
 {
-  auto source = openSource(arguments.input, arguments.source);
+  const bool is_stream = LiveVideoSource::accepts(arguments.input);
+  auto source = is_stream ? openStream(arguments.input, arguments.source, arguments.give_up_s)
+                          : openSource(arguments.input, arguments.source);
   made.note = source->note();
   made.is_camera_known = source->isCameraKnown() || arguments.is_field_of_view_given;
-  if (made.is_camera_known)
+  if (made.is_camera_known || is_stream)
     return source;
   const FieldOfView view = fieldOfView(arguments.input, arguments.source);
   if (view.degrees == 0)
@@ -196,6 +199,7 @@ void track(const TrackArguments &arguments)
   const auto source = openInput(arguments, made);
   Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
+  const bool is_live = live != nullptr || dynamic_cast<const LiveVideoSource *>(source.get()) != nullptr;
   options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
   made.preset = arguments.config.empty() ? "default" : arguments.config;
   made.options = toYaml(options);
@@ -207,7 +211,7 @@ void track(const TrackArguments &arguments)
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   endAtInterrupt();
-  if (fly(arguments, *source, live != nullptr, pipeline, output, flight) == 0) {
+  if (fly(arguments, *source, is_live, pipeline, output, flight) == 0) {
     if (interrupted())
       endWith(ExitCode::interrupted);
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
