@@ -110,6 +110,7 @@ struct OwnPose
   Pose wMc;
   MotionError error;
   double time_s = 0;
+  bool has_height = false; ///< its z is that over the ground
 };
 
 /// The tracker, and what carries its pose from frame to frame.
@@ -138,6 +139,16 @@ public:
     m_height = this->wMc().t.z() - own.wMc.t.z();
   }
 
+  /// What is known by now of the camera's pose at the last frame: points find their scale as they go.
+  void correctLast(const Trajectory &flight, const Pose &bMc)
+  {
+    for (auto pose = flight.rbegin(); pose != flight.rend(); ++pose)
+      if (1e-9 * static_cast<double>(pose->stamp_ns) <= m_last.time_s + 1e-6) {
+        m_last.wMc = pose->wMb * bMc;
+        return;
+      }
+  }
+
   /// Follows into \p image, to which the camera came by \p own. Where its step leads counts from the last pose on the
   /// model, with its height, roll and pitch from \p own: they do not drift.
   void follow(const vpImage<unsigned char> &image, const OwnPose &own)
@@ -145,7 +156,8 @@ public:
     const Pose before = wMc();
     const Eigen::Matrix3d turn = expSo3({0, 0, headingOf(before) - headingOf(m_last.wMc)});
     Pose now(turn * own.wMc.R, before.t + turn * (own.wMc.t - m_last.wMc.t));
-    now.t.z() = own.wMc.t.z() + m_height;
+    if (own.has_height)
+      now.t.z() = own.wMc.t.z() + m_height;
     const Matrix6d carry = adjoint(now.inverse() * before);
     Matrix6d axes = Matrix6d::Zero(); // of the world to the camera's
     axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = now.R.transpose();
@@ -330,7 +342,7 @@ OwnPose ownPose(const Frame &frame, const FrameReport *report, const Pose &bMc)
 {
   const double time_s = 1e-9 * static_cast<double>(frame.stamp_ns);
   if (frame.wMb_odometry)
-    return {*frame.wMb_odometry * bMc, kPoseFilter, time_s};
+    return {*frame.wMb_odometry * bMc, kPoseFilter, time_s, true};
   if (report == nullptr) // a frame that the odometry leaves out
     return {Pose(), kTurnsAlone, time_s};
   return {report->wMc, report->has_ranges && report->is_translation_seen ? kPoints : kTurnsAlone, time_s};
@@ -369,7 +381,12 @@ void follow(const FollowArguments &arguments)
     if (localiser && !(follower.isStarted() && source->hasOdometry()))
       report = localiser->process(frame);
     if (frame.status == FrameStatus::ok && (frame.wMb_odometry || report)) {
-      const OwnPose own = ownPose(frame, report ? &*report : nullptr, bMc);
+      OwnPose own = ownPose(frame, report ? &*report : nullptr, bMc);
+      if (!frame.wMb_odometry && follower.isStarted()) {
+        const Trajectory flight = localiser->smoothed();
+        own.wMc = flight.back().wMb * bMc;
+        follower.correctLast(flight, bMc);
+      }
       std::optional<Pose> first = given ? std::optional(*given * bMc) : std::nullopt;
       if (!follower.isStarted() && is_map && localiser->placement())
         first = localiser->onMap(report->wMb) * bMc;

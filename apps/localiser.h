@@ -31,6 +31,8 @@ public:
   std::optional<double> placedAfter_s() const { return m_placed_s; }
   /// The same body pose on the map; it must have been placed.
   Pose onMap(const Pose &wMb) const;
+  /// In the world of the flight.
+  Trajectory smoothed() const { return m_pipeline.smoothedTrajectory(); }
   Trajectory smoothedOnMap() const;
 
 private:
