@@ -61,4 +61,5 @@ void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
 void addDocumentation(CLI::App &app, const std::string &version);
 void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images
 void addReproduce(CLI::App &app);    ///< the figures of the paper
+void addFitOdds(CLI::App &app);      ///< weights of the final decision
 } // namespace bole::apps

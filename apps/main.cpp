@@ -44,6 +44,7 @@ void addCommands(CLI::App &app)
   addCalibrateSaliency(app);
   addShowSaliency(app);
   addReproduce(app);
+  addFitOdds(app);
 #endif
   addDocumentation(app, "bole " BOLE_VERSION);
 }

@@ -68,6 +68,8 @@ Options readOptions(const TrackArguments &arguments, bool is_compressed)
   if (!arguments.config.empty())
     readConfig(findPreset(arguments.config), options);
   setOptions(arguments.settings, options);
+  if (arguments.is_online)
+    options.stages.final_pass = false;
   if (arguments.camera_height > 0)
     options.camera.height = arguments.camera_height;
   return options;

@@ -50,6 +50,8 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
                      "same, byte by byte");
   command.add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command.add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
+  command.add_flag("--online", arguments->is_online,
+                   "The map as it was known in flight: no second look at all frames at the end");
   command.add_flag("--profile", arguments->is_profiled, "Tell at the end what each stage of a frame cost");
   command.add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors; the exit status tells how it went");
   command.footer("Writes trajectory.tum, trajectory_online.tum, trunks.csv, hypotheses.csv, graph.g2o, overlay.mp4, "

@@ -19,7 +19,7 @@ struct TrackArguments
   std::string input, run, config, again;
   std::vector<std::string> settings, without;
   SourceOptions source;
-  bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_without_odometry = false,
+  bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_online = false, is_without_odometry = false,
        is_without_gyro = false;
   std::size_t frames_most = 0;
   double give_up_s = ArDroneSource::Options().give_up_s;

@@ -31,10 +31,11 @@ struct Options
   /// Parts of the pipeline that can be left out, for comparisons.
   struct Stages
   {
-    bool points = true;    ///< relative poses from point features
-    bool saliency = true;  ///< motion saliency: off leaves detection ungated
-    bool servoing = false; ///< the camera is steered by what is tracked, and may rest or circle a trunk
-  } stages;                ///< what is left out
+    bool points = true;     ///< relative poses from point features
+    bool saliency = true;   ///< motion saliency: off leaves detection ungated
+    bool final_pass = true; ///< at the end every hypothesis is judged by all frames
+    bool servoing = false;  ///< the camera is steered by what is tracked, and may rest or circle a trunk
+  } stages;                 ///< what is left out
 
   /// What trunks look like.
   struct Trunks

@@ -20,7 +20,9 @@
 /// \endcode
 ///
 /// A Frame may be filled by hand: an image and a stamp suffice; the first frame tells whether there is odometry.
-/// Memory: the window of the detector and the graph of the smoother; no image is kept beyond the window.
+/// Memory: the window of the detector, the graph of the smoother, and for the final pass (`stages.final_pass`) frames
+/// from places apart, at most 256 MB of pictures. With `map.lag` or for servoing there is no final pass and no image is
+/// kept beyond the window.
 /// Not thread-safe; no globals.
 
 #include <bole/graph.h>
@@ -50,7 +52,8 @@ public:
 
   /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted.
   FrameReport process(const Frame &frame);
-  /// Smooths the whole flight once more, everything linearised anew, and reviews the map by that.
+  /// Smooths the whole flight once more, everything linearised anew, and judges every hypothesis by all frames
+  /// (`stages.final_pass`): trunks may come that were never confirmed in flight, and others go.
   void finish();
 
   /// All that was ever found, with what became of it; a trunk is what is `confirmed`. The covariances carry the common

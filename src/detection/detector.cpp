@@ -193,17 +193,23 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
   return fit;
 }
 
-double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy)
+/// By how much the bearing of a border changes over the views.
+double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy, double radius)
 {
-  double low = 0, high = 0;
-  const Vector2d reference = (xy - views.back().position).normalized();
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  const Vector2d reference = xy - views.back().position;
+  const auto halfAngle = [radius](const Vector2d &w) { return std::asin(std::min(radius / w.norm(), 1.0)); };
   for (const PlaneView &view : views) {
     const Vector2d w = xy - view.position;
     const double angle = std::atan2(reference.x() * w.y() - reference.y() * w.x(), reference.dot(w));
-    low = std::min(low, angle);
-    high = std::max(high, angle);
+    const double widened = halfAngle(w) - halfAngle(reference);
+    for (const int side : {0, 1}) {
+      const double moved = angle + (side == 0 ? widened : -widened);
+      low[side] = std::min(low[side], moved);
+      high[side] = std::max(high[side], moved);
+    }
   }
-  return high - low;
+  return std::max(high[0] - low[0], high[1] - low[1]);
 }
 
 bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
@@ -241,7 +247,7 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewC
   const Vector2d w = detection.trunk.xy - views.back().position;
   detection.range = w.norm();
   const double r = detection.trunk.radius();
-  detection.parallax = parallaxOf(views, detection.trunk.xy);
+  detection.parallax = parallaxOf(views, detection.trunk.xy, r);
   Matrix3d information = fit.information;
   information.diagonal() += Vector3d(1e-2, 1e-2, 1.0);
   detection.covariance = information.inverse();

@@ -30,7 +30,7 @@ struct DetectorOptions
   double inliers_min = 0.7;      ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;        ///< [px]
   double rms_max_px = 0.85;      ///< of the inliers, [px]
-  double parallax_min = 0.03;    ///< angle between the first and the last line of sight, [rad]
+  double parallax_min = 0.03;    ///< change of the bearing of a border over the window, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   double near_range = 5.5;       ///< nearer than this a trunk must be foreground [m], 0 (off) to 100
   double foreground_min = 0.15;  ///< mean of 1 - p(background) between its borders then, 0 to 1

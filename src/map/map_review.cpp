@@ -63,9 +63,8 @@ bool isAnotherVisit(const MapTrunk &a, const MapTrunk &b)
 /// What was seen of \p gone was seen of \p keep.
 void absorb(MapTrunk &keep, const MapTrunk &gone)
 {
-  const double apart = std::remainder(gone.bearing_first - keep.bearing_first, 2 * M_PI);
-  keep.bearing_low = std::min(keep.bearing_low, apart + gone.bearing_low);
-  keep.bearing_high = std::max(keep.bearing_high, apart + gone.bearing_high);
+  keep.left.add(gone.left);
+  keep.right.add(gone.right);
   if (gone.last_seen_s > keep.last_seen_s) {
     keep.misses_in_a_row = gone.misses_in_a_row;
     keep.left_contrast = gone.left_contrast;
@@ -257,6 +256,72 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
   reviewPairs(update);
   keepActive();
   return update;
+}
+
+TrunkMap TrunkMap::withTrunks(const std::vector<int> &ids) const
+{
+  std::vector<MapTrunk> trunks = m_trunks;
+  for (MapTrunk &trunk : trunks) {
+    trunk.removed = std::find(ids.begin(), ids.end(), trunk.id) == ids.end();
+    trunk.inactive = false;
+    trunk.status = trunk.removed ? TrunkStatus::lost : TrunkStatus::confirmed;
+  }
+  return {m_options, std::move(trunks)};
+}
+
+std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
+{
+  std::vector<std::size_t> forgotten;
+  std::vector<bool> stays(m_trunks.size(), false);
+  for (const TrunkDecision &decision : decisions)
+    stays[static_cast<std::size_t>(decision.id)] = decision.is_trunk && !decision.found;
+  for (MapTrunk &trunk : m_trunks) {
+    if (stays[static_cast<std::size_t>(trunk.id)])
+      continue;
+    if (!trunk.removed)
+      forgotten.push_back(trunk.smoother_id);
+    trunk.removed = true;
+    if (trunk.status == TrunkStatus::confirmed) {
+      trunk.status = TrunkStatus::lost;
+      trunk.fate = TrunkFate::doubted;
+    }
+  }
+  for (const TrunkDecision &decision : decisions) {
+    MapTrunk &trunk = m_trunks[static_cast<std::size_t>(decision.id)];
+    trunk.final_odds = decision.log_odds;
+    if (!decision.is_trunk) {
+      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.final_odds)
+        trunk.fate = TrunkFate::outdone;
+      continue;
+    }
+    if (decision.found) {
+      trunk.smoother_id = decision.found->smoother_id;
+      trunk.trunk = decision.found->trunk;
+      trunk.covariance = decision.found->covariance;
+      trunk.observations = 0;
+      for (const TrunkView &view : decision.found->views)
+        addView(trunk, view);
+    }
+    trunk.status = TrunkStatus::confirmed;
+    trunk.fate = TrunkFate::none;
+    trunk.removed = trunk.inactive = false;
+  }
+  keepActive();
+  return forgotten;
+}
+
+bool TrunkMap::isPlaced(const Matrix5d &covariance) const
+{
+  return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= m_options.confirm_position_sigma;
+}
+
+void TrunkMap::doubtPlaces()
+{
+  for (MapTrunk &trunk : m_trunks)
+    if (trunk.status == TrunkStatus::confirmed && !isPlaced(trunk.covariance)) {
+      trunk.status = TrunkStatus::candidate;
+      trunk.fate = TrunkFate::undecided;
+    }
 }
 
 MapUpdate TrunkMap::forgetUnranged()

@@ -17,6 +17,7 @@ void MapOptions::validate() const
   requireRange("map.confirm_evidence", confirm_evidence, -20, 20);
   requireRange("map.turning_evenness", turning_evenness, 0, 1);
   requireRange("map.turning_contrast", turning_contrast, 0, 0.5);
+  requireRange("map.final_odds", final_odds, -20, 20);
   requireRange("map.doubt_observations", doubt_observations, 3, 1000);
   requireRange("map.doubt_candidate", doubt_candidate, -50, 0);
   requireRange("map.doubt_confirmed", doubt_confirmed, -50, 0);
@@ -111,6 +112,20 @@ void TrunkMap::record(const PointCount &points)
   trunk.points_behind += points.behind;
 }
 
+void BearingSpread::add(double bearing)
+{
+  const double turned = std::remainder(bearing - first, 2 * M_PI);
+  low = std::min(low, turned);
+  high = std::max(high, turned);
+}
+
+void BearingSpread::add(const BearingSpread &other)
+{
+  const double apart = std::remainder(other.first - first, 2 * M_PI);
+  low = std::min(low, apart + other.low);
+  high = std::max(high, apart + other.high);
+}
+
 void blendContrast(std::optional<double> &mean, double now)
 {
   if (now != 0)
@@ -121,12 +136,12 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
 {
   constexpr int kMemory = 30; // views of the running means
   if (trunk.observations == 0) {
-    trunk.bearing_first = view.bearing;
+    trunk.left.begin(view.bearing + view.half_angle);
+    trunk.right.begin(view.bearing - view.half_angle);
     trunk.first_seen_s = trunk.last_seen_s = view.time_s;
   }
-  const double rotated = std::remainder(view.bearing - trunk.bearing_first, 2 * M_PI);
-  trunk.bearing_low = std::min(trunk.bearing_low, rotated);
-  trunk.bearing_high = std::max(trunk.bearing_high, rotated);
+  trunk.left.add(view.bearing + view.half_angle);
+  trunk.right.add(view.bearing - view.half_angle);
   trunk.first_seen_s = std::min(trunk.first_seen_s, view.time_s);
   trunk.last_seen_s = std::max(trunk.last_seen_s, view.time_s);
   trunk.seen_from = view.camera;
@@ -151,7 +166,7 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
     record.xy = trunk.trunk.axisAt(breast_z).head<2>();
     record.radius = trunk.trunk.radius();
     record.lean = trunk.trunk.lean;
-    record.probability = 1 / (1 + std::exp(-evidence(trunk)));
+    record.probability = 1 / (1 + std::exp(-trunk.final_odds.value_or(evidence(trunk))));
     Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
     J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
     J(2, 2) = record.radius;

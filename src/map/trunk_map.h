@@ -14,6 +14,7 @@
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -33,6 +34,7 @@ struct MapOptions
   double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
                                    ///< does: how evenly its borders run along their length, 0 to 1,
   double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
+  double final_odds = -0.5;         ///< log odds by all frames at which it is one, -20 to 20
   int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
   double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
@@ -53,6 +55,17 @@ struct MapOptions
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
+/// Extremes of a bearing in the world.
+struct BearingSpread
+{
+  double first = 0;         ///< [rad]
+  double low = 0, high = 0; ///< from the first one [rad]
+
+  void begin(double bearing) { *this = {bearing, 0, 0}; }
+  void add(double bearing);
+  void add(const BearingSpread &other);
+};
+
 /// A trunk of the map with its history. Only the map writes it.
 struct MapTrunk
 {
@@ -71,16 +84,17 @@ struct MapTrunk
   double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
-  double bearing_first = 0;                            ///< world bearing of the first view [rad]
-  double bearing_low = 0, bearing_high = 0;            ///< extremes of the bearing from the first one [rad]
+  BearingSpread left, right;                           ///< of its borders over its views
   double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
+  std::optional<double> final_odds;     ///< log-odds by all frames, where they were judged: see TrunkMap::decide()
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
 
-  double parallax() const { return bearing_high - bearing_low; }
+  /// By how much the bearing of a border changed [rad]: sideways motion moves both, approach moves them apart.
+  double parallax() const { return std::max(left.high - left.low, right.high - right.low); }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
   double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
@@ -94,6 +108,7 @@ struct TrunkView
 {
   double time_s = 0;
   double bearing = 0;                           ///< of the trunk from the camera, world [rad]
+  double half_angle = 0;                        ///< of its silhouette [rad]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
   double evenness = 0;                          ///< of the borders along their length, 0 to 1
   double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], divided by
@@ -142,6 +157,15 @@ struct TrunkEstimate
   int id = 0;
   Trunk trunk;
   std::optional<Matrix5d> covariance; ///< where it was asked for
+};
+
+/// A hypothesis in the light of the whole flight.
+struct TrunkDecision
+{
+  int id = 0;
+  double log_odds = 0; ///< that it is a trunk
+  bool is_trunk = false;
+  std::optional<NewTrunk> found; ///< with all its views, where they were looked for anew
 };
 
 /// A change of the status of one trunk.
@@ -200,6 +224,15 @@ public:
   MapUpdate review(double now_s, bool has_ranges = true);
   /// The same for the end of a flight: inactive candidates take part again.
   MapUpdate reviewAll(bool has_ranges = true);
+  /// The same map in which \p ids are the confirmed trunks, and what else was is none.
+  TrunkMap withTrunks(const std::vector<int> &ids) const;
+  /// The last word: those decided on are the trunks of the map, with their new views. Returns what the smoother is to
+  /// forget: nothing else stays in it.
+  std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
+  /// Whether a place with this covariance is known well enough for a trunk of the map.
+  bool isPlaced(const Matrix5d &covariance) const;
+  /// Trunks whose place is not known well enough are candidates again.
+  void doubtPlaces();
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 

@@ -94,73 +94,79 @@ Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const 
   return trunk;
 }
 
-namespace
+void Follower::look(const Gradient &gradient, std::size_t pose, const Pose &wMb, const Viewpoint &at,
+                    const TrunkMap &map, int id, const StageOptions &options)
 {
-/// Fits the trunk to its views, and takes down how well they fit.
-void fit(Adoption &adoption, const std::vector<TrackingResult> &results, const Viewpoint &view,
-         const StageOptions &options)
+  constexpr double kTilt = 0.01;   // standard deviation of the two angles that one view hardly knows [rad]
+  constexpr double kBorder_px = 1; // and of bearing and half width, beside that of the trunk
+  Matrix45d J;
+  const RelativeTrunk relative = relativeTrunk(at.wMc, Pose(), m_guess, nullptr, &J);
+  if (!relative.isFinite() || relative.cRt(2, 0) <= 0)
+    return;
+  TrackingPrediction prediction;
+  prediction.relative = relative;
+  const double sigma = kBorder_px / at.camera.fx;
+  prediction.covariance = J * m_covariance * J.transpose();
+  prediction.covariance.diagonal() += Vector4d(kTilt, kTilt, sigma, sigma / relative.ratio()).cwiseAbs2();
+  prediction.range = elevationOf(relative, m_guess, at, options);
+  const HiddenBorders hidden = hiddenBorders(m_guess, id, map, at);
+  prediction.left_hidden = hidden.left;
+  prediction.right_hidden = hidden.right;
+  prediction.left_contrast = m_left_contrast;
+  prediction.right_contrast = m_right_contrast;
+  const TrackingResult result = trackTrunk(gradient, at.camera, prediction, options.tracking);
+  if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used ||
+      !isInsideGate(prediction, result, at.camera.fx, options.flow))
+    return;
+  m_views.push_back({pose, wMb, summaryOf(result, weightOfView(m_before, at.wMc.t, options.flow))});
+  m_before = at.wMc.t;
+  blendContrast(m_left_contrast, result.left_contrast);
+  blendContrast(m_right_contrast, result.right_contrast);
+  m_seen.push_back(viewOf(result, relative, m_guess, at, options.flow));
+  m_results.push_back(result);
+}
+
+Adoption Follower::fitted(double found_s, const PinholeCamera &camera, const StageOptions &options) const
 {
   constexpr double kUnseen = 9; // [px^2]: nothing was seen of it
-  const SmootherOptions &smoothing = options.smoothing;
-  adoption.trunk.found_s = view.time_s;
+  Adoption adoption;
+  adoption.views = m_views;
+  adoption.trunk.trunk = m_guess;
+  adoption.trunk.covariance = m_covariance;
+  adoption.trunk.views = m_seen;
+  adoption.trunk.found_s = found_s;
   adoption.trunk.innovation2 = kUnseen;
-  if (adoption.views.empty())
-    return;
+  if (m_views.empty())
+    return adoption;
+  const SmootherOptions &smoothing = options.smoothing;
   Matrix5d information;
-  adoption.trunk.trunk = fitTrunk(adoption.trunk.trunk, adoption.views, smoothing, &information);
+  adoption.trunk.trunk = fitTrunk(m_guess, m_views, smoothing, &information);
   adoption.trunk.covariance = information.inverse();
   double sum = 0;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    const RelativeTrunk expected = relativeTrunk(adoption.views[i].wMb, smoothing.bMc, adoption.trunk.trunk);
-    sum += misfit(results[i], expected, view.camera.fx, options.flow);
+  for (std::size_t i = 0; i < m_results.size(); ++i) {
+    const RelativeTrunk expected = relativeTrunk(m_views[i].wMb, smoothing.bMc, adoption.trunk.trunk);
+    sum += misfit(m_results[i], expected, camera.fx, options.flow);
   }
-  adoption.trunk.innovation2 = sum / static_cast<double>(results.size());
+  adoption.trunk.innovation2 = sum / static_cast<double>(m_results.size());
+  return adoption;
 }
-} // namespace
 
 Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
                              const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
 {
-  constexpr double kTilt = 0.01;   // standard deviation of the two angles that one view hardly knows [rad]
-  constexpr double kBorder_px = 1; // and of bearing and half width
-  Adoption adoption;
-  adoption.trunk.trunk = detection.trunk;
-  adoption.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
-  std::vector<TrackingResult> results;
-  std::optional<Eigen::Vector3d> before;
-  std::optional<double> left_contrast, right_contrast;
+  Follower follower(detection.trunk, Matrix5d::Zero());
   Viewpoint at = view;
   for (const WindowView &frame : window.views()) {
     const Pose wMb = smoother.pose(frame.pose);
     at.wMc = wMb * options.smoothing.bMc;
     at.time_s = frame.time_s;
-    const RelativeTrunk relative = relativeTrunk(at.wMc, Pose(), detection.trunk);
-    if (!relative.isFinite() || relative.cRt(2, 0) <= 0)
-      continue;
-    TrackingPrediction prediction;
-    prediction.relative = relative;
-    const double sigma = kBorder_px / view.camera.fx;
-    prediction.covariance =
-        Vector4d(kTilt, kTilt, sigma, sigma / relative.ratio()).cwiseAbs2().asDiagonal().toDenseMatrix();
-    prediction.range = elevationOf(relative, detection.trunk, at, options);
-    const HiddenBorders hidden = hiddenBorders(detection.trunk, -1, map, at);
-    prediction.left_hidden = hidden.left;
-    prediction.right_hidden = hidden.right;
-    prediction.left_contrast = left_contrast;
-    prediction.right_contrast = right_contrast;
-    const TrackingResult result = trackTrunk(frame.gradient, view.camera, prediction, options.tracking);
-    if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used ||
-        !isInsideGate(prediction, result, view.camera.fx, options.flow))
-      continue;
-    const SummaryFactor summary = summaryOf(result, weightOfView(before, at.wMc.t, options.flow));
-    before = at.wMc.t;
-    blendContrast(left_contrast, result.left_contrast);
-    blendContrast(right_contrast, result.right_contrast);
-    adoption.views.push_back({frame.pose, wMb, summary});
-    adoption.trunk.views.push_back(viewOf(result, relative, detection.trunk, at, options.flow));
-    results.push_back(result);
+    follower.look(frame.gradient, frame.pose, wMb, at, map, -1, options);
   }
-  fit(adoption, results, view, options);
+  Adoption adoption = follower.fitted(view.time_s, view.camera, options);
+  if (adoption.views.empty()) {
+    adoption.trunk.covariance.setIdentity();
+    adoption.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
+  }
   return adoption;
 }
 

@@ -66,6 +66,29 @@ TrunkPrior priorOf(const Trunk &guess, const SmootherOptions &options);
 Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const SmootherOptions &options,
                Matrix5d *information = nullptr);
 
+/// Looks for one trunk in frame after frame and keeps what it finds: two borders within the gate.
+class Follower
+{
+public:
+  /// \p covariance: of \p guess given the poses; borders are looked for as far as it says.
+  Follower(const Trunk &guess, const Matrix5d &covariance) : m_guess(guess), m_covariance(covariance) {}
+
+  /// \p at: from where, \p id: of the trunk in the map, -1 for one that is not in it.
+  void look(const Gradient &gradient, std::size_t pose, const Pose &wMb, const Viewpoint &at, const TrunkMap &map,
+            int id, const StageOptions &options);
+  /// The trunk fitted to what was found, with how well it fits. \p found_s: when it was found.
+  Adoption fitted(double found_s, const PinholeCamera &camera, const StageOptions &options) const;
+
+private:
+  Trunk m_guess;
+  Matrix5d m_covariance;
+  std::vector<AdoptedView> m_views;
+  std::vector<TrunkView> m_seen;
+  std::vector<TrackingResult> m_results;
+  std::optional<Eigen::Vector3d> m_before;
+  std::optional<double> m_left_contrast, m_right_contrast;
+};
+
 /// A detection of the window, followed through its views. \p view: of the newest frame.
 Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
                              const TrunkMap &map, const Viewpoint &view, const StageOptions &options);

@@ -113,6 +113,8 @@ FrameReport Engine::process(const Frame &frame)
     m_window.push(std::move(gradient), newest(), view, m_smoother, m_units);
     adoptNew(view, background(saliency)); // Eq. 18-21
     lap("detection");
+    if (m_units.flow.final_pass)
+      m_album.add(frame.image, newest(), view, m_units.flow.view_spacing, m_units.detection.profile.range);
     report.trunks = inView(tracked, m_map, view.has_ranges);
     report.points = points();
     reviewMap(report.points, view); // Sec. 7
@@ -329,11 +331,15 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
 
 void Engine::finish()
 {
-  constexpr double kSettled = 1e-6; // of the cost: no view notices
   if (m_smoother.poseCount() == 0)
     return;
   m_smoother.optimize(kSettled);
   refreshWholeMap();
+  if (m_units.flow.final_pass && m_motion->hasRanges()) {
+    decideByAllFrames();
+    reviewScale(0, true);
+    return;
+  }
   const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
   apply(update);
   if (!update.merged.empty() || !update.removed.empty()) {

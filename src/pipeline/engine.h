@@ -7,7 +7,7 @@
 /// The stages are functions of plain values in this folder. The engine holds what lives from frame to frame (motion
 /// source, saliency, smoother, window, map) and hands the result of one stage to the next.
 
-#include "pipeline/adoption.h"
+#include "pipeline/final_pass.h"
 #include "pipeline/motion_source.h"
 #include "pipeline/units.h"
 #include "saliency/saliency.h"
@@ -31,7 +31,22 @@ public:
 
   const TrunkMap &trunks() const { return m_map; } ///< in units of the motion
 
+  /// What the columns of all frames said of every hypothesis, after finish().
+  const std::vector<Judged> &judged() const { return m_judged; }
+
 private:
+  std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
+  std::vector<LevelView> levelViews() const;
+  static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
+
+  /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
+  struct Reading
+  {
+    std::optional<Judged> judged;
+    std::optional<Adoption> views;
+    bool is_seen = false;
+  };
+
   Motion move(const Frame &frame);
   Viewpoint extend(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
@@ -43,6 +58,10 @@ private:
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);
+  double farthestJudged() const;
+  std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const;
+  std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views) const;
+  void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);
   std::vector<KnownTrunk> known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
@@ -59,7 +78,9 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;
+  std::vector<Judged> m_judged;
   Trajectory m_online;                    ///< in units of the motion
   Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion
 };

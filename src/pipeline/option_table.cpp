@@ -101,6 +101,8 @@ std::vector<OptionEntry> optionTable(Options &o)
 
       {"stages.points", &o.stages.points, 0, 1, "", "relative poses from point features"},
       {"stages.saliency", &o.stages.saliency, 0, 1, "", "motion saliency; off: what is far may be taken for a trunk"},
+      {"stages.final_pass", &o.stages.final_pass, 0, 1, "",
+       "at the end every hypothesis is judged by all frames; off: the map as it was known in flight"},
       {"stages.servoing", &o.stages.servoing, 0, 1, "",
        "the camera is steered by the trunks: it may rest before one or circle it"},
 

@@ -59,6 +59,7 @@ TrunkView viewOf(const TrackingResult &result, const RelativeTrunk &expected, co
   TrunkView seen;
   seen.time_s = view.time_s;
   seen.bearing = horizontalView(view.wMc, trunk).bearing;
+  seen.half_angle = std::asin(std::min(result.optimum.ratio(), 1.0));
   seen.left_contrast = result.left_contrast;
   seen.right_contrast = result.right_contrast;
   seen.evenness = result.evenness;

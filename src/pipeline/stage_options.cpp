@@ -185,6 +185,8 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   StageOptions o;
   o.flow.use_points = options.stages.points;
   o.flow.use_saliency = options.stages.saliency;
+  o.flow.final_pass = options.stages.final_pass && !options.stages.servoing && options.map.lag == 0 &&
+                      options.map.policy != MapPolicy::paper;
   if (options.stages.servoing)
     setServoing(o);
   o.visual.camera_height = options.camera.height;

@@ -40,6 +40,7 @@ struct FlowOptions
 {
   bool use_points = true;       ///< relative poses from point features
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
+  bool final_pass = true;       ///< at the end every hypothesis is judged by all frames: see final_pass.h
   bool as_paper = false;        ///< detection, tracking and map as the paper has them: see paper_policy.h
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
   int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs

@@ -157,7 +157,7 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
     std::function<void(MapTrunk &)> spoil;
   };
   const std::vector<Case> cases = {
-      {"parallax", [](MapTrunk &t) { t.bearing_low = t.bearing_high = 0; }},
+      {"parallax", [](MapTrunk &t) { t.left = t.right = {}; }},
       {"place", [&](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e4; }},
       {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
@@ -202,7 +202,7 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
     return m_map.evidence(changed);
   };
   EXPECT_GT(after([](MapTrunk &t) { t.found_again = 3; }), odds);
-  EXPECT_GT(after([](MapTrunk &t) { t.bearing_high += 0.2; }), odds);
+  EXPECT_GT(after([](MapTrunk &t) { t.left.high += 0.2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.contrast *= 2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.innovation2 /= 2; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.misses += 5; }), odds);

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "detection/column_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bole
+{
+using Eigen::Vector2d;
+
+namespace
+{
+/// Ranges that are tried, over that of the trunk.
+constexpr std::array<double, 11> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
+constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
+constexpr int kViews = 24;   // looked at, spread over the flight
+constexpr int kPartners = 3; // each is compared with
+
+/// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
+/// tell, not so much that the bark has turned.
+constexpr double kLeastParallax = 0.015, kMostParallax = 0.08, kBestParallax = 0.035, kWeakParallax = 0.006;
+
+struct Seen
+{
+  std::size_t view = 0;
+  TrunkInLevelView at;
+};
+
+/// Columns of a view that are compared: inside the trunk, beside its left border, beside its right one.
+struct Columns
+{
+  std::vector<double> angle, range; ///< from the heading [rad], of what they show if the trunk is there [m]
+  std::size_t inside = 0;           ///< the first ones are; four each follow beside the borders
+};
+constexpr std::size_t kBeside = 4;
+
+Columns columnsOf(const TrunkInLevelView &at, double radius, double px)
+{
+  Columns columns;
+  const auto add = [&](double offset, double range) {
+    columns.angle.push_back(at.bearing + offset);
+    columns.range.push_back(range);
+  };
+  const double half = std::max(at.half_angle - px, 0.3 * at.half_angle);
+  columns.inside = static_cast<std::size_t>(std::clamp(2 * half / px, 3.0, 12.0));
+  for (std::size_t i = 0; i < columns.inside; ++i) {
+    const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(columns.inside - 1) - 1);
+    const double across = at.range * std::sin(offset);
+    add(offset, at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0)));
+  }
+  const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
+  for (const int side : {1, -1})
+    for (std::size_t i = 0; i < kBeside; ++i)
+      add(side * (at.half_angle + 1.5 * px + strip * static_cast<double>(i) / (kBeside - 1)), at.range);
+  return columns;
+}
+
+/// Mean of squared differences, each cut, in units of the contrast; negative where no band is in both.
+double difference(const LevelColumn &a, const LevelColumn &b, float by_value, float by_slope)
+{
+  const unsigned bands = a.bands & b.bands;
+  if (bands == 0)
+    return -1;
+  float sum = 0;
+  int n = 0;
+  for (std::size_t k = 0; k < kLevelBands; ++k)
+    if (bands >> k & 1U) {
+      const float v = (a.value[k] - b.value[k]) * by_value, s = (a.slope[k] - b.slope[k]) * by_slope;
+      sum += std::min(v * v, 4.f) + std::min(s * s, 4.f);
+      ++n;
+    }
+  return 0.5 * static_cast<double>(sum) / n;
+}
+
+/// Running means by range, for the three kinds of columns.
+struct Curves
+{
+  std::array<std::array<double, kScales.size()>, 3> sum{}, count{};
+
+  void add(std::size_t kind, std::size_t scale, double value)
+  {
+    sum[kind][scale] += value;
+    ++count[kind][scale];
+  }
+  double mean(std::size_t kind, std::size_t scale) const
+  {
+    return count[kind][scale] > 0 ? sum[kind][scale] / count[kind][scale] : std::numeric_limits<double>::infinity();
+  }
+  double least(std::size_t kind, std::size_t first, std::size_t end) const
+  {
+    double best = std::numeric_limits<double>::infinity();
+    for (std::size_t s = first; s < end; ++s)
+      best = std::min(best, mean(kind, s));
+    return best;
+  }
+};
+
+/// The views that stand apart by the right parallax, the best first.
+std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views)
+{
+  const LevelView &view = views[seen.view];
+  const double c = std::cos(seen.at.bearing), s = std::sin(seen.at.bearing);
+  const Vector2d toward = c * view.forward + s * view.left;
+  std::vector<std::pair<double, std::size_t>> good;
+  std::pair<double, std::size_t> widest{0, 0};
+  for (const Seen &other : all) {
+    const Vector2d base = views[other.view].position - view.position;
+    const double parallax = 0.5 * std::abs(base.x() * toward.y() - base.y() * toward.x()) / seen.at.range;
+    if (parallax >= kLeastParallax && parallax <= kMostParallax)
+      good.emplace_back(std::abs(parallax - kBestParallax), other.view);
+    widest = std::max(widest, {parallax, other.view});
+  }
+  if (good.empty() && widest.first >= kWeakParallax)
+    return {widest.second};
+  const std::size_t n = std::min<std::size_t>(good.size(), kPartners);
+  std::partial_sort(good.begin(), good.begin() + static_cast<long>(n), good.end());
+  std::vector<std::size_t> partners;
+  for (std::size_t i = 0; i < n; ++i)
+    partners.push_back(good[i].second);
+  return partners;
+}
+
+/// One view against its partners. False where nothing could be compared.
+bool compare(const LevelView &view, const Columns &columns, const std::vector<std::size_t> &partners,
+             const std::vector<LevelView> &views, Curves &curves)
+{
+  constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
+  constexpr double kLeast = 0.008; // [full scale] noise of the camera
+  Curves here;
+  for (std::size_t i = 0; i < columns.angle.size(); ++i) {
+    const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
+    const LevelColumn column = view.image->at(s / c);
+    if (column.bands == 0)
+      continue;
+    const Vector2d direction = c * view.forward + s * view.left;
+    const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
+    for (const std::size_t partner : partners) {
+      const LevelView &other = views[partner];
+      const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
+      const auto by_value = static_cast<float>(1 / unit);
+      for (std::size_t k = 0; k < kScales.size(); ++k) {
+        const Vector2d at = view.position + columns.range[i] * kScales[k] * direction - other.position;
+        const double ahead = at.dot(other.forward);
+        if (ahead < 0.1)
+          continue;
+        const double d = difference(column, other.image->at(at.dot(other.left) / ahead), by_value, 2 * by_value);
+        if (d >= 0)
+          here.add(kind, k, d);
+      }
+    }
+  }
+  if (here.count[0][kOwn] == 0)
+    return false;
+  for (std::size_t kind = 0; kind < 3; ++kind)
+    for (std::size_t k = 0; k < kScales.size(); ++k)
+      if (here.count[kind][k] > 0)
+        curves.add(kind, k, here.mean(kind, k));
+  return true;
+}
+} // namespace
+
+LevelView::LevelView(const LevelImage &level, const Pose &wMc) : image(&level), position(wMc.t.head<2>()), z(wMc.t.z())
+{
+  forward = (wMc.R * level.cRl).col(0).head<2>().normalized();
+  left = {-forward.y(), forward.x()};
+}
+
+std::optional<TrunkInLevelView> locate(const Trunk &trunk, const LevelView &view, double farthest)
+{
+  constexpr double kAhead = 0.3, kNotInside = 0.3, kSide = 0.02; // [m], [m] from the bark, [rad]
+  const Vector2d w = trunk.axisAt(view.z).head<2>() - view.position;
+  const double ahead = w.dot(view.forward), range = w.norm(), radius = trunk.radius();
+  if (ahead < kAhead || range < radius + kNotInside || range > farthest)
+    return std::nullopt;
+  TrunkInLevelView at{std::atan2(w.dot(view.left), ahead), std::asin(radius / range), range};
+  if (std::abs(at.bearing) + at.half_angle > std::atan(-view.image->q_first) - kSide)
+    return std::nullopt;
+  return at;
+}
+
+std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr int kLeastViews = 3;
+  std::vector<Seen> all;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (const auto at = locate(trunk, views[i], farthest))
+      all.push_back({i, *at});
+  ColumnEvidence evidence;
+  Curves curves;
+  const std::size_t n = std::min<std::size_t>(all.size(), kViews);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Seen &seen = all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0];
+    const std::vector<std::size_t> partners = partnersOf(seen, all, views);
+    if (!partners.empty() && compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step),
+                                     partners, views, curves))
+      ++evidence.views;
+  }
+  if (evidence.views < kLeastViews)
+    return std::nullopt;
+  const auto from = [&](std::size_t kind, std::size_t first, std::size_t end, double own) {
+    const double best = curves.least(kind, first, end);
+    return std::isfinite(best) ? best - own : 0;
+  };
+  evidence.own = curves.mean(0, kOwn);
+  evidence.nearer = from(0, 0, 3, evidence.own);
+  evidence.beyond = from(0, kBeyond, kBackground, evidence.own);
+  evidence.background = from(0, kBackground, kScales.size(), evidence.own);
+  evidence.is_best_at_own = curves.least(0, kOwn - 1, kOwn + 2) <= curves.least(0, 0, kScales.size());
+  const auto beside = [&](std::size_t kind) {
+    return std::isfinite(curves.mean(kind, kOwn)) ? -from(kind, kBeyond + 1, kScales.size(), curves.mean(kind, kOwn))
+                                                  : 0;
+  };
+  evidence.left = beside(1);
+  evidence.right = beside(2);
+  return evidence;
+}
+} // namespace bole

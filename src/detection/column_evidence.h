@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the images of a flight say of one trunk, by depth on both sides of its borders.
+///
+/// Idea: columns of the image that show a trunk look the same in two frames when they are carried over at the trunk's
+/// range, and differ at any other; columns beside a silhouette belong to what stands behind it. So a hypothesis is
+/// tried at its own range and at others, inside its borders and just outside of them, between frames whose parallax is
+/// some pixels. No other hypothesis, no border and no learning is needed (stixels: Badino, Franke and Pfeiffer 2009;
+/// occlusion borders: Stein and Hebert 2009).
+
+#include "detection/level_image.h"
+#include <bole/trunk.h>
+
+#include <optional>
+
+namespace bole
+{
+/// A frame of the flight on the ground plane, at its final pose.
+struct LevelView
+{
+  LevelView(const LevelImage &level, const Pose &wMc);
+
+  const LevelImage *image;
+  Eigen::Vector2d position, forward, left; ///< of the level camera in the world [m], [1], [1]
+  double z;                                ///< its height in the world [m]
+};
+
+/// Where a trunk stands in a view: bearing from the heading, half width, range.
+struct TrunkInLevelView
+{
+  double bearing = 0, half_angle = 0, range = 0; ///< [rad], [rad], [m]
+};
+/// None behind the camera, beyond \p farthest [m] or cut by the side of the image.
+std::optional<TrunkInLevelView> locate(const Trunk &trunk, const LevelView &view, double farthest);
+
+/// Differences between frames of the columns of a trunk: means over its views of squared differences in units of the
+/// contrast of the image, each cut at 4. 0: alike; 2 and more: nothing in common.
+struct ColumnEvidence
+{
+  int views = 0;              ///< in which it was compared
+  double own = 4;             ///< at its range
+  double nearer = 0;          ///< best of the ranges nearer by a fifth and more, less own
+  double beyond = 0;          ///< best of the ranges farther by a quarter and a half, less own
+  double background = 0;      ///< best of those twice as far and farther, less own
+  bool is_best_at_own = true; ///< among all ranges, its own to a ninth is best
+  double left = 0, right = 0; ///< beside a border: at the trunk's range less the best farther one. Below 0: the trunk
+                              ///< goes on there, and the border is one of light and shade
+};
+
+/// None where fewer than three views have a parallax.
+std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
+} // namespace bole

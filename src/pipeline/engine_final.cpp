@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The last look at a flight: which hypotheses are trunks.
+#include "pipeline/engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace bole
+{
+namespace
+{
+constexpr int kLeastViews = 4; ///< of a hypothesis that is judged
+
+std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
+{
+  std::vector<int> ids;
+  for (const Judged &one : judged)
+    if (one.log_odds >= least)
+      ids.push_back(one.id);
+  return ids;
+}
+} // namespace
+
+std::vector<LevelView> Engine::levelViews() const
+{
+  std::vector<LevelView> views;
+  for (const KeptFrame &frame : m_album.frames())
+    views.emplace_back(frame.level, cameraAt(frame.pose));
+  return views;
+}
+
+std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views) const
+{
+  std::vector<Judged> all;
+  for (const MapTrunk &trunk : m_map.trunks())
+    if (trunk.observations >= kLeastViews && trunk.fate != TrunkFate::unranged)
+      if (const auto one = judge({trunk.id, trunk.trunk, m_map.evidence(trunk)}, views, farthestJudged()))
+        all.push_back(*one);
+  return all;
+}
+
+double Engine::farthestJudged() const
+{
+  constexpr double kFarthest_m = 14; // columns of what stands beyond are too few
+  return kFarthest_m / m_metres;
+}
+
+/// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
+/// \p map: what may hide them.
+std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const
+{
+  constexpr int kRounds = 2; // what the first finds tells the second where else to look
+  std::vector<Adoption> found;
+  for (const Hypothesis &one : hypotheses) {
+    Adoption start;
+    start.trunk.trunk = one.trunk;
+    start.trunk.covariance = one.covariance;
+    found.push_back(start);
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Follower> followers;
+    for (const Adoption &one : found)
+      followers.emplace_back(one.trunk.trunk, one.trunk.covariance);
+    for (const KeptFrame &frame : m_album.frames()) {
+      const Gradient gradient = computeGradient(frame.image, m_units.gradient);
+      const Pose wMb = m_smoother.pose(frame.pose);
+      const Viewpoint at{m_camera, wMb * m_bMc, true, m_motion->groundZ(), frame.time_s};
+      for (std::size_t i = 0; i < followers.size(); ++i)
+        if ((found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t).head<2>().norm() < m_units.flow.track_range)
+          followers[i].look(gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
+    }
+    for (std::size_t i = 0; i < followers.size(); ++i)
+      if (Adoption next = followers[i].fitted(m_map.trunk(hypotheses[i].id).first_seen_s, m_camera, m_units);
+          !next.views.empty())
+        found[i] = std::move(next);
+  }
+  return found;
+}
+
+/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds keeps its views unless
+/// the new ones are better.
+std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely,
+                                               const std::vector<LevelView> &views) const
+{
+  constexpr double kBetter = 0.3; // log-odds by which new views must be better than those at hand
+  constexpr double kHides = 1.5;  // log-odds at which one may hide what stands behind it
+  const TrunkMap map = m_map.withTrunks(idsOf(likely, kHides));
+  const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
+    std::vector<Reading> readings;
+    std::vector<Adoption> followed = followAll(hypotheses, map);
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      const auto refit =
+          judge({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestJudged());
+      Reading reading;
+      reading.is_seen = !followed[i].views.empty();
+      if (refit && followed[i].views.size() >= kLeastViews) {
+        reading.judged = *refit;
+        reading.views = std::move(followed[i]);
+      }
+      readings.push_back(std::move(reading));
+    }
+    return readings;
+  };
+  std::vector<Hypothesis> hypotheses;
+  for (const Judged &one : likely)
+    hypotheses.push_back({one.id, one.trunk, one.online});
+  std::vector<Reading> readings = read(hypotheses);
+  for (std::size_t i = 0; i < likely.size(); ++i) {
+    Reading &reading = readings[i];
+    const bool is_held = !m_map.trunk(likely[i].id).removed && reading.is_seen;
+    if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
+      reading.judged = likely[i];
+      reading.views.reset();
+    }
+  }
+  // one border may be the edge of a shadow on the bark
+  std::vector<Hypothesis> wider;
+  std::vector<std::size_t> of;
+  for (std::size_t i = 0; i < readings.size(); ++i)
+    if (readings[i].judged)
+      if (const auto one = widerReading(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
+        wider.push_back(*one);
+        of.push_back(i);
+      }
+  std::vector<Reading> widened = read(wider);
+  for (std::size_t k = 0; k < wider.size(); ++k) {
+    Reading &before = readings[of[k]];
+    if (widened[k].views && isSilhouetteOf(*widened[k].judged, *before.judged))
+      before = std::move(widened[k]);
+  }
+  return readings;
+}
+
+/// Every hypothesis in the light of all frames.
+void Engine::decideByAllFrames()
+{
+  constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
+  const std::vector<LevelView> views = levelViews();
+  const double apart = m_units.map.merge_distance;
+  m_judged = judgeAll(views);
+  std::vector<Reading> readings = readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views);
+  std::vector<Judged> again;
+  for (const Reading &reading : readings) {
+    if (!reading.judged)
+      continue;
+    const Matrix5d &covariance =
+        reading.views ? reading.views->trunk.covariance : m_map.trunk(reading.judged->id).covariance;
+    if (m_map.isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
+      again.push_back(*reading.judged);
+  }
+  const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
+  std::map<int, TrunkDecision> decisions;
+  for (const Judged &one : m_judged)
+    decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
+  for (const Judged &one : chosen)
+    decisions[one.id] = {one.id, one.log_odds, true, std::nullopt};
+  for (Reading &reading : readings) {
+    if (!reading.judged || !reading.views || !decisions[reading.judged->id].is_trunk)
+      continue;
+    NewTrunk trunk = reading.views->trunk;
+    trunk.smoother_id = m_smoother.addTrunk(trunk.trunk, priorOf(trunk.trunk, m_units.smoothing));
+    for (const AdoptedView &view : reading.views->views)
+      m_smoother.addObservation(view.pose, trunk.smoother_id, view.summary);
+    decisions[reading.judged->id].found = trunk;
+  }
+  std::vector<TrunkDecision> list;
+  for (auto &[id, decision] : decisions)
+    list.push_back(std::move(decision));
+  for (const std::size_t gone : m_map.decide(list))
+    m_smoother.removeTrunk(gone);
+  m_smoother.optimize(kSettled);
+  refreshWholeMap();
+  m_map.doubtPlaces();
+}
+} // namespace bole

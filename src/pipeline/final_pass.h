@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Which hypotheses are trunks, decided when the whole flight is known.
+///
+/// Idea: while the drone flies, a hypothesis is judged by what a few frames showed, from poses that were still to be
+/// corrected. At the end each one, also those that were given up, is looked up in all frames: its columns at its own
+/// depth and at others (ColumnEvidence). The likely ones are tracked again through all frames, judged again where that
+/// puts them, and the best set is kept of which no two stand in one place or are made of the same lines.
+
+#include "detection/column_evidence.h"
+#include "pipeline/adoption.h"
+
+#include <vector>
+
+namespace bole
+{
+/// A frame that is kept to the end.
+struct KeptFrame
+{
+  std::size_t pose = 0;
+  double time_s = 0;
+  vpImage<unsigned char> image;
+  LevelImage level;
+};
+
+/// Frames of the flight, from places apart. Bounded: when it is full every other frame goes, and the next ones are
+/// taken half as often.
+class Album
+{
+public:
+  /// \p spacing: least move of the camera between two frames [units of the motion].
+  void add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
+           const ElevationRange &range);
+  const std::vector<KeptFrame> &frames() const { return m_frames; }
+
+private:
+  std::vector<KeptFrame> m_frames;
+  std::size_t m_every = 1, m_offered = 0;
+  std::optional<Eigen::Vector3d> m_last;
+};
+
+/// A place where a trunk may stand.
+struct Hypothesis
+{
+  int id = 0; ///< in the map
+  Trunk trunk;
+  double online = 0;                      ///< log-odds by TrunkMap::evidence
+  Matrix5d covariance = Matrix5d::Zero(); ///< of the place, given the poses: how far its borders are looked for
+};
+
+/// A hypothesis with the odds that all frames give it.
+struct Judged
+{
+  int id = 0; ///< in the map
+  Trunk trunk;
+  double online = 0;
+  ColumnEvidence evidence;
+  double log_odds = 0; ///< that it is a trunk
+};
+
+/// What the decision rests on: 1, how much its columns differ at its range, by how much more they do at the best range
+/// nearer or behind, whether its range is the best, and the log-odds that the frames gave it one by one.
+using OddsTerms = Eigen::Matrix<double, 5, 1>;
+constexpr std::array<const char *, 5> kOddsNames = {"1", "own", "elsewhere", "best_at_own", "online"};
+OddsTerms oddsTerms(const ColumnEvidence &evidence, double online);
+/// Fitted by `bole fit-odds` to the simulated flights of seeds 300 to 323 and three rendered ones.
+OddsTerms oddsWeights();
+
+/// What the columns of all frames say of \p hypothesis; none where too few views have a parallax.
+std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest);
+
+/// Where columns beside a border stand at the range of the trunk: the best guess of the silhouette that takes them in.
+/// None where there is none, or none up to \p radius_max.
+std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                       double radius_max);
+/// Whether \p wider takes in what stood beside a border of \p narrow, and is no worse as a trunk.
+bool isSilhouetteOf(const Judged &wider, const Judged &narrow);
+
+/// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
+/// \p apart [m] between their bark) or fill the same columns in most views.
+std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,
+                              const std::vector<LevelView> &views, double farthest);
+} // namespace bole

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the columns of a flight say of a trunk, on drawn ones before a striped wall.
+#include "detection/column_evidence.h"
+#include "drawn_trunks.h"
+
+#include <gmock/gmock.h>
+
+namespace
+{
+using namespace bole;
+using namespace bole::test;
+
+const PinholeCamera kCamera;
+constexpr double kFarthest = 14;
+
+/// Far trunks of many greys side by side: a background with texture.
+std::vector<DrawnTrunk> wall()
+{
+  std::vector<DrawnTrunk> trunks;
+  for (int i = -20; i <= 20; ++i)
+    trunks.push_back({16, 0.6 * i, 0.3, 60.0 + (i * 73 + 2000) % 140});
+  return trunks;
+}
+
+struct LevelFlight
+{
+  std::vector<LevelImage> images;
+  std::vector<Pose> poses;
+
+  LevelFlight(std::vector<DrawnTrunk> trunks, std::vector<Pose> path) : poses(std::move(path))
+  {
+    for (const DrawnTrunk &far : wall())
+      trunks.push_back(far);
+    for (const Pose &wMc : poses)
+      images.push_back(computeLevelImage(draw(trunks, wMc, kCamera), kCamera, wMc.R, ElevationRange()));
+  }
+  std::vector<LevelView> views() const
+  {
+    std::vector<LevelView> all;
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      all.emplace_back(images[i], poses[i]);
+    return all;
+  }
+};
+
+/// Where a camera that is turned and rolled sees a trunk, its columns are as bright as it is.
+TEST(LevelImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
+{
+  const DrawnTrunk trunk{4, 0.6, 0.2, 40};
+  for (const Pose &wMc : {lookingAhead(0, 0), lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2)}) {
+    const LevelImage level = computeLevelImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+    const auto at = locate(trunkOf(trunk), LevelView(level, wMc), kFarthest);
+    ASSERT_TRUE(at.has_value());
+    const LevelColumn inside = level.at(std::tan(at->bearing));
+    const LevelColumn outside = level.at(std::tan(at->bearing + 2 * at->half_angle));
+    ASSERT_NE(inside.bands, 0u);
+    ASSERT_NE(outside.bands, 0u);
+    for (std::size_t b = 0; b < kLevelBands; ++b) {
+      if (inside.bands >> b & 1U) {
+        EXPECT_NEAR(inside.value[b], 40 / 255.0, 0.01);
+      }
+      if (outside.bands >> b & 1U) {
+        EXPECT_NEAR(outside.value[b], 200 / 255.0, 0.01);
+      }
+    }
+  }
+}
+
+TEST(LevelImage, ShowsNothingOutsideTheImage)
+{
+  const Pose wMc = lookingAhead(0, 0);
+  const LevelImage level = computeLevelImage(draw({}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+  EXPECT_EQ(level.at(level.q_first - 0.1).bands, 0u);
+  EXPECT_EQ(level.at(level.qLast() + 0.1).bands, 0u);
+  EXPECT_EQ(level.at(std::numeric_limits<double>::quiet_NaN()).bands, 0u);
+}
+
+TEST(ColumnEvidence, ATrunkAgreesAtItsOwnRangeOnly)
+{
+  const std::vector<DrawnTrunk> trunks = {{3.5, 0.5, 0.15, 40}, {5, -1, 0.2, 120}};
+  const LevelFlight flight(trunks, sweep());
+  for (const DrawnTrunk &trunk : trunks) {
+    const auto evidence = columnEvidence(trunkOf(trunk), flight.views(), kFarthest);
+    ASSERT_TRUE(evidence.has_value());
+    EXPECT_LT(evidence->own, 0.4);
+    EXPECT_GT(evidence->nearer, 0.5);
+    EXPECT_GT(evidence->background, 0.5);
+    EXPECT_TRUE(evidence->is_best_at_own);
+    EXPECT_GT(evidence->left, -0.2);
+    EXPECT_GT(evidence->right, -0.2);
+  }
+}
+
+TEST(ColumnEvidence, AHypothesisAtAnotherRangeDisagreesThere)
+{
+  const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
+  const LevelFlight flight({trunk}, sweep());
+  const double own = columnEvidence(trunkOf(trunk), flight.views(), kFarthest)->own;
+  for (const double scale : {0.75, 1.4}) { // on the line of sight of the middle of the flight
+    const DrawnTrunk wrong{0.14 + scale * (trunk.x - 0.14), scale * trunk.y, scale * trunk.radius, 40};
+    const auto evidence = columnEvidence(trunkOf(wrong), flight.views(), kFarthest);
+    ASSERT_TRUE(evidence.has_value()) << scale;
+    EXPECT_GT(evidence->own, own + 0.5) << scale;
+    EXPECT_FALSE(evidence->is_best_at_own) << scale;
+  }
+}
+
+TEST(ColumnEvidence, AGapBetweenTwoTrunksShowsWhatStandsBehind)
+{
+  const DrawnTrunk left{3.5, 0.6, 0.15, 40}, right{3.5, 0, 0.15, 40}, gap{3.5, 0.3, 0.15, 0};
+  const LevelFlight flight({left, right}, sweep());
+  const auto none = columnEvidence(trunkOf(gap), flight.views(), kFarthest);
+  const auto trunk = columnEvidence(trunkOf(left), flight.views(), kFarthest);
+  ASSERT_TRUE(none && trunk);
+  EXPECT_GT(none->own, 1);
+  EXPECT_LT(none->background, trunk->background - 0.3);
+}
+
+/// The right part of the trunk lies in shadow: its reading is as wide as the lit part.
+TEST(ColumnEvidence, BesideAnEdgeOfShadowTheTrunkGoesOn)
+{
+  const DrawnTrunk lit{3.5, 0.4, 0.08, 150}, shadow{3.55, 0.3, 0.18, 60};
+  const LevelFlight flight({lit, shadow}, sweep());
+  const auto evidence = columnEvidence(trunkOf(lit), flight.views(), kFarthest);
+  ASSERT_TRUE(evidence.has_value());
+  EXPECT_LT(evidence->right, evidence->left - 0.2);
+  EXPECT_LT(evidence->right, -0.25);
+}
+
+TEST(ColumnEvidence, WithoutParallaxThereIsNone)
+{
+  const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
+  const LevelFlight still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
+  EXPECT_FALSE(columnEvidence(trunkOf(trunk), still.views(), kFarthest).has_value());
+  const LevelFlight flight({trunk}, sweep());
+  EXPECT_FALSE(columnEvidence(trunkOf({-4, 0, 0.15, 40}), flight.views(), kFarthest).has_value()); // behind
+}
+} // namespace

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/final_pass.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+namespace
+{
+using namespace bole;
+
+Trunk trunkAt(double x, double y, double radius)
+{
+  Trunk trunk;
+  trunk.xy = {x, y};
+  trunk.log_radius = std::log(radius);
+  return trunk;
+}
+
+Judged judgedAt(int id, const Trunk &trunk, double log_odds)
+{
+  Judged judged;
+  judged.id = id;
+  judged.trunk = trunk;
+  judged.log_odds = log_odds;
+  return judged;
+}
+
+/// A camera that moves sideways past what stands along x.
+struct Path
+{
+  std::vector<LevelImage> images;
+  std::vector<LevelView> views;
+
+  Path() : images(10)
+  {
+    const Pose forward = SmootherOptions::forwardCamera();
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      images[i].cRl = forward.R.transpose();
+      images[i].q_first = -0.8;
+      images[i].columns.resize(321);
+      views.emplace_back(images[i], Pose(forward.R, {0, 0.05 * static_cast<double>(i), 1.2}));
+    }
+  }
+};
+
+std::vector<int> idsOf(const std::vector<Judged> &judged)
+{
+  std::vector<int> ids;
+  for (const Judged &one : judged)
+    ids.push_back(one.id);
+  return ids;
+}
+
+TEST(FinalPass, OfTwoInOnePlaceTheLikelierStays)
+{
+  const Path path;
+  const auto chosen = chooseSet({judgedAt(1, trunkAt(4, 0, 0.15), 1), judgedAt(2, trunkAt(4.2, 0.1, 0.12), 3),
+                                 judgedAt(3, trunkAt(4, 2, 0.15), 0.5), judgedAt(4, trunkAt(5, -2, 0.15), -2)},
+                                0, 0.3, path.views, 14);
+  EXPECT_THAT(idsOf(chosen), testing::ElementsAre(2, 3));
+}
+
+TEST(FinalPass, TwoReadingsOfTheSameColumnsAtTwoRangesAreOne)
+{
+  const Path path;
+  const Trunk near = trunkAt(4, 0.2, 0.15), far = trunkAt(5, 0.2, 0.1875); // the same lines, a metre apart
+  EXPECT_THAT(idsOf(chooseSet({judgedAt(1, near, 1), judgedAt(2, far, 2)}, 0, 0.3, path.views, 14)),
+              testing::ElementsAre(2));
+  const Trunk behind = trunkAt(7, 0.2, 0.1); // partly hidden by the near one in some views, narrower
+  EXPECT_THAT(idsOf(chooseSet({judgedAt(1, near, 2), judgedAt(2, behind, 1)}, 0, 0.3, path.views, 14)),
+              testing::ElementsAre(1, 2));
+}
+
+TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
+{
+  Judged narrow = judgedAt(1, trunkAt(4, 0, 0.1), 3), wide = judgedAt(1, trunkAt(4, -0.05, 0.15), 2.8);
+  narrow.evidence.right = -0.9;
+  EXPECT_TRUE(isSilhouetteOf(wide, narrow));
+  wide.evidence.right = -0.9;
+  EXPECT_FALSE(isSilhouetteOf(wide, narrow)); // it goes on there as before
+  wide.evidence.right = 0;
+  wide.log_odds = 1;
+  EXPECT_FALSE(isSilhouetteOf(wide, narrow)); // less of a trunk
+}
+
+TEST(FinalPass, TheAlbumIsBoundedAndTakesFramesFromPlacesApart)
+{
+  Album album;
+  const vpImage<unsigned char> image(4000, 4000, 90); // 16 MB each
+  const PinholeCamera camera{3000, 3000, 1999.5, 1999.5, 4000, 4000};
+  Viewpoint at{camera, SmootherOptions::forwardCamera()};
+  for (std::size_t i = 0; i < 40; ++i) {
+    at.wMc.t.x() = 0.1 * static_cast<double>(i);
+    album.add(image, i, at, 0.05, ElevationRange());
+    album.add(image, i, at, 0.05, ElevationRange()); // where the last one was taken
+  }
+  EXPECT_GE(album.frames().size(), 8u);
+  EXPECT_LE(album.frames().size(), 17u);
+  for (std::size_t i = 1; i < album.frames().size(); ++i)
+    EXPECT_GT(album.frames()[i].pose, album.frames()[i - 1].pose);
+  EXPECT_GE(album.frames().back().pose, 30u); // the end of the flight is kept too
+}
+} // namespace
