@@ -20,6 +20,7 @@ Options optionsFor(const FrameSource &source, double camera_height)
   Options options;
   options.camera.compressed = source.isCompressed();
   options.camera.height = camera_height;
+  options.stages.final_pass = false; // the map is asked in flight, and a live stream need not end
   return options;
 }
 } // namespace
