@@ -47,7 +47,6 @@ void addExport(CLI::App &app);   ///< maps for other tools
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
 void addServo(CLI::App &app);             ///< tasks in the closed loop
-void addBenchmark(CLI::App &app);         ///< many simulated flights, medians with intervals
 void addOptions(CLI::App &app);           ///< every option with its range and effect
 void addLocalise(CLI::App &app);          ///< a flight on the map of an earlier one
 void addFollow(CLI::App &app);            ///< a video in a known map
@@ -56,7 +55,6 @@ void addReplay(CLI::App &app);            ///< a recorded flight, served again
 void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone would
 void addGraph(CLI::App &app);             ///< the graph of a run
 void addSolve(CLI::App &app);             ///< the optimum of a saved graph
-void addCalibrateSaliency(CLI::App &app); ///< noise parameters from a sequence
 /// Writes man pages and completions of all other commands; \p version goes into their foot.
 void addDocumentation(CLI::App &app, const std::string &version);
 void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images

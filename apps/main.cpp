@@ -38,10 +38,8 @@ void addCommands(CLI::App &app)
   addCompare(app);
   addSimulate(app);
   addServo(app);
-  addBenchmark(app);
   addReplay(app);
   addEmulate(app);
-  addCalibrateSaliency(app);
   addShowSaliency(app);
   addReproduce(app);
   addFitOdds(app);

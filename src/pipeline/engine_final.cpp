@@ -63,12 +63,17 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
     for (const Adoption &one : found)
       followers.emplace_back(one.trunk.trunk, one.trunk.covariance);
     for (const KeptFrame &frame : m_album.frames()) {
-      const Gradient gradient = computeGradient(frame.image, m_units.gradient);
       const Pose wMb = m_smoother.pose(frame.pose);
       const Viewpoint at{m_camera, wMb * m_bMc, true, m_motion->groundZ(), frame.time_s};
-      for (std::size_t i = 0; i < followers.size(); ++i)
-        if ((found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t).head<2>().norm() < m_units.flow.track_range)
-          followers[i].look(gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
+      std::optional<Gradient> gradient; // made where somebody asks for it
+      for (std::size_t i = 0; i < followers.size(); ++i) {
+        const Eigen::Vector3d to = found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t;
+        if (to.dot(at.wMc.R.col(2)) < 0 || to.head<2>().norm() > m_units.flow.track_range)
+          continue;
+        if (!gradient)
+          gradient = computeGradient(frame.image, m_units.gradient);
+        followers[i].look(*gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
+      }
     }
     for (std::size_t i = 0; i < followers.size(); ++i)
       if (Adoption next = followers[i].fitted(m_map.trunk(hypotheses[i].id).first_seen_s, m_camera, m_units);
