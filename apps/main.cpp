@@ -8,7 +8,11 @@
 #include <algorithm>
 #include <bole/visp.h>
 #include <cstdio>
+#include <functional>
+#include <pthread.h>
 #include <string>
+#include <sys/resource.h>
+#include <thread>
 #include <visp3/core/vpException.h>
 
 namespace
@@ -116,11 +120,25 @@ int run(CLI::App &app, int argc, char **argv)
   }
   return static_cast<int>(ExitCode::good);
 }
-} // namespace
 
-int main(int argc, char **argv)
+/// Calls \p work with stacks of 8 MB for it and for every thread, however little `ulimit -s` leaves.
+int withRoom(const std::function<int()> &work)
 {
-  g_command_line.assign(argv, argv + argc);
+  constexpr std::size_t kStack = std::size_t{8} << 20; // bytes
+  rlimit limit = {};
+  if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kStack)
+    return work();
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, kStack);
+  pthread_setattr_default_np(&attributes);
+  pthread_attr_destroy(&attributes);
+  int status = 0;
+  std::thread([&] { status = work(); }).join();
+  return status;
+}
+int start(int argc, char **argv)
+{
   CLI::App app("bole: tree trunks as vertical cylinders, tracked and mapped from a small drone's video", "bole");
   app.set_version_flag("--version", versionLine());
   app.require_subcommand(1);
@@ -133,4 +151,11 @@ int main(int argc, char **argv)
     return static_cast<int>(ExitCode::good);
   }
   return run(app, argc, argv);
+}
+} // namespace
+
+int main(int argc, char **argv)
+{
+  g_command_line.assign(argv, argv + argc);
+  return withRoom([&] { return start(argc, argv); });
 }

@@ -125,9 +125,9 @@ private:
 };
 
 /// The last lines. They come when all is on the disk.
-void report(const TrackArguments &arguments, const TrackOutput &output, const Verdict &verdict)
+void report(const TrackArguments &arguments, const TrackOutput &output, const Verdict &verdict, bool is_interrupted)
 {
-  std::string text = fmt::format("{}{}\n{}", arguments.run, interrupted() ? " (interrupted)" : "", toText(verdict));
+  std::string text = fmt::format("{}{}\n{}", arguments.run, is_interrupted ? " (interrupted)" : "", toText(verdict));
   if (const auto median = output.timing().age_ms(0.5))
     text +=
         fmt::format("  age of a frame when the map has it, from its last byte: median {:.1f} ms, 99 % below {:.1f} ms, "
@@ -218,10 +218,11 @@ void track(const TrackArguments &arguments)
       endWith(ExitCode::interrupted);
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
   }
+  const bool is_interrupted = interrupted(); // from here on the run is completed, whoever goes away
   flight.finish();
   if (live != nullptr)
     output.setLink(live->counters());
-  output.write(pipeline, !interrupted());
+  output.write(pipeline, !is_interrupted);
   output.finish();
   try {
     writeReport(arguments.run, output.hasTruth() ? arguments.input : "");
@@ -231,10 +232,10 @@ void track(const TrackArguments &arguments)
   }
   const Verdict verdict = output.verdict();
   if (!arguments.is_quiet)
-    report(arguments, output, verdict);
+    report(arguments, output, verdict, is_interrupted);
   if (arguments.is_profiled)
     std::fputs(toText(output.timing()).c_str(), stdout);
-  if (interrupted()) {
+  if (is_interrupted) {
     std::fprintf(stderr, "bole: interrupted; what was known is in %s\n", arguments.run.c_str());
     endWith(ExitCode::interrupted);
   }
@@ -247,10 +248,10 @@ void addTrack(CLI::App &app)
   CLI::App *command = app.add_subcommand("track", "Map the trunks of a flight and smooth its trajectory");
   addTrackOptions(*command, arguments);
   command->callback([arguments, command] {
-    if (!arguments->again.empty()) {
-      trackAgain(*command, *arguments);
-      return;
-    }
+    if (!arguments->again.empty())
+      return trackAgain(*command, *arguments);
+    if (!arguments->resumed.empty())
+      return resume(*command, *arguments);
     settle(*command, *arguments);
     track(*arguments);
   });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// bole track --again: a run is repeated from what its folder holds.
+// bole track --again and --resume: a run is repeated or completed from what its folder holds.
 #include "track_arguments.h"
 
 #include "output/versions.h"
@@ -64,11 +64,31 @@ TrackArguments argumentsOf(const Json &summary, const fs::path &run)
   arguments->config = (run / "options.yaml").string();
   arguments->settings.clear();
   arguments->camera_height = 0; // among the options
-  arguments->has_video = arguments->is_shown = false;
-  arguments->is_quiet = true;
-  if (!summary.value("complete", true))
-    arguments->frames_most = summary["frames"]["all"];
+  arguments->is_shown = false;
   return *arguments;
+}
+
+/// Throws where something beside \p name, its folder and --quiet is given: it would be another run.
+void requireAlone(const CLI::App &command, const std::string &name)
+{
+  for (const CLI::Option *option : command.get_options())
+    if (option->count() > 0 && !option->check_lname(name) && !option->check_lname("output") &&
+        !option->check_lname("quiet"))
+      throw vpException(vpException::badValue, "--%s repeats a run as it was made: %s does not go with it",
+                        name.c_str(), option->get_name().c_str());
+}
+
+/// Paths of the command line are those of the folder in which the run was made.
+void enterFolderOf(const Json &summary)
+{
+  const std::string folder = summary["working_folder"].is_string() ? summary["working_folder"].get<std::string>() : "";
+  if (folder.empty())
+    return;
+  std::error_code error;
+  fs::current_path(folder, error);
+  if (error)
+    throw vpException(vpException::ioError, "%s: the run was made in this folder, which cannot be entered: %s",
+                      folder.c_str(), error.message().c_str());
 }
 
 void sayChanges(const Json &before, const Json &now)
@@ -85,25 +105,17 @@ void sayChanges(const Json &before, const Json &now)
 
 void trackAgain(const CLI::App &command, const TrackArguments &given)
 {
-  for (const CLI::Option *option : command.get_options())
-    if (option->count() > 0 && !option->check_lname("again") && !option->check_lname("output") &&
-        !option->check_lname("quiet"))
-      throw vpException(vpException::badValue, "--again repeats a run as it was made: %s does not go with it",
-                        option->get_name().c_str());
+  requireAlone(command, "again");
   const fs::path run = fs::absolute(given.again);
   const Json summary = summaryOf(run);
   const fs::path repeated = given.run.empty() ? run / "again" : fs::absolute(given.run);
-  if (const std::string folder =
-          summary["working_folder"].is_string() ? summary["working_folder"].get<std::string>() : "";
-      !folder.empty()) {
-    std::error_code error;
-    fs::current_path(folder, error);
-    if (error)
-      throw vpException(vpException::ioError, "%s: the run was made in this folder, which cannot be entered: %s",
-                        folder.c_str(), error.message().c_str());
-  }
+  enterFolderOf(summary);
   TrackArguments arguments = argumentsOf(summary, run);
   arguments.run = repeated.string();
+  arguments.has_video = false;
+  arguments.is_quiet = true;
+  if (!summary.value("complete", true))
+    arguments.frames_most = summary["frames"]["all"];
   g_command_line = summary["command"].get<std::vector<std::string>>();
   try {
     track(arguments);
@@ -128,5 +140,26 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
   }
   if (given.run.empty())
     fs::remove_all(repeated);
+}
+
+void resume(const CLI::App &command, const TrackArguments &given)
+{
+  requireAlone(command, "resume");
+  if (!given.run.empty())
+    throw vpException(vpException::badValue,
+                      "--resume completes a run in its own folder: --output does not go with it");
+  const fs::path run = fs::absolute(given.resumed);
+  const Json summary = summaryOf(run);
+  if (summary.value("complete", true)) {
+    if (!given.is_quiet)
+      fmt::print("{}: is complete\n", given.resumed);
+    return;
+  }
+  enterFolderOf(summary);
+  TrackArguments arguments = argumentsOf(summary, run);
+  arguments.run = run.string();
+  arguments.is_quiet = arguments.is_quiet || given.is_quiet;
+  g_command_line = summary["command"].get<std::vector<std::string>>();
+  track(arguments);
 }
 } // namespace bole::apps

@@ -48,6 +48,9 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
   command.add_option("--again", arguments->again,
                      "Repeat the run in this folder and tell whether its trunks.csv and trajectory.tum come out the "
                      "same, byte by byte");
+  command.add_option("--resume", arguments->resumed,
+                     "Complete the run in this folder, which was interrupted or killed: it is made anew from its first "
+                     "frame with the options it had, to the same bytes as if it had never been broken off");
   command.add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   command.add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4 and saliency.mp4");
   command.add_flag("--online", arguments->is_online,
@@ -68,7 +71,8 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
                  "  bole track data/park-forward -o run --odometry none --camera-height 1.6\n"
                  "  bole track frames/%05d.jpg -o run --rate 25 --config config/default.yaml\n"
                  "  bole track ardrone://192.168.1.1 -o run --show\n"
-                 "  bole track --again run");
+                 "  bole track --again run\n"
+                 "  bole track --resume run");
 }
 
 void settle(const CLI::App &command, TrackArguments &arguments)

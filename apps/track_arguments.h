@@ -16,7 +16,7 @@ namespace bole::apps
 {
 struct TrackArguments
 {
-  std::string input, run, config, again;
+  std::string input, run, config, again, resumed;
   std::vector<std::string> settings, without;
   SourceOptions source;
   bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_online = false, is_without_odometry = false,
@@ -36,4 +36,6 @@ void settle(const CLI::App &command, TrackArguments &arguments);
 void track(const TrackArguments &arguments);
 /// Repeats the run in the folder `again` and tells whether the bytes agree. \throw vpException when it cannot be.
 void trackAgain(const CLI::App &command, const TrackArguments &arguments);
+/// Completes the run in the folder `resumed`, which was interrupted or killed. \throw vpException when it cannot be.
+void resume(const CLI::App &command, const TrackArguments &arguments);
 } // namespace bole::apps

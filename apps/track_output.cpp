@@ -103,7 +103,7 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
   const Eigen::Matrix3d wRb = report.wMb.R;
   const Eigen::Matrix3d place_covariance = wRb * report.pose_covariance.topLeftCorner<3, 3>() * wRb.transpose();
   m_trace.frames.push_back(
-      {frame.index, frame.stamp_ns, frame.status, report.wMb.t, place_covariance.topLeftCorner<2, 2>()});
+      {frame.index, frame.stamp_ns, frame.status, report.wMb.t, place_covariance.topLeftCorner<2, 2>(), frame.message});
   for (const Eigen::Vector3d &point : placedPoints(report, kFar))
     m_trace.evidence.add(point);
   for (const TrunkInView &view : report.trunks) {
@@ -202,6 +202,7 @@ void TrackOutput::setLink(const LinkCounters &link)
 {
   auto &figures = m_summary.figures;
   figures["live_frames_dropped"] = static_cast<double>(link.dropped + link.video.skipped);
+  figures["live_video_refused"] = static_cast<double>(link.video.refused);
   figures["live_connections"] = static_cast<double>(link.connections);
   figures["live_navdata"] = static_cast<double>(link.navdata_packets);
   figures["live_navdata_refused"] = static_cast<double>(link.navdata_refused);

@@ -50,8 +50,10 @@ struct DroneLink::State
       const std::lock_guard<std::mutex> lock(mutex);
       ++counters.connections;
     };
-    of_video.frame = [this](DecodedFrame &&frame, const DroneVideoDecoder::Counters &counted, std::int64_t arrival_ns) {
-      publish(std::move(frame), counted, arrival_ns);
+    of_video.frame = [this](DecodedFrame &&frame, std::int64_t arrival_ns) { publish(std::move(frame), arrival_ns); };
+    of_video.counted = [this](const DroneVideoDecoder::Counters &counted) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      counters.video = counted;
     };
     NavdataReceiver::Callbacks of_navdata;
     of_navdata.tap = tap;
@@ -63,10 +65,9 @@ struct DroneLink::State
         std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
   }
 
-  void publish(DecodedFrame &&decoded, const DroneVideoDecoder::Counters &counted, std::int64_t arrival_ns)
+  void publish(DecodedFrame &&decoded, std::int64_t arrival_ns)
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    counters.video = counted;
     LiveFrame frame;
     const VideoStamps::Stamp stamp = stamps.next(decoded.timestamp_ms, arrival_ns);
     counters.clock_jumps = stamps.jumps();

@@ -14,7 +14,8 @@ namespace bole
 {
 namespace
 {
-constexpr double kCorrelation_s = 0.1; // of the velocity's error
+constexpr double kCorrelation_s = 0.1;   // of the velocity's error
+constexpr double kMostPackets_Hz = 1000; // by the drone's clock, which sends 200: a flood fills no memory
 
 Eigen::Matrix3d turnedBy(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
 
@@ -118,7 +119,8 @@ void NavdataOdometry::add(std::int64_t stamp_ns, const Navdata &navdata)
   }
   m_history.push_back(state);
   const auto oldest = stamp_ns - static_cast<std::int64_t>(m_options.history_s * 1e9);
-  while (m_history.size() > 2 && m_history.front().stamp_ns < oldest)
+  const auto most = static_cast<std::size_t>(m_options.history_s * kMostPackets_Hz);
+  while (m_history.size() > 2 && (m_history.front().stamp_ns < oldest || m_history.size() > most))
     m_history.pop_front();
 }
 

@@ -114,10 +114,12 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
       second_ns = last_data_ns;
       count = 0;
     }
-    if (++count > kMostDatagrams)
-      continue; // a flood: the socket's buffer drops the rest
     m_generation = 1;
     DroneVideoDecoder &video = decoderFor(1);
+    if (++count > kMostDatagrams) { // a flood: the socket's buffer drops the rest
+      video.refuse();
+      continue;
+    }
     if (!has_begun)
       begin(video);
     has_begun = true;
@@ -131,7 +133,8 @@ void VideoReceiver::handle(DroneVideoDecoder &video, const std::uint8_t *data, s
   if (m_callbacks.tap)
     m_callbacks.tap(LinkChannel::video, arrival_ns, data, size);
   for (DecodedFrame &decoded : video.decode(data, size))
-    m_callbacks.frame(std::move(decoded), video.counters(), arrival_ns);
+    m_callbacks.frame(std::move(decoded), arrival_ns);
+  m_callbacks.counted(video.counters());
 }
 
 NavdataReceiver::NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands,

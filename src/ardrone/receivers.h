@@ -22,7 +22,8 @@ public:
   {
     LinkTap tap; ///< may be empty
     std::function<void()> connected;
-    std::function<void(DecodedFrame &&, const DroneVideoDecoder::Counters &, std::int64_t arrival_ns)> frame;
+    std::function<void(DecodedFrame &&, std::int64_t arrival_ns)> frame;
+    std::function<void(const DroneVideoDecoder::Counters &)> counted; ///< after what came, frames or not
   };
   VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks);
   ~VideoReceiver();

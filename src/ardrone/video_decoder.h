@@ -44,6 +44,8 @@ public:
   explicit DroneVideoDecoder(int generation);
   /// Bytes of the stream (2) or one datagram (1), and the frames that they complete.
   std::vector<DecodedFrame> decode(const std::uint8_t *data, std::size_t size);
+  /// A datagram that comes too fast to be looked at.
+  void refuse() { ++m_counters.refused; }
   /// For a new connection: the next frame must be a key frame.
   void restart();
   const Counters &counters() const { return m_counters; }

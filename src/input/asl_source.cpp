@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/asl_source.h"
+#include "geometry/median.h"
+#include "geometry/so3.h"
 #include "input/csv_reader.h"
 #include "input/sensor_yaml.h"
 
@@ -38,11 +40,11 @@ std::vector<Row> readImageRows(const fs::path &cam0)
   }
   if (rows.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no image in it", path));
-  constexpr std::int64_t kFastest_ns = 100'000; // 10,000 images a second
+  constexpr std::int64_t kFastest_ns = 1'000'000; // 1000 images a second
   if (rows.size() > 2 &&
       (rows.back().stamp_ns - rows.front().stamp_ns) / static_cast<std::int64_t>(rows.size() - 1) < kFastest_ns)
     throw vpException(vpException::badValue,
-                      fmt::format("{}: more than 10000 images a second: stamps must be in nanoseconds", path));
+                      fmt::format("{}: more than 1000 images a second: stamps must be in nanoseconds", path));
   return rows;
 }
 
@@ -72,6 +74,65 @@ void requirePlausible(const std::vector<GyroSample> &gyro, const std::string &pa
                                   path, rate_Hz, kSlowest_Hz, kFastest_Hz));
 }
 
+/// Throws for an accelerometer that does not feel gravity. Columns of zeros are taken for none.
+void requireGravity(std::vector<GyroSample> &gyro, const std::string &path)
+{
+  constexpr double kLeast = 4, kMost = 25;        // m/s^2, median of a flight: it hovers or swings, and shakes
+  constexpr double kLeast_g = 0.7, kMost_g = 1.4; // the same where the unit is g
+  constexpr std::size_t kFewest = 10;             // samples that make a median
+  std::vector<double> norms;
+  for (const GyroSample &sample : gyro)
+    if (sample.force)
+      norms.push_back(sample.force->norm());
+  if (norms.size() < kFewest)
+    return;
+  const double median = medianOf(std::move(norms));
+  if (median == 0)
+    for (GyroSample &sample : gyro)
+      sample.force.reset();
+  else if (median < kLeast || median > kMost)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: specific force = {:.3g} m/s^2 (median), must be {:g} to {:g}{}", path, median,
+                                  kLeast, kMost,
+                                  median > kLeast_g && median < kMost_g               ? ": looks like g"
+                                  : median > 1e3 * kLeast_g && median < 1e3 * kMost_g ? ": looks like thousandths of g"
+                                  : median < kLeast_g ? ": looks as if gravity were taken out (leave the columns away)"
+                                                      : ""));
+}
+
+/// Throws where the gyro turns some sixty times as far as the odometry, and as it does: degrees per second.
+void requireSameTurns(const std::vector<GyroSample> &gyro, const Trajectory &odometry, const std::string &path)
+{
+  constexpr double kLeast = 40, kMost = 80; // times: 57.3 degrees are a radian
+  constexpr double kAlike = 0.5;            // correlation squared; a bias has none
+  double both = 0, by_gyro = 0, by_odometry = 0;
+  auto sample = gyro.begin();
+  for (std::size_t i = 1; i < odometry.size(); ++i) {
+    const StampedPose &from = odometry[i - 1], &to = odometry[i];
+    while (sample != gyro.end() && sample->stamp_ns <= from.stamp_ns)
+      ++sample;
+    Eigen::Vector3d felt = Eigen::Vector3d::Zero();
+    std::int64_t last_ns = from.stamp_ns;
+    for (; sample != gyro.end() && sample->stamp_ns <= to.stamp_ns; ++sample) {
+      felt += static_cast<double>(sample->stamp_ns - last_ns) * 1e-9 * sample->rate;
+      last_ns = sample->stamp_ns;
+    }
+    if (last_ns == from.stamp_ns)
+      continue;
+    const Eigen::Vector3d turned = logSo3(orthonormalized(from.wMb.R.transpose() * to.wMb.R));
+    both += felt.dot(turned);
+    by_gyro += felt.squaredNorm();
+    by_odometry += turned.squaredNorm();
+  }
+  if (by_odometry <= 0 || by_gyro <= 0 || both * both < kAlike * by_gyro * by_odometry)
+    return;
+  if (const double factor = both / by_odometry; factor > kLeast && factor < kMost)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: angular rate = {:.3g} times that of the odometry, must be the same in rad/s: "
+                                  "looks like degrees per second",
+                                  path, factor));
+}
+
 /// Throws where no sample falls into the time of the images: the gyro would be unused without a word.
 void requireOverlap(const std::vector<GyroSample> &gyro, const std::vector<Row> &rows, const std::string &path)
 {
@@ -97,6 +158,7 @@ std::vector<GyroSample> readGyro(const fs::path &imu0)
       gyro.back().force = bRs * Eigen::Vector3d(csv.number(4, "a_x"), csv.number(5, "a_y"), csv.number(6, "a_z"));
   }
   requirePlausible(gyro, (imu0 / "data.csv").string());
+  requireGravity(gyro, (imu0 / "data.csv").string());
   return gyro;
 }
 
@@ -160,6 +222,7 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options) : 
   recording.truth = readPoses(root / "state_groundtruth_estimate0");
   recording.gyro = readGyro(root / "imu0");
   requireOverlap(recording.gyro, m_state->rows, (root / "imu0" / "data.csv").string());
+  requireSameTurns(recording.gyro, recording.odometry, (root / "imu0" / "data.csv").string());
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 

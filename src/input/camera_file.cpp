@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/camera_plausibility.h"
 #include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 
 #include <bole/open_source.h>
 
@@ -8,9 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
-#include <regex>
+#include <set>
 #include <visp3/core/vpException.h>
 #include <visp3/core/vpXmlParserCamera.h>
 
@@ -18,6 +17,7 @@ namespace bole
 {
 namespace
 {
+constexpr std::size_t kMostNames = 100; // of cameras in one file: each is looked for on its own
 const std::set<std::string> kCameraKeys = {
     "sensor_type", "comment",      "T_BS",       "rate_hz",          "resolution",
     "intrinsics",  "camera_model", "camera_fov", "distortion_model", "distortion_coefficients"};
@@ -111,27 +111,48 @@ MountedCamera readCalibration(const SensorYaml &yaml)
   return camera;
 }
 
+/// Throws where \p camera, read from \p yaml, cannot be one.
+void requireCamera(const MountedCamera &camera, const SensorYaml &yaml, const char *pinhole_key)
+{
+  using Part = Implausibility::Part;
+  const Implausibility fault = implausibility(camera);
+  if (fault.part != Part::none)
+    yaml.refuse(fault.part == Part::pinhole      ? pinhole_key
+                : fault.part == Part::distortion ? "distortion_coefficients"
+                                                 : "T_BS",
+                fault.text);
+}
+
 MountedCamera readYaml(const std::string &path)
 {
-  if (const SensorYaml any(path, {}); any.has("camera_matrix"))
-    return readCalibration(any);
+  if (const SensorYaml any(path, {}); any.has("camera_matrix")) {
+    const MountedCamera camera = readCalibration(any);
+    requireCamera(camera, any, "camera_matrix");
+    return camera;
+  }
   const SensorYaml yaml(path, kCameraKeys);
   MountedCamera camera;
   camera.model.pinhole = readPinhole(yaml);
   readDistortion(yaml, camera.model);
   camera.bMc = yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : forwardCamera();
+  requireCamera(camera, yaml, "intrinsics");
   return camera;
 }
 
 /// Names of the cameras in ViSP's XML: its parser wants to be told the one it is to read.
 std::set<std::string> cameraNames(const std::string &path)
 {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  const std::regex pattern("<name>\\s*([^<]*?)\\s*</name>");
+  const std::string text = readSmallFile(path), tag = "<name>", blanks = " \t\r\n";
   std::set<std::string> names;
-  for (auto it = std::sregex_iterator(text.begin(), text.end(), pattern); it != std::sregex_iterator(); ++it)
-    names.insert((*it)[1]);
+  for (std::size_t at = text.find(tag); at != std::string::npos; at = text.find(tag, at)) {
+    at += tag.size();
+    const std::string name = text.substr(at, text.find('<', at) - at);
+    const std::size_t first = std::min(name.find_first_not_of(blanks), name.size());
+    names.insert(name.substr(first, name.find_last_not_of(blanks) + 1 - first));
+  }
+  if (names.size() > kMostNames)
+    throw vpException(vpException::ioError,
+                      fmt::format("{}: {} names in it, must be at most {}", path, names.size(), kMostNames));
   return names;
 }
 
@@ -171,6 +192,8 @@ MountedCamera readXml(const std::string &path, int width, int height)
   }
   if (!(pinhole.fx > 0) || !(pinhole.fy > 0) || pinhole.width <= 0 || pinhole.height <= 0)
     throw vpException(vpException::ioError, fmt::format("{}: px, py, image_width and image_height must be > 0", path));
+  if (const Implausibility fault = implausibility(camera); fault.part != Implausibility::Part::none)
+    throw vpException(vpException::badValue, fmt::format("{}: {}", path, fault.text));
   return camera;
 }
 } // namespace
@@ -189,10 +212,7 @@ MountedCamera readCamera(const std::string &path, int width, int height)
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension != ".xml" && extension != ".yaml" && extension != ".yml")
     throw vpException(vpException::ioError, fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
-  const MountedCamera camera = extension == ".xml" ? readXml(path, width, height) : readYaml(path);
-  if (const std::string fault = implausibility(camera); !fault.empty())
-    throw vpException(vpException::badValue, fmt::format("{}: {}", path, fault));
-  return camera;
+  return extension == ".xml" ? readXml(path, width, height) : readYaml(path);
 }
 
 Pose readSensorPose(const std::string &path)

@@ -50,28 +50,31 @@ bool isUnfolded(const CameraModel &model)
 }
 } // namespace
 
-std::string implausibility(const MountedCamera &camera)
+Implausibility implausibility(const MountedCamera &camera)
 {
+  using Part = Implausibility::Part;
   const PinholeCamera &p = camera.model.pinhole;
   const double view_deg = 2 * std::atan(0.5 * p.width / p.fx) * kDegrees;
   if (!(view_deg >= kNarrowest_deg && view_deg <= kWidest_deg))
-    return fmt::format("fx = {:g} px at {} columns is a field of view of {:.3g} degrees, must be {:g} to {:g}", p.fx,
-                       p.width, view_deg, kNarrowest_deg, kWidest_deg);
+    return {Part::pinhole, fmt::format("fx = {:g} px at {} columns is a field of view of {:.3g} degrees, must be {:g} "
+                                       "to {:g}",
+                                       p.fx, p.width, view_deg, kNarrowest_deg, kWidest_deg)};
   const double aspect = p.fx / p.fy;
   if (!(aspect >= 1 / kLargestAspect && aspect <= kLargestAspect))
-    return fmt::format("fx / fy = {:.3g}, must be {:g} to {:g}", aspect, 1 / kLargestAspect, kLargestAspect);
+    return {Part::pinhole,
+            fmt::format("fx / fy = {:.3g}, must be {:g} to {:g}", aspect, 1 / kLargestAspect, kLargestAspect)};
   if (!p.contains({p.cx, p.cy}, -0.5))
-    return fmt::format("the principal point ({:g}, {:g}) must be in the picture of {}x{} px", p.cx, p.cy, p.width,
-                       p.height);
+    return {Part::pinhole, fmt::format("the principal point ({:g}, {:g}) must be in the picture of {}x{} px", p.cx,
+                                       p.cy, p.width, p.height)};
   if (camera.model.distortion != Distortion::none && !isUnfolded(camera.model))
-    return "the distortion folds the picture: farther out in the scene must be farther out in the picture, up to its "
-           "sides (too large coefficients, or in another order?)";
+    return {Part::distortion, "the distortion folds the picture: farther out in the scene must be farther out in the "
+                              "picture, up to its sides (too large coefficients, or in another order?)"};
   if (!(camera.bMc.t.norm() < kLargestArm_m))
-    return fmt::format("the camera is {:.4g} m from the body, must be less than {:g} m (millimetres?)",
-                       camera.bMc.t.norm(), kLargestArm_m);
+    return {Part::mounting, fmt::format("the camera is {:.4g} m from the body, must be less than {:g} m (millimetres?)",
+                                        camera.bMc.t.norm(), kLargestArm_m)};
   if ((camera.bMc.R - Eigen::Matrix3d::Identity()).norm() < 1e-6)
-    return "T_BS has no rotation, must take the camera's axes (x right, y down, z ahead) to the body's (x ahead, y "
-           "left, z up)";
+    return {Part::mounting, "T_BS has no rotation, must take the camera's axes (x right, y down, z ahead) to the "
+                            "body's (x ahead, y left, z up)"};
   return {};
 }
 

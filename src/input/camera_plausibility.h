@@ -10,9 +10,23 @@
 
 namespace bole
 {
-/// What cannot be true of \p camera, with the limit: field of view, shape of the pixels, principal point, a distortion
-/// that folds the picture, the place in the body. Empty when all is well.
-std::string implausibility(const MountedCamera &camera);
+/// What cannot be true of a camera, and which of its parts says so.
+struct Implausibility
+{
+  enum class Part
+  {
+    none,
+    pinhole,
+    distortion,
+    mounting
+  };
+  Part part = Part::none;
+  std::string text = {}; ///< with the limit
+};
+
+/// Looks at field of view, shape of the pixels, principal point, whether the distortion folds the picture, and the
+/// place in the body.
+Implausibility implausibility(const MountedCamera &camera);
 
 /// k1 and k2 that come closest to k1, k2, k3 over the picture of \p pinhole (OpenCV's calibrations have a third radial
 /// coefficient, CameraModel two). \return the largest difference that is left [px].

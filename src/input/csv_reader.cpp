@@ -21,6 +21,7 @@ std::string_view trimmed(std::string_view text)
 }
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::string_view kUtf16Marks[] = {"\xFF\xFE", "\xFE\xFF"};
 constexpr std::size_t kLongestLine = 100'000;
 
 /// "stamp,0,142302,-0,176885": no point anywhere, and every second field is a fraction of at least two digits.
@@ -45,6 +46,17 @@ bool isHeader(std::string_view line)
   const char first = line.front();
   const bool is_word = (first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z') || first == '"' || first == '_';
   return is_word && line.substr(0, 3) != "nan" && line.substr(0, 3) != "inf";
+}
+
+/// What a message may quote of a file: its beginning, on one line and without what a terminal would obey.
+std::string shownField(std::string_view text)
+{
+  constexpr std::size_t kLongest = 60;
+  std::string shown(text.substr(0, kLongest));
+  for (char &c : shown)
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7F')
+      c = '?';
+  return text.size() > kLongest ? shown + "..." : shown;
 }
 
 /// Seconds in decimal notation as nanoseconds, without a detour through floating point.
@@ -78,8 +90,10 @@ CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_path(path), 
   std::string line;
   std::getline(m_file, line);
   m_line = 1;
+  if (line.substr(0, kByteOrderMark.size()) == kByteOrderMark)
+    line.erase(0, kByteOrderMark.size());
   if (trimmed(line) != m_format.header)
-    fail(fmt::format("the header is \"{}\", must be \"{}\"", trimmed(line).substr(0, 120), m_format.header));
+    fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(trimmed(line)), m_format.header));
 }
 
 void CsvReader::fail(const std::string &message) const
@@ -113,6 +127,8 @@ bool CsvReader::next()
     std::string_view content = trimmed(line);
     if (m_line == 1 && content.substr(0, kByteOrderMark.size()) == kByteOrderMark)
       content.remove_prefix(kByteOrderMark.size());
+    if (m_line == 1 && (content.substr(0, 2) == kUtf16Marks[0] || content.substr(0, 2) == kUtf16Marks[1]))
+      fail("is text in UTF-16, must be in UTF-8");
     if (line.size() > kLongestLine)
       fail(fmt::format("{} characters, must be at most {} in a line", line.size(), kLongestLine));
     if (content.empty() || content.front() == '#' || (m_rows == 0 && isHeader(content)))
@@ -143,7 +159,7 @@ double CsvReader::number(std::size_t column, std::string_view name) const
   double value = 0;
   const auto result = std::from_chars(begin, end, value);
   if (begin == end || result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
-    fail(fmt::format("{} = \"{}\", must be a finite number", name, field));
+    fail(fmt::format("{} = \"{}\", must be a finite number", name, shownField(field)));
   return value;
 }
 
@@ -153,7 +169,7 @@ std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
   std::int64_t value = 0;
   const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
   if (field.empty() || result.ec != std::errc() || result.ptr != field.data() + field.size())
-    fail(fmt::format("{} = \"{}\", must be a whole number", name, field));
+    fail(fmt::format("{} = \"{}\", must be a whole number", name, shownField(field)));
   return value;
 }
 

@@ -36,6 +36,7 @@ MeasuredRotation FrameHealth::motionTo(const Frame &frame) const
   motion.focal_px = m_focal_px;
   if (!m_last_stamp_ns)
     return motion;
+  motion.elapsed_s = 1e-9 * static_cast<double>(frame.stamp_ns - *m_last_stamp_ns);
   const Eigen::Matrix3d cRb = m_bMc.R.transpose();
   if (const auto angle = integrated(frame.gyro, *m_last_stamp_ns, frame.stamp_ns))
     motion.gyro = cRb * *angle;

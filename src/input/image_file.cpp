@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
@@ -16,6 +17,8 @@ namespace bole
 namespace
 {
 using Bytes = std::vector<unsigned char>;
+
+constexpr std::uint64_t kLargestSide = std::uint64_t{1} << 30; // px, of what a header may say
 
 std::array<std::uint32_t, 256> crcTable()
 {
@@ -76,6 +79,22 @@ class TiffDirectory
 public:
   explicit TiffDirectory(const Bytes &bytes) : m_bytes(bytes), m_is_little(bytes[0] == 'I') {}
 
+  static bool isOne(const Bytes &bytes)
+  {
+    return bytes.size() >= 8 && ((bytes[0] == 'I' && bytes[1] == 'I' && bytes[2] == 42) ||
+                                 (bytes[0] == 'M' && bytes[1] == 'M' && bytes[3] == 42));
+  }
+
+  cv::Size size() const
+  {
+    cv::Size size(0, 0);
+    const std::uint64_t directory = number(4, 4), entries = number(directory, 2);
+    for (std::uint64_t at = directory + 2; at + 12 <= m_bytes.size() && at < directory + 2 + 12 * entries; at += 12)
+      if (const std::uint64_t tag = number(at, 2); tag == 256 || tag == 257)
+        (tag == 256 ? size.width : size.height) = static_cast<int>(std::min(value(at, 0), kLargestSide));
+    return size;
+  }
+
   std::string fault() const
   {
     const std::uint64_t directory = number(4, 4);
@@ -117,9 +136,32 @@ private:
   bool m_is_little;
 };
 
-/// Size by the header of a PNG, BMP or JPEG, before anything is allocated for it; nothing for others.
+/// Size by the header of a PNM: "P5 width height", with comments between.
+std::optional<cv::Size> pnmSize(const Bytes &bytes)
+{
+  std::uint64_t sides[2] = {0, 0};
+  std::size_t at = 2;
+  for (std::uint64_t &side : sides) {
+    for (; at < bytes.size() && (std::isspace(bytes[at]) != 0 || bytes[at] == '#'); ++at)
+      if (bytes[at] == '#')
+        at = static_cast<std::size_t>(std::find(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.end(), '\n') -
+                                      bytes.begin());
+    if (at >= bytes.size() || std::isdigit(bytes[at]) == 0)
+      return std::nullopt;
+    for (; at < bytes.size() && std::isdigit(bytes[at]) != 0; ++at)
+      side = std::min(10 * side + static_cast<std::uint64_t>(bytes[at] - '0'), kLargestSide);
+  }
+  return cv::Size(static_cast<int>(sides[0]), static_cast<int>(sides[1]));
+}
+
+/// Size by the header of a PNG, BMP, JPEG, TIFF or PNM, before anything is allocated for it; nothing for what is none
+/// of these or hides its size, which is not decoded.
 std::optional<cv::Size> sizeOf(const Bytes &bytes)
 {
+  if (TiffDirectory::isOne(bytes))
+    return TiffDirectory(bytes).size();
+  if (bytes.size() >= 8 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6')
+    return pnmSize(bytes);
   const auto big16 = [&bytes](std::size_t at) { return static_cast<int>(bytes[at]) << 8 | bytes[at + 1]; };
   if (bytes.size() >= 24 && bytes[0] == 0x89 && bytes[1] == 'P')
     return cv::Size(static_cast<int>(std::min(bigEndian32(&bytes[16]), 1u << 30)),
@@ -130,9 +172,9 @@ std::optional<cv::Size> sizeOf(const Bytes &bytes)
     return cv::Size(std::abs(size[0] % (1 << 30)), std::abs(size[1] % (1 << 30)));
   }
   if (bytes[0] == 0xFF && bytes.size() > 4 && bytes[1] == 0xD8)
-    for (std::size_t at = 2; at + 9 < bytes.size() && bytes[at] == 0xFF;
-         at += 2 + static_cast<std::size_t>(big16(at + 2))) {
+    for (std::size_t at = 2, length = 0; at + 9 < bytes.size() && bytes[at] == 0xFF; at += length) {
       const int marker = bytes[at + 1];
+      length = marker == 0xFF ? 1 : 2 + static_cast<std::size_t>(big16(at + 2)); // any number of FF may stand in front
       if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC)
         return cv::Size(big16(at + 7), big16(at + 5));
     }
@@ -148,8 +190,7 @@ std::string containerFault(const Bytes &bytes)
     return pngFault(bytes);
   if (bytes.size() >= 3 && bytes[0] == 0xFF && bytes[1] == 0xD8 && bytes[2] == 0xFF)
     return jpegFault(bytes);
-  if (bytes.size() >= 8 && ((bytes[0] == 'I' && bytes[1] == 'I' && bytes[2] == 42) ||
-                            (bytes[0] == 'M' && bytes[1] == 'M' && bytes[3] == 42)))
+  if (TiffDirectory::isOne(bytes))
     return TiffDirectory(bytes).fault();
   return {};
 }
@@ -177,10 +218,13 @@ ImageFile readImageFile(const std::string &path, int width, int height)
   const std::string fault = containerFault(bytes);
   if (!fault.empty())
     return broken(FrameStatus::corrupt, path, fault);
-  if (const auto size = sizeOf(bytes); size && width > 0 && *size != cv::Size(width, height))
+  const auto size = sizeOf(bytes);
+  if (!size)
+    return broken(FrameStatus::corrupt, path, "cannot be decoded, must be a PNG, JPEG, PNM, BMP or TIFF");
+  if (width > 0 && *size != cv::Size(width, height))
     return broken(FrameStatus::resized, path,
                   fmt::format("image of {}x{} px, must be {}x{}", size->width, size->height, width, height));
-  else if (size && static_cast<double>(size->width) * size->height > kMostPixels)
+  if (static_cast<double>(size->width) * size->height > kMostPixels)
     return broken(
         FrameStatus::corrupt, path,
         fmt::format("image of {}x{} px, must be at most {:g} pixels", size->width, size->height, kMostPixels));

@@ -9,6 +9,7 @@
 #include <deque>
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 namespace bole
@@ -31,9 +32,17 @@ constexpr double kStillRotation = 2e-3; // rad: by the gyro the camera may stand
 constexpr double kSureMatch = 0.75;     // correlation of two images that show the same
 constexpr double kSureMargin = 0.05;    // of it over the correlation at the shift that the gyro says
 constexpr double kFlipGain = 0.3;       // correlation that an exchange of sides must add
-constexpr double kFlipLeast = 0.6;      // correlation that it must reach
-constexpr int kLastsMost = 30;          // frames that blur and noise are refused before they count as usual
-constexpr int kJumpsMost = 5;           // frames out of order before the new place is believed
+constexpr double kFlipLeast = 0.6;      // correlation that it must reach; frames of a flight reach it with each other
+constexpr double kElsewhere = 0.45;     // correlation with the frame before, below which it is another place
+constexpr double kSoon_s = 0.35;        // in which a flight does not leave what it sees
+constexpr double kWhole = 0.75;         // correlation of the half that follows the frame before
+constexpr double kTorn = 0.45;          // and most of the other
+constexpr double kBackGain = 0.1;       // correlation by which an image follows the last good one better
+constexpr double kBackLeast = 0.35;     // and that it must reach
+constexpr double kZooms[] = {1.15, 1.3, 1.5, 1.75, 2};
+constexpr int kLastsMost = 30;   // frames that a fault of the picture is refused before it counts as usual
+constexpr int kJumpsMost = 5;    // frames out of order or torn before they are believed
+constexpr int kTornSpacing = 30; // frames: what tears more often is in the view, as a propeller
 
 double middleOf(const std::deque<double> &values) { return medianOf({values.begin(), values.end()}); }
 
@@ -46,6 +55,54 @@ void remember(std::deque<double> &values, double value)
 
 /// Shift of a distant image over the focal length when the camera rotates by \p rotation.
 Eigen::Vector2d shiftOf(const Eigen::Vector3d &rotation) { return {rotation.y(), -rotation.x()}; }
+
+/// The middle of \p image, enlarged to its size.
+cv::Mat enlarged(const cv::Mat &image, double zoom)
+{
+  const cv::Size size(static_cast<int>(std::lround(image.cols / zoom)),
+                      static_cast<int>(std::lround(image.rows / zoom)));
+  cv::Mat out;
+  cv::resize(image({(image.cols - size.width) / 2, (image.rows - size.height) / 2, size.width, size.height}), out,
+             image.size(), 0, 0, cv::INTER_LINEAR);
+  return out;
+}
+
+struct Suspicion
+{
+  ImageFault fault = ImageFault::none;
+  std::string text = {};
+};
+
+/// What else of the frame \p before \p now may show, where that fits far better than \p as_it_is.
+Suspicion otherwise(const cv::Mat &before, const cv::Mat &now, const ImageMatch &as_it_is)
+{
+  const auto fits = [&as_it_is](double correlation) {
+    return correlation > kFlipLeast && correlation > as_it_is.correlation + kFlipGain;
+  };
+  cv::Mat flipped;
+  cv::flip(now, flipped, -1);
+  if (fits(matchImages(before, flipped).correlation))
+    return {ImageFault::upside_down, "upside down against the frame before"};
+  cv::flip(now, flipped, 1);
+  if (fits(matchImages(before, flipped).correlation))
+    return {ImageFault::mirrored, "mirrored against the frame before"};
+  double least = 0;
+  cv::minMaxLoc(as_it_is.correlations, &least);
+  if (fits(-least))
+    return {ImageFault::negative, "negative of the frame before"};
+  for (const double zoom : kZooms) {
+    if (fits(matchImages(enlarged(before, zoom), now).correlation))
+      return {ImageFault::cropped, fmt::format("cropped: {:g} times as large as in the frame before", zoom)};
+    if (fits(matchImages(before, enlarged(now, zoom)).correlation))
+      return {ImageFault::cropped, fmt::format("cropped: {:g} times as small as in the frame before", zoom)};
+  }
+  const int middle = now.rows / 2;
+  const double top = matchImages(before.rowRange(0, middle), now.rowRange(0, middle)).correlation;
+  const double bottom = matchImages(before.rowRange(middle, now.rows), now.rowRange(middle, now.rows)).correlation;
+  if (std::max(top, bottom) > kWhole && std::min(top, bottom) < kTorn)
+    return {ImageFault::torn, "torn: one half does not follow the frame before"};
+  return {};
+}
 } // namespace
 
 const char *toString(ImageFault fault)
@@ -71,6 +128,12 @@ const char *toString(ImageFault fault)
     return "mirrored";
   case ImageFault::upside_down:
     return "upside down";
+  case ImageFault::negative:
+    return "negative";
+  case ImageFault::cropped:
+    return "cropped";
+  case ImageFault::torn:
+    return "torn";
   case ImageFault::out_of_order:
     return "out of order";
   case ImageFault::late:
@@ -88,10 +151,15 @@ struct ImageHealth::State
   bool may_repeat = true;
   double good_repeated = 0;
   std::deque<double> noises, sharpnesses, changes; ///< of accepted images; noise over deviation
-  int bad_quality = 0, jumps = 0;
+  int bad_quality = 0;
+  Suspicion odd;                 ///< how the images have stood to the last accepted one since it
+  int odd_count = 0;             ///< of them
+  int since_torn = kTornSpacing; ///< frames
   std::optional<Eigen::Vector3d> gyro = Eigen::Vector3d::Zero(),
-                                 odometry = Eigen::Vector3d::Zero(); ///< since `previous`
-  double gyro_since_good = 0;                                        ///< angle [rad], negative where it is not known
+                                 odometry = Eigen::Vector3d::Zero();       ///< since `previous`
+  std::optional<Eigen::Vector3d> gyro_from_last = Eigen::Vector3d::Zero(); ///< since the last accepted image
+  double elapsed_s = 0;                                                    ///< since `previous`
+  double gyro_since_good = 0; ///< angle [rad], negative where it is not known
   GyroAgreement agreement;
   std::string reason;
 
@@ -105,6 +173,16 @@ struct ImageHealth::State
   ImageFault judgeQuality(const ImageNumbers &numbers);
   ImageFault judgeFrozen(const cv::Mat &image, const cv::Mat &small);
   ImageFault judgeOrder(const cv::Mat &small, const MeasuredRotation &motion);
+  ImageFault judgeOdd(const cv::Mat &small, const ImageMatch &moved, double focal);
+  GyroAgreement::Interval intervalOf(const ImageMatch &moved, double focal) const;
+  ImageFault named(GyroAgreement::Verdict verdict);
+  bool isBack(const cv::Mat &small, const ImageMatch &moved, double focal) const;
+  ImageFault begin(Suspicion suspicion)
+  {
+    odd = std::move(suspicion);
+    odd_count = 1;
+    return say(odd.fault, odd.text);
+  }
   void accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers);
 };
 
@@ -117,6 +195,8 @@ void ImageHealth::State::addMotion(const MeasuredRotation &motion)
       sum.reset();
   };
   add(gyro, motion.gyro);
+  add(gyro_from_last, motion.gyro);
+  elapsed_s += motion.elapsed_s;
   add(odometry, motion.odometry);
   gyro_since_good = motion.gyro && gyro_since_good >= 0 ? gyro_since_good + motion.gyro->norm() : -1;
 }
@@ -179,49 +259,95 @@ ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &
   return ImageFault::none;
 }
 
+/// Whether an image follows the last accepted one again, after others that did not.
+bool ImageHealth::State::isBack(const cv::Mat &small, const ImageMatch &moved, double focal) const
+{
+  const ImageMatch with_last = matchImages(thumb, small);
+  if (with_last.correlation > std::max(kBackLeast, moved.correlation + kBackGain))
+    return true;
+  if (odd.fault != ImageFault::out_of_order) // what was done to the image before is undone
+    return moved.correlation < kFlipLeast && otherwise(previous, small, moved).fault == odd.fault;
+  if (with_last.correlation < kFlipLeast || !gyro_from_last || focal <= 0)
+    return false;
+  const Eigen::Vector2d seen(with_last.x / focal, with_last.y / focal);
+  return agreement.follows(seen, shiftOf(*gyro_from_last), odd_count + 1);
+}
+
 /// Against the images before and the gyro.
 ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRotation &motion)
 {
-  const ImageMatch with_last = matchImages(thumb, small);
-  if (with_last.correlation < kFlipLeast) {
-    cv::Mat flipped;
-    for (const int code : {-1, 1}) {
-      cv::flip(small, flipped, code);
-      const double other = matchImages(thumb, flipped).correlation;
-      if (other > kFlipLeast && other > with_last.correlation + kFlipGain)
-        return code == -1 ? say(ImageFault::upside_down, "upside down against the frame before")
-                          : say(ImageFault::mirrored, "mirrored against the frame before");
+  const double focal = motion.focal_px * small.cols / last.cols;
+  const ImageMatch moved = matchImages(previous, small);
+  if (odd.fault != ImageFault::none)
+    return judgeOdd(small, moved, focal);
+  ++since_torn;
+  if (moved.correlation < kFlipLeast)
+    if (Suspicion other = otherwise(previous, small, moved);
+        other.fault != ImageFault::none && (other.fault != ImageFault::torn || since_torn > kTornSpacing)) {
+      since_torn = other.fault == ImageFault::torn ? 0 : since_torn;
+      agreement.reset();
+      return begin(std::move(other));
     }
-  }
-  if (!gyro || motion.focal_px <= 0) {
+  if (!gyro || focal <= 0) {
     agreement.reset();
     return ImageFault::none;
   }
-  const double focal = motion.focal_px * small.cols / last.cols;
-  if ((focal * shiftOf(*gyro)).cwiseAbs().maxCoeff() > 0.4 * kSearchShare * small.cols) {
-    agreement.reset(); // farther than images are searched for each other
-    return ImageFault::none;
+  const GyroAgreement::Interval interval = intervalOf(moved, focal);
+  if (interval.is_seen && moved.correlation < kElsewhere && elapsed_s < kSoon_s) {
+    agreement.add(interval, false);
+    return begin({ImageFault::out_of_order, "out of order: it shows another place than the frame before"});
   }
-  const ImageMatch moved = previous.data == thumb.data ? with_last : matchImages(previous, small);
+  const ImageFault fault = named(agreement.add(interval, true));
+  if (fault == ImageFault::out_of_order)
+    return begin({fault, "out of order: it does not follow the frame before as the gyro says"});
+  return fault;
+}
+
+/// After an image that stood otherwise to those before it.
+ImageFault ImageHealth::State::judgeOdd(const cv::Mat &small, const ImageMatch &moved, double focal)
+{
+  const bool is_out_of_order = odd.fault == ImageFault::out_of_order;
+  const bool is_back = isBack(small, moved, focal);
+  if (is_out_of_order && gyro && focal > 0) {
+    const ImageFault fault = named(agreement.add(intervalOf(moved, focal), false));
+    if (!is_back && fault != ImageFault::none) { // they follow each other, at another time
+      odd = {};
+      return fault;
+    }
+  }
+  const bool is_short = is_out_of_order || odd.fault == ImageFault::torn;
+  if (!is_back && ++odd_count <= (is_short ? kJumpsMost : kLastsMost))
+    return say(odd.fault, odd.text);
+  odd = {};
+  return ImageFault::none;
+}
+
+/// What the images and the gyro say of the time since the image before.
+GyroAgreement::Interval ImageHealth::State::intervalOf(const ImageMatch &moved, double focal) const
+{
+  constexpr double kAlike_px = 2; // of the thumb: that near, it cannot be the trunk beside
   GyroAgreement::Interval interval;
   interval.image = Eigen::Vector2d(moved.x, moved.y) / focal;
   interval.gyro = shiftOf(*gyro);
   // Rows of trunks look alike one trunk farther: then the place that the gyro says is nearly as good.
   const Eigen::Vector2d expected = focal * interval.gyro;
+  interval.is_seen = expected.cwiseAbs().maxCoeff() < 0.4 * kSearchShare * thumb.cols;
   interval.is_sure =
-      moved.correlation > kSureMatch && moved.bestNear(expected.x(), expected.y()) < moved.correlation - kSureMargin;
+      moved.correlation > kSureMatch && (focal * (interval.image - interval.gyro).norm() < kAlike_px ||
+                                         moved.bestNear(expected.x(), expected.y()) < moved.correlation - kSureMargin);
   if (odometry)
     interval.odometry = shiftOf(*odometry);
-  const GyroAgreement::Verdict verdict = agreement.add(interval);
-  jumps = verdict == GyroAgreement::Verdict::jumped ? jumps + 1 : 0;
+  return interval;
+}
+
+/// The fault that \p verdict is, said unless it is a jump.
+ImageFault ImageHealth::State::named(GyroAgreement::Verdict verdict)
+{
   switch (verdict) {
   case GyroAgreement::Verdict::agrees:
     return ImageFault::none;
   case GyroAgreement::Verdict::jumped:
-    return jumps > kJumpsMost
-               ? ImageFault::none
-               : say(ImageFault::out_of_order, "out of order: it does not follow the frame before as the "
-                                               "gyro says");
+    return ImageFault::out_of_order;
   case GyroAgreement::Verdict::late:
     return say(ImageFault::late, fmt::format("{} by {} frames against the gyro", agreement.lag() > 0 ? "late" : "early",
                                              std::abs(agreement.lag())));
@@ -243,6 +369,7 @@ void ImageHealth::State::accept(const cv::Mat &image, const cv::Mat &small, cons
   image.copyTo(last);
   thumb = small;
   gyro_since_good = 0;
+  gyro_from_last = Eigen::Vector3d::Zero();
 }
 
 ImageHealth::ImageHealth() : ImageHealth(Options{}) {}
@@ -293,6 +420,7 @@ ImageFault ImageHealth::check(const vpImage<unsigned char> &I, const MeasuredRot
     fault = s.judgeOrder(small, motion);
     s.previous = small;
     s.gyro = s.odometry = Eigen::Vector3d::Zero();
+    s.elapsed_s = 0;
   }
   s.may_repeat = false;
   if (fault == ImageFault::none)

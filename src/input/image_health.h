@@ -5,12 +5,14 @@
 ///
 /// Idea: a camera, its driver and its radio link fail in few ways, and each leaves a mark that no forest makes.
 /// By itself an image shows no contrast, no light, too much of it, noise, blur, or rows and columns that repeat each
-/// other. Against the images before it is a repetition (perhaps with fresh noise on top), mirrored, or upside down.
-/// Against the gyro it is out of order or late: the shift of the whole image between two frames is the rotation of the
-/// camera but for the parallax.
+/// other. Against the images before it is a repetition (perhaps with fresh noise on top), mirrored, upside down, a
+/// negative, cropped or torn, and so are those that follow it, until one follows the last good image again. Against the
+/// gyro it is out of order or late: the shift of the whole image between two frames is the rotation of the camera but
+/// for the parallax.
 ///
 /// Limits are in grey levels, in shares, and in multiples of what the flight showed so far, so that they hold for every
-/// camera. A camera that really has changed for good (a drop on the lens) is believed again after 30 images.
+/// camera. A camera that really has changed for good (a drop on the lens, another mode) is believed again after 30
+/// images.
 
 #include <Eigen/Core>
 
@@ -34,6 +36,9 @@ enum class ImageFault
   frozen,       ///< an image that came before, perhaps with fresh noise
   mirrored,     ///< left and right exchanged
   upside_down,  ///< rotated by 180 degrees
+  negative,     ///< dark and bright exchanged
+  cropped,      ///< the same scene larger or smaller: another part of the sensor
+  torn,         ///< one half follows the image before, the other does not
   out_of_order, ///< does not follow the frame before as the gyro says
   late          ///< shows what the gyro measured at another time
 };
@@ -46,7 +51,8 @@ struct MeasuredRotation
   std::optional<Eigen::Vector3d> gyro;
   /// The same by the odometry: where it is there, the gyro is believed only if both agree.
   std::optional<Eigen::Vector3d> odometry;
-  double focal_px = 0; ///< focal length in the checked image
+  double focal_px = 0;  ///< focal length in the checked image
+  double elapsed_s = 0; ///< [s]
 };
 
 /// Remembers what the flight looked like. Cost: about 0.3 ms at 320x240. Not thread-safe.

@@ -68,6 +68,13 @@ void SensorYaml::fail(const std::string &key, const std::string &must_be) const
   failAt(m_path, node.Mark(), fmt::format("{} = {}, must be {}", key, dumped(node), must_be));
 }
 
+void SensorYaml::refuse(const std::string &key, const std::string &message) const
+{
+  if (!has(key))
+    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, message));
+  failAt(m_path, m_root[key].Mark(), fmt::format("{}: {}", key, message));
+}
+
 std::string SensorYaml::text(const std::string &key) const
 {
   const YAML::Node node = at(key);

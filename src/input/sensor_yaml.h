@@ -27,6 +27,8 @@ public:
   /// 4x4 rigid motion under \p key, as {cols, rows, data: [16 numbers]} or a list of four rows.
   Pose rigidMotion(const std::string &key) const;
   [[noreturn]] void fail(const std::string &key, const std::string &must_be) const;
+  /// "file:line: key: message", without the line where the key is absent.
+  [[noreturn]] void refuse(const std::string &key, const std::string &message) const;
 
 private:
   YAML::Node at(const std::string &key) const;

@@ -2,14 +2,13 @@
 #include "input/sequence_source.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <limits>
 #include <map>
 #include <regex>
 #include <visp3/core/vpException.h>
-#include <visp3/core/vpIoTools.h>
 
 namespace bole
 {
@@ -18,8 +17,7 @@ namespace
 {
 struct Numbers
 {
-  long first = std::numeric_limits<long>::max();
-  long last = -1;
+  long first = 0, last = 0;
 };
 
 /// The one `%d` or `%0Nd` of a pattern.
@@ -41,24 +39,47 @@ std::string imagePath(const std::string &pattern, long number)
   return (fs::path(pattern).parent_path() / (match.prefix().str() + padded + match.suffix().str())).string();
 }
 
+/// The number in the place of \p placeholder in \p name, -1 where there is none.
+long numberOf(const std::string &name, const std::smatch &placeholder)
+{
+  const auto before = static_cast<std::size_t>(placeholder.prefix().length());
+  const auto behind = static_cast<std::size_t>(placeholder.suffix().length());
+  long number = -1;
+  if (name.size() > before + behind)
+    std::from_chars(name.data() + before, name.data() + name.size() - behind, number);
+  return number;
+}
+
+/// Throws where so many numbers in a row have no image that two flights stand in one folder, or a name means no number.
+void requireNoHole(const std::vector<long> &sorted, const std::string &pattern)
+{
+  constexpr long kLargest = 10000; // images: minutes of a flight
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    if (sorted[i] - sorted[i - 1] > kLargest)
+      throw vpException(vpException::badValue,
+                        fmt::format("{}: no image from number {} to {}, must be at most {} in a row", pattern,
+                                    sorted[i - 1] + 1, sorted[i] - 1, kLargest));
+}
+
 Numbers numbersOf(const std::string &pattern)
 {
   const fs::path folder = fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
   const std::string name = fs::path(pattern).filename().string();
-  placeholderOf(name);
+  const std::smatch placeholder = placeholderOf(name);
   if (!fs::is_directory(folder))
     throw vpException(vpException::ioError, fmt::format("{}: no such folder", folder.string()));
-  Numbers numbers;
+  std::vector<long> all;
   for (const auto &entry : fs::directory_iterator(folder)) {
-    const long number = vpIoTools::getIndex(entry.path().filename().string(), name);
+    const long number = numberOf(entry.path().filename().string(), placeholder);
     if (number < 0 || fs::path(imagePath(pattern, number)).filename() != entry.path().filename())
       continue;
-    numbers.first = std::min(numbers.first, number);
-    numbers.last = std::max(numbers.last, number);
+    all.push_back(number);
   }
-  if (numbers.last < 0)
+  if (all.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no such image", pattern));
-  return numbers;
+  std::sort(all.begin(), all.end());
+  requireNoHole(all, pattern);
+  return {all.front(), all.back()};
 }
 
 /// The first image that can be read gives the size of all.

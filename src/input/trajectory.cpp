@@ -46,10 +46,21 @@ void append(Trajectory &trajectory, const StampedPose &pose, const CsvReader &cs
   trajectory.push_back(pose);
 }
 
-Trajectory nonEmpty(Trajectory trajectory, const std::string &path)
+/// \p unit of the stamps in the file.
+Trajectory checked(Trajectory trajectory, const std::string &path, const char *unit)
 {
+  constexpr double kSlowest_Hz = 0.05, kFastest_Hz = 20000;
+  constexpr std::size_t kFewest = 10; // poses that have a rate
   if (trajectory.empty())
     throw vpException(vpException::ioError, fmt::format("{}: no pose in it", path));
+  if (trajectory.size() < kFewest)
+    return trajectory;
+  const double rate_Hz = 1e9 * static_cast<double>(trajectory.size() - 1) /
+                         static_cast<double>(trajectory.back().stamp_ns - trajectory.front().stamp_ns);
+  if (rate_Hz < kSlowest_Hz || rate_Hz > kFastest_Hz)
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: {:.3g} poses a second, must be {:g} to {:g}: stamps must be in {}", path,
+                                  rate_Hz, kSlowest_Hz, kFastest_Hz, unit));
   return trajectory;
 }
 } // namespace
@@ -80,7 +91,7 @@ Trajectory readAslTrajectory(const std::string &path)
     const std::int64_t stamp_ns = csv.risingStampNs(0);
     append(trajectory, {stamp_ns, readPose(csv, {4, 5, 6, 7})}, csv);
   }
-  return nonEmpty(std::move(trajectory), path);
+  return checked(std::move(trajectory), path, "nanoseconds");
 }
 
 Trajectory readTumTrajectory(const std::string &path)
@@ -91,7 +102,7 @@ Trajectory readTumTrajectory(const std::string &path)
     const std::int64_t stamp_ns = csv.risingStampFromSeconds(0);
     append(trajectory, {stamp_ns, readPose(csv, {7, 4, 5, 6})}, csv);
   }
-  return nonEmpty(std::move(trajectory), path);
+  return checked(std::move(trajectory), path, "seconds");
 }
 
 Trajectory readTrajectory(const std::string &path)

@@ -19,18 +19,6 @@ constexpr std::uintmax_t kMostBytes = 1000000; ///< of a file that people write
 
 [[noreturn]] void fail(const std::string &message) { throw vpException(vpException::ioError, "%s", message.c_str()); }
 
-std::string readText(const std::string &path)
-{
-  if (!std::filesystem::is_regular_file(path))
-    fail(fmt::format("{}: no such file", path));
-  if (std::filesystem::file_size(path) > kMostBytes)
-    fail(fmt::format("{}: is larger than {} bytes", path, kMostBytes));
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    fail(fmt::format("{}: cannot be read", path));
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 /// The encoding, and brackets that the parser would follow into the depth.
 void checkText(const std::string &path, std::string &text)
 {
@@ -82,6 +70,18 @@ private:
 };
 } // namespace
 
+std::string readSmallFile(const std::string &path)
+{
+  if (!std::filesystem::is_regular_file(path))
+    fail(fmt::format("{}: no such file", path));
+  if (std::filesystem::file_size(path) > kMostBytes)
+    fail(fmt::format("{}: is larger than {} bytes", path, kMostBytes));
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    fail(fmt::format("{}: cannot be read", path));
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
 std::string placeOf(const std::string &path, const YAML::Mark &mark)
 {
   return mark.line < 0 ? path + ":1" : fmt::format("{}:{}", path, mark.line + 1);
@@ -89,7 +89,7 @@ std::string placeOf(const std::string &path, const YAML::Mark &mark)
 
 YAML::Node loadYaml(const std::string &path)
 {
-  std::string text = readText(path);
+  std::string text = readSmallFile(path);
   checkText(path, text);
   try {
     const YAML::Node root = YAML::Load(text);

@@ -13,9 +13,18 @@ namespace bole
 {
 namespace
 {
-constexpr const char *kFramesHeader = "frame,stamp,status,x,y,z,var_xx,var_xy,var_yy";
+constexpr const char *kFramesHeader = "frame,stamp,status,x,y,z,var_xx,var_xy,var_yy,reason";
 constexpr const char *kViewsHeader = "frame,stamp,id,range,sigma_range,radius,sigma_radius,x,y,sigma_x,sigma_y";
 constexpr const char *kEvidenceHeader = "x,y,points";
+
+/// \p text as a field of a table.
+std::string oneField(std::string text)
+{
+  for (char &c : text)
+    if (c == ',' || c == '\n' || c == '\r')
+      c = c == ',' ? ';' : ' ';
+  return text;
+}
 
 FrameStatus statusOf(const CsvReader &csv, std::size_t column)
 {
@@ -41,11 +50,12 @@ std::vector<std::pair<Eigen::Vector2d, int>> GroundEvidence::squares() const
 
 void writeTrace(const std::string &folder, const FlightTrace &trace)
 {
-  std::string text = fmt::format("{}\n# units,s,,m,m,m,m^2,m^2,m^2\n", kFramesHeader);
+  std::string text = fmt::format("{}\n# units,s,,m,m,m,m^2,m^2,m^2,\n", kFramesHeader);
   for (const FrameTrace &frame : trace.frames)
-    fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{:.4f},{:.4e},{:.4e},{:.4e}\n", frame.index,
+    fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{:.4f},{:.4e},{:.4e},{:.4e},{}\n", frame.index,
                    secondsText(frame.stamp_ns), toString(frame.status), frame.place.x(), frame.place.y(),
-                   frame.place.z(), frame.covariance_xy(0, 0), frame.covariance_xy(0, 1), frame.covariance_xy(1, 1));
+                   frame.place.z(), frame.covariance_xy(0, 0), frame.covariance_xy(0, 1), frame.covariance_xy(1, 1),
+                   oneField(frame.reason));
   writeAtomically(folder + "/frames.csv", text);
 
   text = fmt::format("{}\n# units,s,,m,m,m,m,m,m,m,m\n", kViewsHeader);
@@ -65,7 +75,7 @@ void writeTrace(const std::string &folder, const FlightTrace &trace)
 FlightTrace readTrace(const std::string &folder)
 {
   FlightTrace trace;
-  CsvReader frames(folder + "/frames.csv", {9, ',', kFramesHeader});
+  CsvReader frames(folder + "/frames.csv", {10, ',', kFramesHeader});
   while (frames.next()) {
     FrameTrace frame;
     frame.index = static_cast<std::size_t>(frames.integer(0, "frame"));
@@ -74,6 +84,7 @@ FlightTrace readTrace(const std::string &folder)
     frame.place = {frames.number(3, "x"), frames.number(4, "y"), frames.number(5, "z")};
     const double xy = frames.number(7, "var_xy");
     frame.covariance_xy << frames.number(6, "var_xx"), xy, xy, frames.number(8, "var_yy");
+    frame.reason = frames.text(9);
     trace.frames.push_back(frame);
   }
   CsvReader views(folder + "/views.csv", {11, ',', kViewsHeader});

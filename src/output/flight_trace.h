@@ -20,6 +20,7 @@ struct FrameTrace
   FrameStatus status = FrameStatus::ok;
   Eigen::Vector3d place = Eigen::Vector3d::Zero();         ///< of the body in the world [m]
   Eigen::Matrix2d covariance_xy = Eigen::Matrix2d::Zero(); ///< [m^2], the common error of the scale left out
+  std::string reason = {};                                 ///< why the status is not ok
 };
 
 /// A confirmed trunk as a frame measured it.

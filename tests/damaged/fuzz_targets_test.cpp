@@ -9,6 +9,7 @@
 #include "ardrone/recording.h"
 #include "ardrone/uvlc.h"
 #include "lab/emulator/h264_encoder.h"
+#include "output/video_writer.h"
 #include <bole/graph.h>
 
 #include "support/flight.h"
@@ -20,15 +21,23 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <sstream>
+#include <visp3/core/vpImageConvert.h>
 
 extern "C" {
+int fuzz_camera(const std::uint8_t *data, std::size_t size);
+int fuzz_cao(const std::uint8_t *data, std::size_t size);
 int fuzz_g2o(const std::uint8_t *data, std::size_t size);
+int fuzz_image(const std::uint8_t *data, std::size_t size);
 int fuzz_navdata(const std::uint8_t *data, std::size_t size);
+int fuzz_options(const std::uint8_t *data, std::size_t size);
 int fuzz_pave(const std::uint8_t *data, std::size_t size);
 int fuzz_recording(const std::uint8_t *data, std::size_t size);
+int fuzz_tables(const std::uint8_t *data, std::size_t size);
 int fuzz_uvlc(const std::uint8_t *data, std::size_t size);
+int fuzz_video(const std::uint8_t *data, std::size_t size);
 }
 
 namespace
@@ -102,6 +111,22 @@ void addCaptured(std::vector<Bytes> &good, const std::string &name, std::size_t 
   bytes.resize(std::min(bytes.size(), most));
   if (!bytes.empty())
     good.push_back(std::move(bytes));
+}
+
+Bytes bytesOf(const std::string &path, std::size_t most = 1 << 20)
+{
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file) << path;
+  Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  bytes.resize(std::min(bytes.size(), most));
+  return bytes;
+}
+
+/// The target of camera files reads XML where the first byte says so.
+Bytes withKind(std::uint8_t kind, Bytes bytes)
+{
+  bytes.insert(bytes.begin(), kind);
+  return bytes;
 }
 
 vpImage<unsigned char> scene(unsigned width, unsigned height, int shift)
@@ -190,4 +215,69 @@ TEST(FuzzTargets, DamagedGraphs)
   const std::string text = out.str();
   ASSERT_GT(text.size(), 1000u);
   expectSurvives("g2o", fuzz_g2o, {Bytes(text.begin(), text.end())}, 1500);
+}
+
+TEST(FuzzTargets, DamagedCameraFiles)
+{
+  const std::string root = BOLE_SOURCE_DIR;
+  const std::string opencv =
+      "1image_width: 320\nimage_height: 240\ncamera_matrix: {rows: 3, cols: 3, data: [200, 0, 160, "
+      "0, 201, 120, 0, 0, 1]}\ndistortion_coefficients: [-0.2, 0.05, 0, 0, 0.01]\n";
+  const std::string xml = "0<root><camera><name>c</name><image_width>320</image_width><image_height>240</image_height>"
+                          "<model><type>perspectiveProjWithoutDistortion</type><px>200</px><py>200</py><u0>160</u0>"
+                          "<v0>120</v0></model></camera></root>";
+  expectSurvives("camera", fuzz_camera,
+                 {withKind(1, bytesOf(root + "/data/park-forward/mav0/cam0/sensor.yaml")),
+                  withKind(1, bytesOf(root + "/config/cameras/ardrone1.yaml")), Bytes(opencv.begin(), opencv.end()),
+                  withKind(0, Bytes(xml.begin() + 1, xml.end()))},
+                 4000);
+}
+
+TEST(FuzzTargets, DamagedOptions)
+{
+  const std::string config = std::string(BOLE_SOURCE_DIR) + "/config";
+  expectSurvives("options", fuzz_options, {bytesOf(config + "/default.yaml"), bytesOf(config + "/ardrone1.yaml")},
+                 1500);
+}
+
+TEST(FuzzTargets, DamagedTables)
+{
+  const std::string flight = std::string(BOLE_SOURCE_DIR) + "/data/park-forward/";
+  const std::string tum = "# time x y z qx qy qz qw\n0.1 0 0 1 0 0 0 1\n0.2 0.1 0 1 0 0 0 1\n3.5e-1 1 0 1 0 0 0 1\n";
+  expectSurvives("tables", fuzz_tables,
+                 {bytesOf(flight + "mav0/odom0/data.csv", 2000), bytesOf(flight + "trees.csv", 1000),
+                  Bytes(tum.begin(), tum.end())},
+                 4000);
+}
+
+TEST(FuzzTargets, DamagedModels)
+{
+  expectSurvives("cao", fuzz_cao, {bytesOf(std::string(BOLE_SOURCE_DIR) + "/models/park-forward.cao", 3000)}, 4000);
+}
+
+TEST(FuzzTargets, DamagedImages)
+{
+  std::vector<Bytes> good;
+  const vpImage<unsigned char> I = scene(64, 48, 0);
+  const cv::Mat image(48, 64, CV_8UC1, I.bitmap);
+  for (const char *kind : {".png", ".jpg", ".pgm", ".bmp", ".tiff"}) {
+    good.emplace_back();
+    cv::imencode(kind, image, good.back());
+  }
+  expectSurvives("image", fuzz_image, good, 6000);
+}
+
+TEST(FuzzTargets, DamagedVideos)
+{
+  const std::string path = testing::TempDir() + "bole_fuzz_video.mp4";
+  {
+    VideoWriter writer(path);
+    vpImage<vpRGBa> colour;
+    for (int i = 0; i < 12; ++i) {
+      vpImageConvert::convert(scene(96, 64, i), colour);
+      writer.write(colour, 100'000'000LL * i);
+    }
+    writer.finish();
+  }
+  expectSurvives("video", fuzz_video, {bytesOf(path)}, 150);
 }

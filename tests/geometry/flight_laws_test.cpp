@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 
+#include <bole/visp.h>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>

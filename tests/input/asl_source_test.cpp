@@ -178,6 +178,9 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
       {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,1e9,0,1,1,0,0,0\n", "odom0/data.csv:2: position"},
       {"mav0/odom0/data.csv", "0,0,0,1,1,0,0,0\n100000000,900,0,1,1,0,0,0\n", "odom0/data.csv:2: speed"},
       {"mav0/cam0/data.csv", "100,a.png\n50,b.png\n", "cam0/data.csv:2: timestamp = 50 ns"},
+      {"mav0/imu0/data.csv", "\xFF\xFE\x30", "imu0/data.csv:1: is text in UTF-16"},
+      {"mav0/imu0/data.csv", "0,\x1B[2J,0,0\n", "imu0/data.csv:1: w_x = \"?[2J\", must be a finite number"},
+      {"mav0/cam0/data.csv", "0,0000.png\n100000,0001.png\n200000,0002.png\n", "must be in nanoseconds"},
       {"mav0/cam0/data.csv", "#nothing\n", "cam0/data.csv: no image"},
       {"mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\nfoo: 1\n",
        "sensor.yaml:3: unknown key \"foo\""},
@@ -202,6 +205,86 @@ TEST(AslSource, ReadsAByteOrderMarkAndAHeaderWithoutItsSign)
   flight.write("mav0/imu0/data.csv", "\xEF\xBB\xBF#timestamp\n0,0,0,0\n100000000,0,0,0\n");
   AslSource source(flight.path());
   EXPECT_TRUE(readAll(source)[1].wMb_odometry);
+}
+
+/// imu0/data.csv of ten samples with this specific force.
+std::string imuWith(const char *force)
+{
+  std::string text;
+  for (int k = 0; k < 12; ++k)
+    text += fmt::format("{},0,0,0.1,{}\n", 10000000 * k, force);
+  return text;
+}
+
+TEST(AslSource, NamesTheUnitOfAnAccelerometerThatDoesNotFeelGravity)
+{
+  const std::pair<const char *, const char *> cases[] = {{"0,0,1.01", "looks like g"},
+                                                         {"0,-998,0", "looks like thousandths of g"},
+                                                         {"0.1,0,0.05", "gravity were taken out"},
+                                                         {"0,0,981", "must be 4 to 25"}};
+  for (const auto &[force, message] : cases) {
+    FlightFolder flight(3);
+    flight.write("mav0/imu0/data.csv", imuWith(force));
+    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(message)) << force;
+  }
+  FlightFolder without(3);
+  without.write("mav0/imu0/data.csv", imuWith("0,0,0"));
+  AslSource source(without.path());
+  const auto frames = readAll(source);
+  ASSERT_FALSE(frames[1].gyro.empty());
+  EXPECT_FALSE(frames[1].gyro[0].force); // columns of zeros are no accelerometer
+}
+
+TEST(AslSource, NamesASlowGyroInDegrees)
+{
+  const auto refusal = [](double unit) {
+    constexpr std::size_t kFrames = 40;
+    FlightFolder flight(kFrames);
+    std::string poses, rates;
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      const double yaw = 0.03 * std::sin(0.3 * static_cast<double>(i)); // at most 0.09 rad/s: 5.2 degrees a second
+      poses += fmt::format("{},0,0,1,{:.9f},0,0,{:.9f}\n", i * 100000000, std::cos(yaw / 2), std::sin(yaw / 2));
+    }
+    for (std::size_t k = 1; k <= 10 * kFrames; ++k)
+      rates += fmt::format("{},0,0,{:.6f}\n", k * 10000000,
+                           unit * 0.09 * std::cos(0.3 * (static_cast<double>(k) - 0.5) / 10));
+    flight.write("mav0/odom0/data.csv", poses);
+    flight.write("mav0/imu0/data.csv", rates);
+    return messageOf([&] { AslSource source(flight.path()); });
+  };
+  EXPECT_EQ(refusal(1), "");
+  EXPECT_EQ(refusal(-1), "");
+  EXPECT_THAT(refusal(180 / M_PI), HasSubstr("looks like degrees per second"));
+}
+
+TEST(AslSource, DecodesOnlyWhatTellsItsSize)
+{
+  FlightFolder flight(4);
+  const auto replace = [&flight](std::size_t i, const std::string &bytes) {
+    std::ofstream(flight.imagePath(i), std::ios::binary) << bytes;
+  };
+  replace(1, "P5 # a comment\n30000 30000 255\n");
+  replace(2, "RIFF....WEBPVP8 ");
+  AslSource source(flight.path());
+  const auto frames = readAll(source);
+  EXPECT_EQ(frames[1].status, FrameStatus::resized);
+  EXPECT_THAT(frames[1].message, HasSubstr("image of 30000x30000 px, must be 64x48"));
+  EXPECT_EQ(frames[2].status, FrameStatus::corrupt);
+  EXPECT_THAT(frames[2].message, HasSubstr("must be a PNG, JPEG, PNM, BMP or TIFF"));
+  EXPECT_EQ(frames[3].status, FrameStatus::ok);
+}
+
+TEST(AslSource, ReadsEveryKindOfImage)
+{
+  for (const char *kind : {".png", ".jpg", ".pgm", ".bmp", ".tiff"}) {
+    FlightFolder flight(2);
+    const cv::Mat image = cv::imread(flight.imagePath(1), cv::IMREAD_GRAYSCALE);
+    const std::string path = testing::TempDir() + "bole_kind" + kind;
+    cv::imwrite(path, image);
+    std::filesystem::rename(path, flight.imagePath(1)); // what it is stands in its bytes, not in its name
+    AslSource source(flight.path());
+    EXPECT_EQ(readAll(source)[1].status, FrameStatus::ok) << kind;
+  }
 }
 
 TEST(AslSource, RefusesFoldersThatAreNoFlight)

@@ -154,7 +154,23 @@ TEST_F(CameraFile, RefusesCamerasThatCannotBe)
   EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [0,0,1,1.0e+9, -1,0,0,0, 0,-1,0,0, 0,0,0,1]\n"),
               HasSubstr("from the body"));
   EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"),
-              HasSubstr("no rotation"));
+              HasSubstr("c.yaml:3: T_BS: T_BS has no rotation"));
+  EXPECT_THAT(refusal("intrinsics: [200, 2000, 160, 120]\n"), HasSubstr("c.yaml:2: intrinsics: fx / fy"));
+  EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\ndistortion_model: equidistant\n"
+                      "distortion_coefficients: [-9, 0, 0, 0]\n"),
+              HasSubstr("c.yaml:4: distortion_coefficients: the distortion folds"));
+}
+
+TEST_F(CameraFile, AnXmlOfAnySizeIsRefusedInALine)
+{
+  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", "<name>" + std::string(900'000, ' '))); }),
+              HasSubstr("0 ViSP cameras"));
+  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", std::string(2'000'000, '<'))); }),
+              HasSubstr("larger than 1000000 bytes"));
+  std::string many;
+  for (int k = 0; k < 200; ++k)
+    many += "<name>" + std::to_string(k) + "</name>";
+  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", many)); }), HasSubstr("200 names in it, must be at most 100"));
 }
 
 TEST_F(CameraFile, NamesFileLineAndKeyOfAMistake)

@@ -3,10 +3,14 @@
 #include "support/drawn_trunks.h"
 
 #include "input/gyro_agreement.h"
+#include "input/image_file.h"
 #include "input/image_health.h"
 
 #include <algorithm>
+#include <fmt/format.h>
+#include <functional>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <visp3/core/vpException.h>
 
@@ -91,7 +95,104 @@ TEST(ImageHealth, AFrozenImageIsNamedUnderFreshNoiseAndWithAClockInItsCorner)
   EXPECT_EQ(health.check(image(7)), ImageFault::none) << health.reason();
 }
 
-/// A flight that turns about two axes; \p late: frames by which the images lag, \p sign: of the horizontal shift.
+TEST(ImageHealth, NamesWhatStandsOtherwiseUntilOneFollowsTheLastGoodImageAgain)
+{
+  using Spoil = std::function<cv::Mat(const cv::Mat &)>;
+  const auto flipped = [](int code) {
+    return [code](const cv::Mat &I) {
+      cv::Mat out;
+      cv::flip(I, out, code);
+      return out;
+    };
+  };
+  const std::pair<ImageFault, Spoil> cases[] = {
+      {ImageFault::mirrored, flipped(1)},
+      {ImageFault::upside_down, flipped(-1)},
+      {ImageFault::negative, [](const cv::Mat &I) { return cv::Mat(255 - I); }},
+      {ImageFault::cropped,
+       [](const cv::Mat &I) {
+         cv::Mat out;
+         cv::resize(I({I.cols / 6, I.rows / 6, I.cols * 2 / 3, I.rows * 2 / 3}), out, I.size());
+         return out;
+       }},
+      {ImageFault::torn,
+       [](const cv::Mat &I) {
+         cv::Mat out = I.clone(), other;
+         cv::flip(I, other, -1);
+         other.rowRange(I.rows / 2, I.rows).copyTo(out.rowRange(I.rows / 2, I.rows));
+         return out;
+       }},
+  };
+  const auto image = [](unsigned k) { // of the demonstration flight: drawn woods are too much alike
+    const ImageFile file = readImageFile(
+        fmt::format("{}/data/park-forward/mav0/cam0/data/{:013}.png", BOLE_SOURCE_DIR, 100'000'000LL * (45 + k)));
+    EXPECT_EQ(file.status, FrameStatus::ok) << file.message;
+    return file.image;
+  };
+  for (const auto &[fault, spoil] : cases) {
+    ImageHealth health;
+    health.start(image(0));
+    for (unsigned k = 1; k < 10; ++k) {
+      vpImage<unsigned char> I = image(k);
+      const bool is_spoilt = k >= 4 && k < 8;
+      if (is_spoilt) {
+        const cv::Mat now(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
+        spoil(now.clone()).copyTo(now);
+      }
+      EXPECT_EQ(health.check(I), is_spoilt ? fault : ImageFault::none)
+          << toString(fault) << " " << k << health.reason();
+    }
+  }
+}
+
+/// A flight that turns about two axes.
+Eigen::Vector2d turnAt(int k) { return {0.03 * std::sin(0.9 * k), 0.02 * std::sin(1.7 * k + 1)}; }
+
+/// What the images show of it, with the slow shift of a translation and a little noise.
+Eigen::Vector2d shownAt(int k) { return turnAt(k) + Eigen::Vector2d(0.004, 0.002 * std::sin(5.0 * k)); }
+
+TEST(GyroAgreement, TellsInASecondThatImagesBecameLate)
+{
+  for (const int late : {-2, 1, 3}) {
+    GyroAgreement agreement;
+    int named_after = -1;
+    for (int k = 0; k < 60; ++k) {
+      const bool is_late = k >= 30 && k < 45;
+      const auto verdict = agreement.add({shownAt(is_late ? k - late : k), turnAt(k), {}, false, true});
+      EXPECT_TRUE(k >= 30 || verdict == GyroAgreement::Verdict::agrees);
+      if (verdict == GyroAgreement::Verdict::late && named_after < 0) {
+        named_after = k - 30;
+        EXPECT_EQ(agreement.lag(), late);
+      }
+      EXPECT_TRUE(k < 55 || verdict == GyroAgreement::Verdict::agrees) << k; // and that they are not any more
+    }
+    EXPECT_GE(named_after, 0) << late;
+    EXPECT_LE(named_after, 10) << late;
+  }
+}
+
+TEST(GyroAgreement, TellsTheOneImageThatDoesNotFollow)
+{
+  GyroAgreement agreement;
+  for (int k = 0; k < 40; ++k) {
+    const Eigen::Vector2d off(k == 30 ? 0.03 : 0, 0);
+    EXPECT_EQ(agreement.add({shownAt(k) + off, turnAt(k), {}, true, true}),
+              k == 30 ? GyroAgreement::Verdict::jumped : GyroAgreement::Verdict::agrees)
+        << k;
+  }
+}
+
+TEST(GyroAgreement, SaysNothingOfACameraThatHardlyTurns)
+{
+  GyroAgreement agreement;
+  for (int k = 0; k < 60; ++k) // the images wander by parallax alone
+    EXPECT_EQ(
+        agreement.add({0.02 * Eigen::Vector2d(std::sin(0.2 * k), std::cos(0.31 * k)), 0.05 * turnAt(k), {}, true}),
+        GyroAgreement::Verdict::agrees)
+        << k;
+}
+
+/// \p late: frames by which the images lag, \p sign: of the horizontal shift.
 GyroAgreement::Verdict verdictOf(int late, double sign, int frames = 40)
 {
   GyroAgreement agreement;

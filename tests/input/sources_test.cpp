@@ -87,6 +87,15 @@ TEST_F(Sources, AFolderOfNumberedImagesIsASequence)
   EXPECT_EQ(readAll(*openSource(path("plain/a%d.ppm"))).size(), 4u);
 }
 
+TEST_F(Sources, AHoleOfManyNumbersIsRefused)
+{
+  m_flight.write("big99999999999999999999.png", "no number of an image");
+  EXPECT_THAT(messageOf([&] { SequenceSource(path("big%d.png")); }), HasSubstr("no such image"));
+  writeImages("hole%d.png", {1, 500000});
+  EXPECT_THAT(messageOf([&] { SequenceSource(path("hole%d.png")); }),
+              HasSubstr("no image from number 2 to 499999, must be at most 10000 in a row"));
+}
+
 TEST_F(Sources, ATruncatedJpegIsCorrupt)
 {
   writeImages("a%02d.jpg", {0, 1, 2});
@@ -258,6 +267,19 @@ TEST(SourceOptions, NameTheValueThatIsOutOfRange)
   options = {};
   options.frame_rate_hz = 0;
   EXPECT_THAT(messageOf([&] { options.validate(); }), HasSubstr("frame_rate_hz = 0, must be"));
+}
+
+TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHas)
+{
+  std::string asl, tum;
+  for (int k = 0; k < 20; ++k) {
+    asl += fmt::format("{},{},0,1,1,0,0,0\n", 100 * k, 0.1 * k); // milliseconds
+    tum += fmt::format("{} {} 0 1 0 0 0 1\n", 100 * k, 0.1 * k); // too
+  }
+  m_flight.write("poses.csv", asl);
+  m_flight.write("poses.tum", tum);
+  EXPECT_THAT(messageOf([&] { readTrajectory(path("poses.csv")); }), HasSubstr("stamps must be in nanoseconds"));
+  EXPECT_THAT(messageOf([&] { readTrajectory(path("poses.tum")); }), HasSubstr("stamps must be in seconds"));
 }
 
 TEST(Trajectory, InterpolatesOnSe3)

@@ -37,6 +37,8 @@ pid_t start(const std::string &folder)
 {
   const pid_t child = fork();
   if (child == 0) {
+    for (const int each : {SIGHUP, SIGINT, SIGPIPE, SIGTERM})
+      std::signal(each, SIG_DFL); // whoever runs the tests may ignore them
     if (freopen("/dev/null", "w", stderr) && freopen("/dev/null", "w", stdout))
       execl(BOLE_EXECUTABLE, "bole", "track", kFlight.c_str(), "-o", folder.c_str(), "--no-video", nullptr);
     _exit(127);

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Every fault of the lists is put into a copy of a flight, `bole track` is run on it, and what came of it is judged.
+//
+//   fault_table BOLE FLIGHT WORK [--part N] [--only NAME...] [--table FILE]
+//
+// --part N takes every N-th fault that needs a run (those that are refused cost nothing and are all taken), --table
+// writes the table for the documentation. Exit status 1 where a fault falls short that is not known to.
+#include "fault_list.h"
+
+#include "output/atomic_file.h"
+#include "support/shell.h"
+#include <bole/evaluation.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <visp3/core/vpException.h>
+
+namespace
+{
+using namespace bole;
+using namespace bole::faults;
+namespace fs = std::filesystem;
+
+constexpr double kLoss = 0.1; ///< of recall or precision that a fault may cost in silence
+constexpr double kSoon_s = 1; ///< in which a fault must be named
+constexpr double kFrame_s = 1 / kRate_hz;
+
+/// What is known to fall short, with the reason in the documentation.
+const std::set<std::string> kKnown = {"rolling_20", "stamps_15ms", "stamps_30ms", "jpeg"};
+
+/// No run may take longer, or more memory: a hang and a hoard are findings.
+#if defined(__SANITIZE_ADDRESS__)
+const char *const kBounds = "";
+#else
+const char *const kBounds = "ulimit -v 6000000; ";
+#endif
+const char *const kTimeout = "timeout -k 5 300 ";
+
+std::string bytesOf(const fs::path &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// How good a run is, and what it says went wrong.
+struct Result
+{
+  int status = 0;
+  double recall = 0, precision = 0, ate = 0;
+  std::size_t frames = 0; ///< that were not used
+  double named_s = -1;    ///< stamp of the first of these [s]; < 0: none
+  std::string names;      ///< how they and the sensors are named
+};
+
+/// Frames that frames.csv calls anything but ok.
+void readFrames(const fs::path &run, double since_s, Result &result)
+{
+  std::ifstream file(run / "frames.csv");
+  std::string line;
+  std::getline(file, line);
+  std::vector<std::string> names;
+  while (std::getline(file, line)) {
+    std::istringstream text(line);
+    std::vector<std::string> fields;
+    for (std::string field; std::getline(text, field, ',');)
+      fields.push_back(field);
+    if (line[0] == '#' || fields.size() < 3 || fields[2] == "ok")
+      continue;
+    ++result.frames;
+    const double stamp_s = std::stod(fields[1]);
+    if (result.named_s < 0 && stamp_s > since_s - kFrame_s)
+      result.named_s = stamp_s;
+    const std::string reason = fields.size() > 9 && !fields[9].empty() ? fields[9] : fields[2];
+    const std::string name =
+        fields[2] == "doubtful" ? reason.substr(0, reason.find_first_of(":0123456789")) : fields[2];
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      names.push_back(name);
+  }
+  for (const std::string &name : names)
+    result.names += (result.names.empty() ? "" : ", ") + name.substr(0, 40);
+}
+
+void readSensors(const fs::path &run, Result &result)
+{
+  const auto summary = nlohmann::json::parse(bytesOf(run / "summary.json"));
+  for (const auto &sensor : summary.at("sensors")) {
+    const double since_s = sensor.at("since_s");
+    result.named_s = result.named_s < 0 ? since_s : std::min(result.named_s, since_s);
+    result.names += (result.names.empty() ? "" : ", ") + sensor.at("text").get<std::string>();
+  }
+}
+
+Result judgeRun(const fs::path &run, const std::string &flight, double since_s, int status)
+{
+  Result result;
+  result.status = status;
+  if (!fs::exists(run / "trajectory.tum"))
+    return result;
+  readFrames(run, since_s, result);
+  readSensors(run, result);
+  try {
+    const Evaluation evaluation = evaluate(run.string(), flight);
+    result.ate = evaluation.smoothed.absolute[static_cast<std::size_t>(Alignment::xy_yaw)].ate;
+    if (evaluation.trunks) {
+      result.recall = evaluation.trunks->recall;
+      result.precision = evaluation.trunks->confirmed > 0 ? evaluation.trunks->precision : 0;
+    }
+  }
+  catch (const vpException &error) {
+    result.names += fmt::format("; evaluation: {}", error.getStringMessage());
+  }
+  return result;
+}
+
+/// One line of the table.
+struct Line
+{
+  const Fault *fault;
+  std::string seen, figures = "| | ";
+  bool is_good = false;
+};
+
+class Trial
+{
+public:
+  Trial(std::string bole, std::string flight, fs::path work)
+      : m_bole(std::move(bole)), m_flight(std::move(flight)), m_work(std::move(work))
+  {
+    fs::remove_all(m_work);
+    fs::create_directories(m_work);
+    SpoiltFlight whole(m_flight, "none");
+    m_clean_run = m_work / "clean";
+    const test::Outcome outcome = track(whole, m_clean_run, "");
+    clean = judgeRun(m_clean_run, m_flight, 0, outcome.status);
+  }
+
+  Line judge(const Fault &fault)
+  {
+    Line line{&fault, {}};
+    const fs::path run = m_work / "run";
+    fs::remove_all(run);
+    if (fault.process) {
+      fs::create_directories(run);
+      const Seen seen = fault.process({m_bole, m_flight, run.string()});
+      line.seen = seen.text;
+      line.is_good = seen.is_right;
+      return line;
+    }
+    SpoiltFlight flight(m_flight, fault.name);
+    fault.spoil(flight);
+    const test::Outcome outcome = track(flight, run, fault.arguments);
+    if (fault.duty == Duty::refuse)
+      judgeRefusal(fault, outcome, run, line);
+    else if (fault.duty == Duty::read)
+      judgeReading(run, outcome, line);
+    else
+      judgeSurvival(fault, outcome, run, line);
+    return line;
+  }
+
+  Result clean;
+
+private:
+  test::Outcome track(const SpoiltFlight &flight, const fs::path &run, const std::string &arguments)
+  {
+    const fs::path copy = m_work / "copy";
+    flight.write(copy);
+    return test::runShell(fmt::format("{}{}{} track {} -o {} --no-video -q {}", kBounds, kTimeout, m_bole,
+                                      copy.string(), run.string(), arguments));
+  }
+
+  static std::string firstLine(const std::string &text) { return text.substr(0, text.find('\n')); }
+
+  void judgeRefusal(const Fault &fault, const test::Outcome &outcome, const fs::path &run, Line &line) const
+  {
+    std::string said = firstLine(outcome.text);
+    for (const std::string &folder : {(m_work / "copy").string() + "/mav0/", (m_work / "copy").string() + "/"})
+      for (std::size_t at = said.find(folder); at != std::string::npos; at = said.find(folder))
+        said.erase(at, folder.size());
+    line.seen = fmt::format("`{}`", said.size() > 160 ? said.substr(0, 157) + "..." : said);
+    line.is_good = (outcome.status == 1 || outcome.status == 2) && outcome.text.find(fault.says) != std::string::npos &&
+                   !fs::exists(run / "trunks.csv");
+    if (outcome.status != 1 && outcome.status != 2)
+      line.seen = fmt::format("EXIT {}: {}", outcome.status, line.seen);
+  }
+
+  void judgeReading(const fs::path &run, const test::Outcome &outcome, Line &line) const
+  {
+    line.is_good = outcome.status == 0;
+    for (const char *file : {"trunks.csv", "trajectory.tum"})
+      line.is_good = line.is_good && bytesOf(run / file) == bytesOf(m_clean_run / file);
+    line.seen = line.is_good ? "the same bytes" : fmt::format("exit {}: {}", outcome.status, firstLine(outcome.text));
+  }
+
+  void judgeSurvival(const Fault &fault, const test::Outcome &outcome, const fs::path &run, Line &line) const
+  {
+    const Result result = judgeRun(run, m_flight, fault.since_s, outcome.status);
+    const bool has_ended = outcome.status == 0 || outcome.status == 3;
+    const bool is_kept = result.recall >= clean.recall - kLoss && result.precision >= clean.precision - kLoss;
+    const bool is_named = result.named_s >= 0 && result.named_s <= fault.since_s + kSoon_s + 1e-6;
+    line.is_good = has_ended && (is_kept || is_named);
+    if (!has_ended)
+      line.seen = fmt::format("EXIT {}: {}", outcome.status, firstLine(outcome.text));
+    else if (result.names.empty())
+      line.seen = is_kept ? "nothing lost" : "SILENT";
+    else
+      line.seen = fmt::format(
+          "{}{}{}", result.names, result.frames > 0 ? fmt::format(" ({} frames", result.frames) : "",
+          result.frames == 0   ? ""
+          : result.named_s < 0 ? ")"
+                               : fmt::format(", {:.1f} s after)", std::max(0.0, result.named_s - fault.since_s)));
+    line.figures = fmt::format("{:.3f} | {:.2f} | {:.2f}", result.ate, result.recall, result.precision);
+  }
+
+  std::string m_bole, m_flight;
+  fs::path m_work, m_clean_run;
+};
+
+std::vector<Fault> allFaults()
+{
+  std::vector<Fault> all;
+  for (const auto &part : {pictureFaults(), sensorFaults(), fileFaults(), processFaults()})
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+std::string rowOf(const Line &line)
+{
+  const bool is_known = kKnown.count(line.fault->name) > 0;
+  return fmt::format("| `{}` | {} | {} | {} | {} |\n", line.fault->name, line.fault->what, line.seen, line.figures,
+                     line.is_good ? "yes"
+                     : is_known   ? "no"
+                                  : "**NO**");
+}
+
+std::string tableOf(const std::vector<Line> &lines, const Result &clean)
+{
+  std::string text, group;
+  text += fmt::format("Without a fault: ATE {:.3f} m, recall {:.2f}, precision {:.2f}, {} frames named.\n", clean.ate,
+                      clean.recall, clean.precision, clean.frames);
+  for (const Line &line : lines) {
+    if (line.fault->group != group)
+      text += fmt::format("\n| {} | what it is | what is seen | ATE [m] | recall | precision | held |\n"
+                          "|---|---|---|---|---|---|---|\n",
+                          group = line.fault->group);
+    text += rowOf(line);
+  }
+  return text;
+}
+
+/// What stands between the marks of \p path is replaced by \p table.
+void writeTable(const std::string &path, const std::string &table)
+{
+  const std::string begin = "<!-- faults -->\n", end = "<!-- end -->";
+  const std::string text = bytesOf(path);
+  const std::size_t from = text.find(begin), to = text.find(end, from);
+  if (from == std::string::npos || to == std::string::npos)
+    throw std::runtime_error(path + ": must hold the lines \"<!-- faults -->\" and \"<!-- end -->\"");
+  writeAtomically(path, text.substr(0, from + begin.size()) + table + text.substr(to));
+}
+
+int run(const std::vector<std::string> &words)
+{
+  std::size_t part = 1;
+  std::string table;
+  std::set<std::string> only;
+  for (std::size_t i = 3; i + 1 < words.size(); i += 2) {
+    if (words[i] == "--part")
+      part = std::stoul(words[i + 1]);
+    else if (words[i] == "--table")
+      table = words[i + 1];
+    else if (words[i] == "--only")
+      only.insert(words[i + 1]);
+  }
+  Trial trial(words[0], words[1], words[2]);
+  fmt::print("clean: ATE {:.3f} m, recall {:.2f}, precision {:.2f}, {} frames named, exit {}\n", trial.clean.ate,
+             trial.clean.recall, trial.clean.precision, trial.clean.frames, trial.clean.status);
+  const std::vector<Fault> all = allFaults();
+  std::vector<Line> lines;
+  std::size_t runs = 0, short_of = 0;
+  for (const Fault &fault : all) {
+    if (!only.empty() ? only.count(fault.name) == 0 : fault.duty != Duty::refuse && runs++ % part != 0)
+      continue;
+    lines.push_back(trial.judge(fault));
+    fmt::print("{}", rowOf(lines.back()));
+    std::fflush(stdout);
+    short_of += lines.back().is_good || kKnown.count(fault.name) > 0 ? 0 : 1;
+  }
+  fmt::print("{} faults, {} fall short\n", lines.size(), short_of);
+  if (!table.empty())
+    writeTable(table, tableOf(lines, trial.clean));
+  const bool is_clean = trial.clean.status == 0 && trial.clean.frames == 0 && trial.clean.recall > 0;
+  return is_clean && short_of == 0 && !lines.empty() ? 0 : 1;
+}
+} // namespace
+
+int main(int argc, char **argv)
+{
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() < 3) {
+    fmt::print(stderr, "fault_table BOLE FLIGHT WORK [--part N] [--only NAME]... [--table FILE]\n");
+    return 2;
+  }
+  try {
+    return run(words);
+  }
+  catch (const std::exception &error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
+}

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What happens to a process: signals, a full disk, a small stack, a reader that goes away, two at once.
+#include "fault_list.h"
+
+#include "support/shell.h"
+
+#include <chrono>
+#include <csignal>
+#include <fmt/format.h>
+#include <fstream>
+#include <iterator>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace bole::faults
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+std::string bytesOf(const fs::path &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::size_t posesIn(const fs::path &run)
+{
+  std::ifstream file(run / "trajectory.tum");
+  std::size_t count = 0;
+  for (std::string line; std::getline(file, line);)
+    count += line.front() != '#';
+  return count;
+}
+
+std::size_t hiddenIn(const fs::path &run)
+{
+  std::size_t count = 0;
+  for (const auto &entry : fs::directory_iterator(run))
+    count += entry.path().filename().string().front() == '.';
+  return count;
+}
+
+std::string trackOf(const Shop &shop, const std::string &run, const std::string &more = " --no-video")
+{
+  return shop.bole + " track " + shop.flight + " -o " + run + more;
+}
+
+/// A run that gets \p signal when it has first written what it knows. \return its status as waitpid() tells it.
+int runUntil(const Shop &shop, const std::string &run, int signal)
+{
+  const pid_t child = fork();
+  if (child == 0) {
+    for (const int each : {SIGHUP, SIGINT, SIGPIPE, SIGTERM})
+      std::signal(each, SIG_DFL); // whoever runs this may ignore them
+    if (freopen("/dev/null", "w", stderr) && freopen("/dev/null", "w", stdout))
+      execl(shop.bole.c_str(), "bole", "track", shop.flight.c_str(), "-o", run.c_str(), "--no-video", nullptr);
+    _exit(127);
+  }
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(300);
+  while (!fs::exists(run + "/summary.json") && std::chrono::steady_clock::now() < give_up)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  kill(child, signal);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return status;
+}
+
+Fault process(const std::string &name, const std::string &what, const std::function<Seen(const Shop &)> &seen)
+{
+  return {"process", name, what, Duty::keep, {}, {}, {}, seen};
+}
+
+Fault interrupted(const std::string &name, int signal)
+{
+  return process(name, name + " after 50 frames or more", [signal](const Shop &shop) {
+    const std::string run = shop.folder + "/run";
+    const int status = runUntil(shop, run, signal);
+    const std::size_t poses = posesIn(run);
+    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return Seen{code == 130 && poses >= 50 && fs::exists(run + "/trunks.csv") && hiddenIn(run) == 0,
+                fmt::format("exit {}, {} poses kept", code, poses)};
+  });
+}
+
+Seen killedAndResumed(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run", whole = shop.folder + "/whole";
+  runUntil(shop, run, SIGKILL);
+  std::ofstream(run + "/.overlay.partial.mp4") << "half";
+  const std::size_t kept = posesIn(run);
+  const int resumed = test::runShell(shop.bole + " track -q --resume " + run).status;
+  const int unbroken = test::runShell(trackOf(shop, whole, " --no-video -q")).status;
+  bool is_same = resumed == 0 && unbroken == 0 && kept >= 50;
+  for (const char *file : {"/trajectory.tum", "/trunks.csv", "/graph.g2o"})
+    is_same = is_same && bytesOf(run + file) == bytesOf(whole + file);
+  return {is_same && hiddenIn(run) == 0, fmt::format("{} poses kept; --resume: exit {}, {}", kept, resumed,
+                                                     is_same ? "the same bytes" : "OTHER BYTES")};
+}
+
+Seen fullDisk(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run";
+  // no file may grow beyond 256 kB (512 bytes a block): the videos would
+  const test::Outcome outcome = test::runShell("ulimit -f 500; " + trackOf(shop, run, " --frames 40"));
+  return {outcome.status == 0 && outcome.text.find("without videos") != std::string::npos && posesIn(run) == 40 &&
+              hiddenIn(run) == 0,
+          fmt::format("exit {}, {} poses, warned", outcome.status, posesIn(run))};
+}
+
+Seen smallStack(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run";
+  const test::Outcome outcome = test::runShell("ulimit -s 64; " + trackOf(shop, run, " --frames 30"));
+  return {outcome.status == 0 && posesIn(run) == 30, fmt::format("exit {}, {} poses", outcome.status, posesIn(run))};
+}
+
+Seen noReader(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run";
+  const int status = test::runShell("(" + trackOf(shop, run, " --no-video --frames 30") + "; echo $? > " + shop.folder +
+                                    "/status) | true")
+                         .status;
+  const std::string code = bytesOf(shop.folder + "/status");
+  const bool is_complete = bytesOf(run + "/summary.json").find("\"complete\": true") != std::string::npos;
+  return {status == 0 && is_complete && code == "0\n",
+          fmt::format("exit {}, {}", code.substr(0, code.find('\n')), is_complete ? "complete" : "NOT COMPLETE")};
+}
+
+Seen twoAtOnce(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run", line = trackOf(shop, run, " --no-video -q --frames 60");
+  const test::Outcome outcome = test::runShell(
+      line + " & while [ ! -e " + run + " ]; do sleep 0.01; done; sleep 0.2; " + line + "; echo second $?; wait");
+  const bool is_told = outcome.text.find("another run writes into this folder") != std::string::npos &&
+                       outcome.text.find("second 1") != std::string::npos;
+  return {is_told && posesIn(run) == 60, is_told ? "the second one is told so" : outcome.text.substr(0, 80)};
+}
+
+Seen noHangup(const Shop &shop)
+{
+  const std::string run = shop.folder + "/run";
+  const test::Outcome outcome =
+      test::runShell("trap '' HUP; " + trackOf(shop, run, " --no-video -q") + " & child=$!; while [ ! -e " + run +
+                     "/summary.json ]; do sleep 0.01; done; kill -HUP $child; wait $child; echo ended $?");
+  return {outcome.text.find("ended 0") != std::string::npos, "it goes on to its end"};
+}
+} // namespace
+
+std::vector<Fault> processFaults()
+{
+  return {interrupted("SIGINT", SIGINT),
+          interrupted("SIGTERM", SIGTERM),
+          interrupted("SIGHUP", SIGHUP),
+          interrupted("SIGPIPE", SIGPIPE),
+          process("kill -9", "killed after 50 frames or more, then resumed", killedAndResumed),
+          process("nohup", "SIGHUP where it is ignored", noHangup),
+          process("full_disk", "no file may be larger than 256 kB", fullDisk),
+          process("stack_64k", "a stack of 64 kB", smallStack),
+          process("closed_output", "nobody reads its output", noReader),
+          process("two_at_once", "two runs into one folder", twoAtOnce)};
+}
+} // namespace bole::faults
