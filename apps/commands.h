@@ -49,6 +49,7 @@ void addSimulate(CLI::App &app);
 void addServo(CLI::App &app);             ///< tasks in the closed loop
 void addOptions(CLI::App &app);           ///< every option with its range and effect
 void addLocalise(CLI::App &app);          ///< a flight on the map of an earlier one
+void addFollow(CLI::App &app);            ///< a video in a known map
 void addRecord(CLI::App &app);            ///< a live flight to disk
 void addReplay(CLI::App &app);            ///< a recorded flight, served again
 void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone would

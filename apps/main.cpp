@@ -34,6 +34,7 @@ void addCommands(CLI::App &app)
   addExport(app);
   addOptions(app);
   addLocalise(app);
+  addFollow(app);
   addRecord(app);
   addGraph(app);
   addSolve(app);

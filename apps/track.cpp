@@ -8,6 +8,7 @@
 #include "track_arguments.h"
 #include "track_output.h"
 
+#include "input/live_video.h"
 #include "motion/sensor_calibration.h"
 #include "output/progress.h"
 #include "report/report_page.h"
@@ -33,10 +34,12 @@ namespace
 /// A video without a camera file is looked through for a pan that tells its field of view.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
-  auto source = openSource(arguments.input, arguments.source);
+  const bool is_stream = LiveVideoSource::accepts(arguments.input);
+  auto source = is_stream ? openStream(arguments.input, arguments.source, arguments.give_up_s)
+                          : openSource(arguments.input, arguments.source);
   made.note = source->note();
   made.is_camera_known = source->isCameraKnown() || arguments.is_field_of_view_given;
-  if (made.is_camera_known)
+  if (made.is_camera_known || is_stream)
     return source;
   const FieldOfView view = fieldOfView(arguments.input, arguments.source);
   if (view.degrees == 0)
@@ -57,7 +60,8 @@ std::unique_ptr<FrameSource> openRecording(TrackArguments arguments, const Optio
   auto source = openVideo(arguments, made);
   const bool has_sensors =
       (source->hasGyro() && !arguments.is_without_gyro) || (source->hasOdometry() && !arguments.is_without_odometry);
-  if (!has_sensors || !options.stages.calibration || !options.stages.points || !source->isCameraKnown())
+  const bool is_stream = LiveVideoSource::accepts(arguments.input); // cannot be looked through twice
+  if (!has_sensors || is_stream || !options.stages.calibration || !options.stages.points || !source->isCameraKnown())
     return source;
   calibration = calibrateSensors(*source, !arguments.is_without_gyro, !arguments.is_without_odometry);
   made.calibration = calibration.constants;
@@ -228,6 +232,7 @@ void track(const TrackArguments &asked_for)
   made.sensors = calibration.verdicts;
   Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
+  const bool is_live = live != nullptr || dynamic_cast<const LiveVideoSource *>(source.get()) != nullptr;
   options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
   made.preset = arguments.config.empty() ? "default" : arguments.config;
   made.options = toYaml(options);
@@ -240,7 +245,7 @@ void track(const TrackArguments &asked_for)
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   endAtInterrupt();
-  if (fly(arguments, *source, live != nullptr, pipeline, output, flight) == 0) {
+  if (fly(arguments, *source, is_live, pipeline, output, flight) == 0) {
     if (interrupted())
       endWith(ExitCode::interrupted);
     throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());

@@ -10,8 +10,10 @@ namespace bole::apps
 void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &arguments)
 {
   command
-      .add_option("INPUT", arguments->input,
-                  "EuRoC/ASL folder, video file, numbered images (image%04d.png) or ardrone://HOST")
+      .add_option(
+          "INPUT", arguments->input,
+          "EuRoC/ASL folder, video file, numbered images (image%04d.png), ardrone://HOST, a camera (/dev/video0) "
+          "or an address (rtsp://, http://)")
       ->transform(findSequence);
   command.add_option("-o,--output", arguments->run, "Folder for the results");
   command.add_option("--config", arguments->config,
@@ -40,7 +42,7 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
   command.add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();
   command.add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)")->check(within(0, 1e9));
-  command.add_option("--give-up", arguments->give_up_s, "Silence of a live drone that ends its flight [s]")
+  command.add_option("--give-up", arguments->give_up_s, "Silence of a live drone or stream that ends its flight [s]")
       ->capture_default_str()
       ->check(within(0.1, 86400));
   command.add_option("--again", arguments->again,

@@ -11,6 +11,7 @@
 #include "output/svg.h"
 #include "pipeline/paper_policy.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -222,8 +223,17 @@ Panel figure6(const SeenFlight &flight)
   picture.truth_trunks = flight.trunks;
   for (const StampedPose &pose : flight.smoothed)
     picture.smoothed.push_back({pose.stamp_ns, aligned * pose.wMb});
+  constexpr double kAround = 10; // [m] of the trajectory that the sheet shows
+  Eigen::AlignedBox2d sheet;
+  for (const StampedPose &pose : flight.truth)
+    sheet.extend(Eigen::Vector2d(pose.wMb.t.head<2>()));
+  int beyond = 0;
   for (TrunkRecord tree : flight.map) {
     tree.xy = aligned * tree.xy;
+    if (tree.status == TrunkStatus::confirmed && !(sheet.exteriorDistance(tree.xy) < kAround)) {
+      ++beyond;
+      continue;
+    }
     tree.covariance.topLeftCorner<2, 2>() = aligned.linear() * tree.covarianceXy() * aligned.linear().transpose();
     picture.trunks.push_back(tree);
   }
@@ -233,8 +243,9 @@ Panel figure6(const SeenFlight &flight)
       {{"figure-6.svg", toSvg(picture)}},
       fmt::format("The paper shows true trees (green) and mapped ones (red) with the trajectory, the map moved onto "
                   "the truth by hand. Here the map is moved by least squares over the trajectory, in x, y and yaw. "
-                  "All {} trees are drawn, those that stand twice too; {} of them stand for a trunk of their own.",
-                  trees, flight.right.size())};
+                  "The map has {} trees, those that stand twice too; {} of them stand for a trunk of their own, and {} "
+                  "stand farther than {:g} m from the trajectory, beyond the sheet.",
+                  trees, flight.right.size(), beyond, kAround)};
 }
 
 std::vector<Panel> figure7(const SeenFlight &flight)

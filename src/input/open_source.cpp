@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/require_range.h"
 #include "input/asl_source.h"
+#include "input/live_video.h"
 #include "input/sequence_source.h"
 #include "input/video_source.h"
 #include <bole/open_source.h>
@@ -23,6 +24,8 @@ void SourceOptions::validate() const
 
 std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOptions &options)
 {
+  if (LiveVideoSource::accepts(input))
+    return openStream(input, options);
   if (AslSource::accepts(input))
     return std::make_unique<AslSource>(input, options);
   if (std::filesystem::is_directory(input)) {

@@ -4,6 +4,7 @@
 #include "input/libav.h"
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -122,14 +123,60 @@ cv::Mat VideoFile::Libav::grey(const AVFrame &picture)
   return image;
 }
 
+namespace
+{
+constexpr double kOpening_s = 10, kSilence_s = 3; ///< that an address may take to answer, and between two packets
+
+std::int64_t steady_ns()
+{
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Asked by libav again and again while it waits.
+int isOver(void *limit)
+{
+  const auto *of = static_cast<const ReadLimit *>(limit);
+  return of->is_stopped || steady_ns() > of->until_ns ? 1 : 0;
+}
+} // namespace
+
 VideoFile::VideoFile(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
 {
   if (!std::filesystem::is_regular_file(path))
     throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+  open();
+}
+
+VideoFile::VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limit)
+    : m_path(address), m_limit(std::move(limit)), m_libav(std::make_unique<Libav>())
+{
+  open();
+}
+
+void VideoFile::allowReading(double seconds) const
+{
+  if (m_limit)
+    m_limit->until_ns = steady_ns() + static_cast<std::int64_t>(seconds * 1e9);
+}
+
+void VideoFile::open()
+{
   const QuietLibav quiet;
-  AVFormatContext *format = nullptr;
-  checkLibav(avformat_open_input(&format, path.c_str(), nullptr, nullptr), path + ": no video");
+  const std::string &path = m_path;
+  AVFormatContext *format = avformat_alloc_context();
+  AVDictionary *options = nullptr;
+  if (m_limit && format != nullptr) {
+    format->interrupt_callback = {isOver, m_limit.get()};
+    if (path.rfind("rtsp", 0) == 0)
+      av_dict_set(&options, "rtsp_flags", "prefer_tcp", 0); // over UDP a lost packet is a broken picture
+  }
+  allowReading(kOpening_s);
+  const int opened = avformat_open_input(&format, path.c_str(), nullptr, &options);
+  av_dict_free(&options);
+  checkLibav(opened, path + ": no video");
   m_libav->format.reset(format);
+  const bool has_no_stamps = std::strcmp(format->iformat->name, "mpjpeg") == 0;
+  format->use_wallclock_as_timestamps = m_limit && has_no_stamps ? 1 : 0;
   checkLibav(avformat_find_stream_info(format, nullptr), path + ": no video");
   m_libav->stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
   checkLibav(m_libav->stream, path + ": no video stream that can be decoded");
@@ -178,6 +225,7 @@ void VideoFile::decodeMore()
 {
   const QuietLibav quiet;
   AVPacket &packet = *m_libav->packet;
+  allowReading(kSilence_s);
   const bool has_packet = av_read_frame(m_libav->format.get(), &packet) >= 0;
   if (has_packet && packet.stream_index != m_libav->stream) {
     av_packet_unref(&packet);

@@ -3,6 +3,7 @@
 /// \file
 /// Grey pictures with their times out of a video file (libavformat, libavcodec).
 
+#include <atomic>
 #include <bole/visp.h>
 #include <cstdint>
 #include <deque>
@@ -25,6 +26,13 @@ struct Picture
   vpImage<unsigned char> image;
 };
 
+/// What ends a read from an address that would wait for ever: stop it from any thread.
+struct ReadLimit
+{
+  std::atomic<bool> is_stopped{false};
+  std::atomic<std::int64_t> until_ns{0}; ///< of the steady clock; set before each read
+};
+
 /// Decodes the best video stream of a file, in the order of presentation, one thread.
 ///
 /// Every packet of the stream must end in a picture: one that does not (lost reference, damaged data) is reported in
@@ -36,6 +44,8 @@ class VideoFile
 public:
   /// Throws vpException when the file is no video that can be decoded.
   explicit VideoFile(const std::string &path);
+  /// The same of an address (rtsp://, http://, file://): throws vpException where it stays silent, too.
+  VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limit);
   ~VideoFile();
   VideoFile(const VideoFile &) = delete;
   VideoFile &operator=(const VideoFile &) = delete;
@@ -46,10 +56,15 @@ public:
   std::size_t frames() const;
   /// By the file's own word [ns], 0 when it does not say.
   std::int64_t duration_ns() const;
+  /// Whether it comes from an address and does not say how long it is.
+  bool isLive() const { return m_limit != nullptr && duration_ns() == 0; }
+  const std::shared_ptr<ReadLimit> &limit() const { return m_limit; }
 
 private:
   struct Libav;
 
+  void open();
+  void allowReading(double seconds) const;
   void decodeMore();
   void take(const AVFrame &frame);
   void reportLost(std::int64_t before);
@@ -58,6 +73,7 @@ private:
   std::int64_t stampOf(std::int64_t pts);
 
   std::string m_path;
+  std::shared_ptr<ReadLimit> m_limit; ///< of an address
   std::unique_ptr<Libav> m_libav;
   std::deque<Picture> m_ready;
   std::set<std::int64_t> m_pending; ///< times of packets that have not become a picture yet

@@ -11,10 +11,10 @@ namespace bole
 {
 struct VideoSource::State
 {
-  explicit State(const std::string &path) : file(path)
+  State(const std::string &path, std::unique_ptr<VideoFile> opened) : file(std::move(opened))
   {
     Picture picture;
-    while (file.next(picture)) {
+    while (file->next(picture)) {
       ahead.push_back(std::move(picture));
       if (!ahead.back().is_damaged)
         return;
@@ -26,28 +26,33 @@ struct VideoSource::State
   bool take(Picture &picture)
   {
     if (ahead.empty())
-      return file.next(picture);
+      return file->next(picture);
     picture = std::move(ahead.front());
     ahead.pop_front();
     return true;
   }
 
-  VideoFile file;
+  std::unique_ptr<VideoFile> file;
   std::deque<Picture> ahead; ///< up to the first whole one, whose size is that of the video
 };
 
 VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
+    : VideoSource(path, options, std::make_unique<VideoFile>(path))
+{
+}
+
+VideoSource::VideoSource(const std::string &path, const SourceOptions &options, std::unique_ptr<VideoFile> file)
 {
   options.validate();
   m_name = path;
-  m_state = std::make_unique<State>(path);
+  m_state = std::make_unique<State>(path, std::move(file));
   const vpImage<unsigned char> &first = m_state->ahead.back().image;
   const MountedCamera camera =
       cameraFor(options, static_cast<int>(first.getWidth()), static_cast<int>(first.getHeight()), m_note);
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
-  const std::int64_t duration_ns = m_state->file.duration_ns();
+  const std::int64_t duration_ns = m_state->file->duration_ns();
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
@@ -68,5 +73,5 @@ bool VideoSource::next(Frame &frame)
   return true;
 }
 
-std::size_t VideoSource::size() const { return m_state->file.frames(); }
+std::size_t VideoSource::size() const { return m_state->file->frames(); }
 } // namespace bole

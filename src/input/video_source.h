@@ -7,6 +7,8 @@
 
 namespace bole
 {
+class VideoFile;
+
 /// Reads a video file (any container and codec of libavformat and libavcodec) frame by frame.
 ///
 /// Stamps are the container's, counted from the first frame. A packet that does not become a
@@ -21,6 +23,8 @@ class VideoSource : public RecordedSource
 {
 public:
   explicit VideoSource(const std::string &path, const SourceOptions &options = {});
+  /// With what was opened already. \p file: that of \p path.
+  VideoSource(const std::string &path, const SourceOptions &options, std::unique_ptr<VideoFile> file);
   ~VideoSource() override;
 
   bool next(Frame &frame) override;

@@ -39,31 +39,6 @@ std::vector<ObservedTree> instantiate(const Gradient &gradient, const vpImage<fl
   return trees;
 }
 
-/// "We non-linearly optimize the relative tree parameters to maximize the true measurement likelihood before computing"
-/// the quadratic: the minimum of the tree's own energy below \p start, in all four directions, by Newton steps that are
-/// halved until the energy falls. Nothing where that ends on no minimum.
-std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera,
-                                       const RelativeTrunk &start)
-{
-  constexpr int kIterations = 50;
-  if (!start.isFinite())
-    return std::nullopt;
-  SummaryFactor summary = expandEnergy(energy, camera, start);
-  for (int i = 0; i < kIterations; ++i) {
-    const Vector4d steps = pixelSteps(camera, summary.optimum);
-    if (!summary.f.allFinite() || !summary.F.allFinite())
-      return std::nullopt;
-    Vector4d step = -convexified(summary, steps).F.ldlt().solve(summary.f);
-    const auto length_px = [&] { return step.cwiseQuotient(steps).cwiseAbs().maxCoeff(); };
-    while (length_px() >= kSettled_px && !(energy.evaluate(summary.optimum.plus(step)) < summary.energy))
-      step *= 0.5;
-    if (!(length_px() >= kSettled_px))
-      return isConvex(summary, steps) ? std::optional(summary) : std::nullopt;
-    summary = expandEnergy(energy, camera, summary.optimum.plus(step));
-  }
-  return std::nullopt;
-}
-
 Sighting sightingOf(const ObservedTree &tree, const TrunkEnergy &energy, const Trunk &trunk, const Viewpoint &view)
 {
   Sighting sighting;
@@ -80,7 +55,7 @@ Sighting sightingOf(const ObservedTree &tree, const TrunkEnergy &energy, const T
 /// Eq. 9 at the joint optimum, and the end of those whose energy is not convex there. A tree that no image has
 /// measured is none.
 std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<ObservedTree> &trees, const Viewpoint &view,
-                                   Smoother &smoother, TrunkMap &map, const StageOptions &options)
+                                   Smoother &smoother, TrunkMap &map)
 {
   const std::size_t newest = smoother.poseCount() - 1;
   std::vector<TrunkInView> seen;
@@ -108,7 +83,7 @@ std::vector<TrunkInView> summarise(const TrunkEnergy &energy, std::vector<Observ
       map.end(tree.id);
     if (!tree.relative.isFinite())
       continue;
-    const ElevationRange drawn = elevationOf(tree.relative, trunk, view, options);
+    constexpr ElevationRange drawn = {-1, 1}; // of the endless line, what pictures show
     seen.push_back({tree.id, map.trunk(tree.id).status, is_observed,
                     toString(is_observed ? TrackingStatus::tracked : TrackingStatus::negative_curvature), tree.relative,
                     drawn.low, drawn.high, horizontalView(view.wMc, trunk).range});
@@ -159,6 +134,28 @@ SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps)
   return summary;
 }
 
+std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera,
+                                       const RelativeTrunk &start)
+{
+  constexpr int kIterations = 50;
+  if (!start.isFinite())
+    return std::nullopt;
+  SummaryFactor summary = expandEnergy(energy, camera, start);
+  for (int i = 0; i < kIterations; ++i) {
+    const Vector4d steps = pixelSteps(camera, summary.optimum);
+    if (!summary.f.allFinite() || !summary.F.allFinite())
+      return std::nullopt;
+    Vector4d step = -convexified(summary, steps).F.ldlt().solve(summary.f);
+    const auto length_px = [&] { return step.cwiseQuotient(steps).cwiseAbs().maxCoeff(); };
+    while (length_px() >= kSettled_px && !(energy.evaluate(summary.optimum.plus(step)) < summary.energy))
+      step *= 0.5;
+    if (!(length_px() >= kSettled_px))
+      return isConvex(summary, steps) ? std::optional(summary) : std::nullopt;
+    summary = expandEnergy(energy, camera, summary.optimum.plus(step));
+  }
+  return std::nullopt;
+}
+
 std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flight, const Pose &bMc,
                                       const GyroOptions &options)
 {
@@ -197,6 +194,6 @@ std::vector<TrunkInView> mapAsPaper(const Gradient &gradient, const vpImage<floa
     trees.push_back({map.trunks()[i].id, map.trunks()[i].smoother_id, {}});
   const TrunkEnergy energy = energyOf(gradient, view.camera, options);
   optimiseJointly(energy, view.camera, trees, smoother);
-  return summarise(energy, trees, view, smoother, map, options);
+  return summarise(energy, trees, view, smoother, map);
 }
 } // namespace bole

@@ -41,6 +41,12 @@ bool isConvex(const SummaryFactor &summary, const Vector4d &steps);
 /// basin of Eq. 3 is the blur, three pixels wide): one step downhill from wherever it starts.
 SummaryFactor convexified(SummaryFactor summary, const Vector4d &steps);
 
+/// "We non-linearly optimize the relative tree parameters to maximize the true measurement likelihood before computing"
+/// the quadratic: the minimum of the tree's own energy below \p start, in all four directions, by Newton steps that are
+/// halved until the energy falls. Nothing where that ends on no minimum.
+std::optional<SummaryFactor> minimised(const TrunkEnergy &energy, const PinholeCamera &camera,
+                                       const RelativeTrunk &start);
+
 /// The turn of the camera since the last pose of \p flight by the gyro, where it covers it: what EM starts from.
 std::optional<RotationPrior> gyroTurn(const Frame &frame, const Trajectory &flight, const Pose &bMc,
                                       const GyroOptions &options);

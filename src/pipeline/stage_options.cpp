@@ -148,17 +148,7 @@ void setServoing(StageOptions &o)
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
 }
 
-/// Eq. 19 and 20 by the statistics of park-forward (`bole reproduce --statistics`): Q is one half at the upper quartile
-/// of all lines and nine tenths at the median of those on borders of near trunks.
-void setByInspection(LineDetectorOptions &lines)
-{
-  const auto set = [](double &a, double &b, double half, double nine_tenths) {
-    a = -std::log(9.0) / (nine_tenths - half);
-    b = -a * half;
-  };
-  set(lines.border_a, lines.border_b, 0.042, 0.051);         // mean gradient [full scale/px]
-  set(lines.foreground_a, lines.foreground_b, 0.574, 0.688); // mean of 1 - p(background)
-}
+constexpr LineQuartiles kParkForward = {0.042, 0.574}; ///< of data/park-forward
 
 /// All that the paper has otherwise; src/doc/paper.md says equation by equation why.
 void setPaper(StageOptions &o, const Options::Paper &paper)
@@ -169,7 +159,7 @@ void setPaper(StageOptions &o, const Options::Paper &paper)
   o.gradient.split = true;
   o.saliency = SaliencyOptions::paper();
   o.lines.either_polarity = false;
-  setByInspection(o.lines);
+  setByInspection(o.lines, kParkForward);
   o.tracking.energy.form = EnergyForm::paper;
   o.tracking.energy.paper_alpha = paper.alpha;
   o.smoothing.prior_lean_sigma = kUpright;
@@ -177,6 +167,17 @@ void setPaper(StageOptions &o, const Options::Paper &paper)
   o.map.at_once = true;
 }
 } // namespace
+
+void setByInspection(LineDetectorOptions &lines, const LineQuartiles &quartiles)
+{
+  constexpr double kNineTenths = 1.2; // of the quartile: the median of the borders of near trunks, in park-forward
+  const auto set = [](double &a, double &b, double half) {
+    a = -std::log(9.0) / ((kNineTenths - 1) * half);
+    b = -a * half;
+  };
+  set(lines.border_a, lines.border_b, quartiles.gradient);
+  set(lines.foreground_a, lines.foreground_b, quartiles.foreground);
+}
 
 StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
 {

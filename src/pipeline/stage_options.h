@@ -80,6 +80,16 @@ struct StageOptions
   void validate() const;
 };
 
+/// Upper quartiles over all lines of all pictures of a flight, as `bole reproduce --statistics` prints them.
+struct LineQuartiles
+{
+  double gradient = 0;   ///< of the mean of the blurred part (Eq. 19) [full scale/px]
+  double foreground = 0; ///< of the mean of 1 - p(background) (Eq. 20)
+};
+/// Eq. 19 and 20 "by inspection of the statistics of the data": Q is one half at the quartile and nine tenths at 1.2
+/// times of it.
+void setByInspection(LineDetectorOptions &lines, const LineQuartiles &quartiles);
+
 /// The stages' options for a user's, with thresholds in the pixels of \p camera.
 /// \throw vpException naming the option, its value and the range.
 StageOptions stageOptions(const Options &options, const PinholeCamera &camera);

@@ -54,6 +54,9 @@ TEST(PaperPreset, IsThePaperToTheLetter)
   // 6: left borders on the negative part, right ones on the positive; "a fixed threshold ... 0.75"
   EXPECT_FALSE(paper.lines.either_polarity);
   EXPECT_EQ(paper.lines.threshold, 0.75);
+  // 6: "parameters a and b by inspection of the statistics of the data", here those of data/park-forward
+  EXPECT_NEAR(-paper.lines.border_b / paper.lines.border_a, 0.042, 1e-9);
+  EXPECT_NEAR(-paper.lines.foreground_b / paper.lines.foreground_a, 0.574, 1e-9);
   // 7: a detection is a tree, and duplicates stay
   EXPECT_TRUE(paper.map.at_once);
 }

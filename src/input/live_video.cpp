@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/live_video.h"
+#include "input/video_source.h"
+
+#include <bole/visp.h>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <fmt/format.h>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <visp3/core/vpException.h>
+#include <visp3/sensor/vpV4l2Grabber.h>
+
+namespace bole
+{
+namespace
+{
+constexpr char kDevice[] = "/dev/video";
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kFrameTimeout_ns = kSecond_ns / 2; ///< without a picture there is a missing frame
+constexpr std::int64_t kRetry_ns = kSecond_ns / 2;        ///< between two attempts to connect
+
+std::int64_t now_ns() { return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+bool isDevice(const std::string &address) { return address.rfind(kDevice, 0) == 0; }
+
+/// The next picture; false at the end of the connection. Throws vpException for what went wrong.
+using PictureReader = std::function<bool(Picture &)>;
+
+PictureReader readerOf(std::unique_ptr<VideoFile> file)
+{
+  return [shared = std::shared_ptr<VideoFile>(std::move(file))](Picture &picture) { return shared->next(picture); };
+}
+
+PictureReader openCamera(const std::string &device)
+{
+#ifdef VISP_HAVE_V4L2
+  if (!std::filesystem::exists(device))
+    throw vpException(vpException::ioError, fmt::format("{}: no camera: there is no such device", device));
+  auto grabber = std::make_shared<vpV4l2Grabber>();
+  grabber->setDevice(device);
+  grabber->setScale(1);
+  vpImage<unsigned char> image;
+  try {
+    grabber->open(image);
+  }
+  catch (const vpException &error) {
+    throw vpException(vpException::ioError, fmt::format("{}: no camera: {}", device, error.getStringMessage()));
+  }
+  return [grabber, first_ns = std::int64_t(-1)](Picture &picture) mutable {
+    timeval stamp{};
+    grabber->acquire(picture.image, stamp);
+    const std::int64_t stamp_ns = stamp.tv_sec * kSecond_ns + stamp.tv_usec * 1000;
+    if (first_ns < 0)
+      first_ns = stamp_ns;
+    picture.stamp_ns = stamp_ns - first_ns;
+    return true;
+  };
+#else
+  throw vpException(vpException::notImplementedError,
+                    fmt::format("{}: this ViSP was built without V4L2, no camera can be read", device));
+#endif
+}
+
+PictureReader openReader(const std::string &address, const std::shared_ptr<ReadLimit> &limit)
+{
+  return isDevice(address) ? openCamera(address) : readerOf(std::make_unique<VideoFile>(address, limit));
+}
+} // namespace
+
+struct LiveVideoSource::State
+{
+  std::string address;
+  std::int64_t give_up_ns = 0;
+  std::shared_ptr<ReadLimit> limit = std::make_shared<ReadLimit>();
+  PictureReader reader;
+  std::int64_t begun_ns = 0; ///< when the first picture came: where stamps count from
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::optional<Picture> newest;
+  std::int64_t arrival_ns = 0;
+  std::string trouble; ///< why nothing comes
+  Counters counters;
+  bool is_stopped = false;
+  std::thread thread;
+
+  std::int64_t last_stamp_ns = -1; ///< given out
+  std::int64_t heard_ns = 0;
+
+  ~State()
+  {
+    stop();
+    if (thread.joinable())
+      thread.join();
+  }
+
+  void stop() noexcept
+  {
+    limit->is_stopped = true;
+    const std::lock_guard<std::mutex> lock(mutex);
+    is_stopped = true;
+    changed.notify_all();
+  }
+
+  /// A whole picture, which tells the size.
+  Picture first()
+  {
+    constexpr int kMostDamaged = 300; // until a key frame comes
+    Picture picture;
+    for (int i = 0; i < kMostDamaged && reader(picture); ++i)
+      if (!picture.is_damaged)
+        return picture;
+    throw vpException(vpException::ioError, fmt::format("{}: no picture that can be decoded", address));
+  }
+
+  /// Takes every picture, and connects again when none comes any more.
+  void read(std::int64_t offset_ns)
+  {
+    bool is_first = false; // of a connection
+    while (!limit->is_stopped) {
+      try {
+        if (!reader) {
+          reader = openReader(address, limit);
+          is_first = true;
+          const std::lock_guard<std::mutex> lock(mutex);
+          ++counters.connections;
+        }
+        Picture picture;
+        if (!reader(picture))
+          throw vpException(vpException::ioError, fmt::format("{}: the stream ended", address));
+        const std::int64_t arrived_ns = now_ns();
+        if (std::exchange(is_first, false))
+          offset_ns = arrived_ns - begun_ns - picture.stamp_ns;
+        picture.stamp_ns += offset_ns;
+        take(std::move(picture), arrived_ns);
+      }
+      catch (const vpException &error) {
+        reader = nullptr;
+        std::unique_lock<std::mutex> lock(mutex);
+        trouble = error.getStringMessage();
+        changed.wait_for(lock, std::chrono::nanoseconds(kRetry_ns), [this] { return is_stopped; });
+      }
+    }
+  }
+
+  void take(Picture picture, std::int64_t arrived_ns)
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++counters.pictures;
+    counters.dropped += newest.has_value();
+    if (newest && picture.is_damaged && !newest->is_damaged)
+      return;
+    newest = std::move(picture);
+    arrival_ns = arrived_ns;
+    trouble.clear();
+    changed.notify_all();
+  }
+};
+
+bool LiveVideoSource::accepts(const std::string &address)
+{
+  return isDevice(address) || (address.find("://") != std::string::npos && address.rfind("ardrone:", 0) != 0);
+}
+
+LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s)
+    : LiveVideoSource(address, options, give_up_s, nullptr)
+{
+}
+
+LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s,
+                                 std::unique_ptr<VideoFile> file)
+{
+  options.validate();
+  if (!(give_up_s > 0 && give_up_s <= 86400))
+    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0, 86400]", give_up_s);
+  if (!options.odometry_path.empty())
+    throw vpException(vpException::badValue,
+                      fmt::format("{}: a live stream has no odometry file ({})", address, options.odometry_path));
+  m_name = address;
+  m_state = std::make_unique<State>();
+  State &state = *m_state;
+  state.address = address;
+  state.give_up_ns = static_cast<std::int64_t>(give_up_s * 1e9);
+  if (file)
+    state.limit = file->limit();
+  state.reader = file ? readerOf(std::move(file)) : openReader(address, state.limit);
+  state.counters.connections = 1;
+  Picture first = state.first();
+  const std::int64_t first_ns = first.stamp_ns;
+  first.stamp_ns = 0;
+  const MountedCamera camera =
+      cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), m_note);
+  m_builder = std::make_unique<FrameBuilder>(camera, options, Recording());
+  state.begun_ns = state.heard_ns = now_ns();
+  state.take(std::move(first), state.begun_ns);
+  state.thread = std::thread([&state, first_ns] { state.read(-first_ns); });
+}
+
+LiveVideoSource::~LiveVideoSource() = default;
+
+bool LiveVideoSource::next(Frame &frame)
+{
+  State &state = *m_state;
+  ImageFile file;
+  std::int64_t stamp_ns = 0, arrival_ns = 0;
+  {
+    std::unique_lock<std::mutex> lock(state.mutex);
+    state.changed.wait_for(lock, std::chrono::nanoseconds(kFrameTimeout_ns),
+                           [&state] { return state.newest || state.is_stopped; });
+    if (state.is_stopped)
+      return false;
+    if (state.newest) {
+      stamp_ns = state.newest->stamp_ns;
+      arrival_ns = state.heard_ns = state.arrival_ns;
+      file.status = state.newest->is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
+      file.message = std::move(state.newest->message);
+      file.image = std::move(state.newest->image);
+      state.newest.reset();
+    }
+    else {
+      const std::int64_t now = now_ns();
+      if (now - state.heard_ns > state.give_up_ns)
+        return false;
+      stamp_ns = now - state.begun_ns;
+      file.status = FrameStatus::missing;
+      file.message = state.trouble.empty() ? "no picture came" : state.trouble;
+    }
+  }
+  stamp_ns = std::max(stamp_ns, state.last_stamp_ns + 1);
+  state.last_stamp_ns = stamp_ns;
+  m_builder->build(stamp_ns, std::move(file), frame);
+  frame.arrival_ns = arrival_ns;
+  return true;
+}
+
+LiveVideoSource::Counters LiveVideoSource::counters() const
+{
+  const std::lock_guard<std::mutex> lock(m_state->mutex);
+  return m_state->counters;
+}
+
+void LiveVideoSource::stop() noexcept { m_state->stop(); }
+
+std::unique_ptr<FrameSource> openStream(const std::string &address, const SourceOptions &options, double give_up_s)
+{
+  if (isDevice(address))
+    return std::make_unique<LiveVideoSource>(address, options, give_up_s);
+  auto file = std::make_unique<VideoFile>(address, std::make_shared<ReadLimit>());
+  if (file->isLive())
+    return std::make_unique<LiveVideoSource>(address, options, give_up_s, std::move(file));
+  return std::make_unique<VideoSource>(address, options, std::move(file));
+}
+} // namespace bole
