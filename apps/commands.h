@@ -46,15 +46,15 @@ void addReport(CLI::App &app);   ///< the page about a run
 void addExport(CLI::App &app);   ///< maps for other tools
 void addCompare(CLI::App &app);  ///< our tracker against ViSP's
 void addSimulate(CLI::App &app);
-void addServo(CLI::App &app);             ///< tasks in the closed loop
-void addOptions(CLI::App &app);           ///< every option with its range and effect
-void addLocalise(CLI::App &app);          ///< a flight on the map of an earlier one
-void addFollow(CLI::App &app);            ///< a video in a known map
-void addRecord(CLI::App &app);            ///< a live flight to disk
-void addReplay(CLI::App &app);            ///< a recorded flight, served again
-void addEmulate(CLI::App &app);           ///< a sequence, served as an AR.Drone would
-void addGraph(CLI::App &app);             ///< the graph of a run
-void addSolve(CLI::App &app);             ///< the optimum of a saved graph
+void addServo(CLI::App &app);    ///< tasks in the closed loop
+void addOptions(CLI::App &app);  ///< every option with its range and effect
+void addLocalise(CLI::App &app); ///< a flight on the map of an earlier one
+void addFollow(CLI::App &app);   ///< a video in a known map
+void addRecord(CLI::App &app);   ///< a live flight to disk
+void addReplay(CLI::App &app);   ///< a recorded flight, served again
+void addEmulate(CLI::App &app);  ///< a sequence, served as an AR.Drone would
+void addGraph(CLI::App &app);    ///< the graph of a run
+void addSolve(CLI::App &app);    ///< the optimum of a saved graph
 /// Writes man pages and completions of all other commands; \p version goes into their foot.
 void addDocumentation(CLI::App &app, const std::string &version);
 void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images

@@ -19,8 +19,8 @@ struct TrackArguments
   std::string input, run, config, again, resumed;
   std::vector<std::string> settings, without;
   SourceOptions source;
-  bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_online = false, is_without_odometry = false,
-       is_without_gyro = false;
+  bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_online = false,
+       is_without_odometry = false, is_without_gyro = false;
   std::size_t frames_most = 0;
   double give_up_s = ArDroneSource::Options().give_up_s;
   double camera_height = 0;

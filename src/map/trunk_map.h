@@ -34,7 +34,7 @@ struct MapOptions
   double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
                                    ///< does: how evenly its borders run along their length, 0 to 1,
   double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
-  double final_odds = -0.5;         ///< log odds by all frames at which it is one, -20 to 20
+  double final_odds = -0.5;        ///< log odds by all frames at which it is one, -20 to 20
   int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
   double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
