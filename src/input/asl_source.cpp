@@ -74,8 +74,7 @@ void requirePlausible(const std::vector<GyroSample> &gyro, const std::string &pa
                                   path, rate_Hz, kSlowest_Hz, kFastest_Hz));
 }
 
-/// Throws for an accelerometer that does not feel gravity. Columns that never change are taken for none: zeros, or the
-/// gravity of a simulator that knows no other force.
+/// Throws for an accelerometer that does not feel gravity. Columns of zeros are taken for none.
 void requireGravity(std::vector<GyroSample> &gyro, const std::string &path)
 {
   constexpr double kLeast = 4, kMost = 25;        // m/s^2, median of a flight: it hovers or swings, and shakes
@@ -88,8 +87,10 @@ void requireGravity(std::vector<GyroSample> &gyro, const std::string &path)
   if (norms.size() < kFewest)
     return;
   const double median = medianOf(std::move(norms));
-  const auto isAsTheFirst = [&](const GyroSample &sample) { return sample.force == gyro.front().force; };
-  if (median != 0 && (median < kLeast || median > kMost))
+  if (median == 0)
+    for (GyroSample &sample : gyro)
+      sample.force.reset();
+  else if (median < kLeast || median > kMost)
     throw vpException(vpException::badValue,
                       fmt::format("{}: specific force = {:.3g} m/s^2 (median), must be {:g} to {:g}{}", path, median,
                                   kLeast, kMost,
@@ -97,9 +98,6 @@ void requireGravity(std::vector<GyroSample> &gyro, const std::string &path)
                                   : median > 1e3 * kLeast_g && median < 1e3 * kMost_g ? ": looks like thousandths of g"
                                   : median < kLeast_g ? ": looks as if gravity were taken out (leave the columns away)"
                                                       : ""));
-  if (std::all_of(gyro.begin(), gyro.end(), isAsTheFirst))
-    for (GyroSample &sample : gyro)
-      sample.force.reset();
 }
 
 /// Throws where the gyro turns some sixty times as far as the odometry, and as it does: degrees per second.
