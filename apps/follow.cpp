@@ -8,6 +8,7 @@
 
 #include "geometry/cylinder.h"
 #include "geometry/so3.h"
+#include "geometry/visp_matrix.h"
 #include "input/live_video.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
@@ -64,24 +65,6 @@ void clickFirstPose(vpMbTrunkTracker &tracker, const FollowArguments &arguments,
   vpDisplay::display(image);
   vpDisplay::flush(image);
   tracker.initClick(image, fs::path(arguments.model).replace_extension(".init").string(), true);
-}
-
-Matrix6d toEigen(const vpMatrix &m)
-{
-  Matrix6d e;
-  for (unsigned i = 0; i < 6; ++i)
-    for (unsigned j = 0; j < 6; ++j)
-      e(int(i), int(j)) = m[i][j];
-  return e;
-}
-
-vpMatrix toVisp(const Matrix6d &e)
-{
-  vpMatrix m(6, 6);
-  for (unsigned i = 0; i < 6; ++i)
-    for (unsigned j = 0; j < 6; ++j)
-      m[i][j] = e(int(i), int(j));
-  return m;
 }
 
 /// How well a flight knows its own motion, in the axes of the world: x, y, z [m] and the turns about them [rad].

@@ -4,6 +4,7 @@
 #include "interrupt.h"
 
 #include "lab/baseline/comparison_report.h"
+#include "lab/baseline/comparison_video.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
 #include "output/progress.h"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 struct CompareArguments
 {
   std::string sequence, out, settings, json;
-  bool has_basin = false, has_faults = false, is_quick = false, is_quiet = false;
+  bool has_video = true, has_basin = false, has_faults = false, is_quick = false, is_quiet = false;
   double range_m = 25, far_m = 25;
 };
 
@@ -185,6 +186,8 @@ void run(const CompareArguments &arguments)
   writeAtomically(arguments.json.empty() ? arguments.out + "/compare.json" : arguments.json, toJson(report));
   writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
   writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
+  if (arguments.has_video && !interrupted())
+    writeComparisonVideo((fs::path(arguments.out) / "compare.mp4").string(), flight, cao, report.scores);
   if (interrupted()) {
     fmt::print(stderr, "bole: interrupted: what was compared until then is in {}\n", arguments.out);
     endWith(ExitCode::interrupted);
@@ -211,13 +214,15 @@ void addCompare(CLI::App &app)
   command->add_option("--far", arguments->far_m, "Range up to which our tracker uses trunks [m]")
       ->check(CLI::Range(0.5, 100.0))
       ->capture_default_str();
+  command->add_flag("!--no-video", arguments->has_video, "Write no compare.mp4");
   command->add_flag("-q,--quiet", arguments->is_quiet, "No table and no progress");
   command->add_option("--json", arguments->json, "File for all figures (default OUT/compare.json)");
   command->footer(
       "Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
       "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are "
       "used.\n"
-      "Prints the table and writes OUT/compare.json, compare.html and compare.svg.\n"
+      "Prints the table and writes OUT/compare.json, compare.html, compare.svg and compare.mp4 (the trackers with a\n"
+      "prior, side by side).\n"
       "Examples:\n"
       "  bole compare data/park-forward -o run/compare --basin --faults\n"
       "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");

@@ -10,7 +10,6 @@ namespace
 constexpr double kInMap = 0.7;          ///< that a trunk seen is in the map: recall of a map by one flight
 constexpr double kOnMap = 0.5;          ///< before anything is seen: that the flight is on the map
 constexpr double kPlaceFloor = 0.05;    ///< bow and lean between two flights' views of one trunk [m]
-constexpr double kPlaceMost = 0.15;     ///< RMSE of places against each other, after alignment (README) [m]
 constexpr double kLogRadiusFloor = 0.1; ///< the same of its width
 constexpr double kRelativeScale = 0.02; ///< scale of one map against the other: two pose filters
 constexpr std::size_t kProposers = 10;  ///< trunks seen that propose poses: the best known ones

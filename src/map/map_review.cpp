@@ -26,7 +26,7 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
-         trunk.positionSigma() <= m_options.confirm_position_sigma && evidence(trunk) >= m_options.confirm_evidence;
+         isPlaced(trunk.covariance) && evidence(trunk) >= m_options.confirm_evidence;
 }
 
 namespace

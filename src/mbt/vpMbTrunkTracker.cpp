@@ -2,6 +2,7 @@
 // The ViSP side of vpMbTrunkTracker. Its estimation is PoseEstimator; its display is in vpMbTrunkTrackerDisplay.cpp.
 #include "mbt/trunk_tracker_impl.h"
 
+#include "geometry/visp_matrix.h"
 #include "mbt/cao_reader.h"
 #include "mbt/trunk_settings.h"
 
@@ -15,27 +16,11 @@ using bole::ImageFault;
 using bole::Matrix6d;
 using bole::PinholeCamera;
 using bole::Pose;
+using bole::toEigen;
+using bole::toVisp;
 
 namespace
 {
-Matrix6d toEigen(const vpMatrix &m)
-{
-  Matrix6d e;
-  for (unsigned i = 0; i < 6; ++i)
-    for (unsigned j = 0; j < 6; ++j)
-      e(int(i), int(j)) = m[i][j];
-  return e;
-}
-
-vpMatrix toVisp(const Eigen::MatrixXd &e)
-{
-  vpMatrix m(unsigned(e.rows()), unsigned(e.cols()));
-  for (unsigned i = 0; i < m.getRows(); ++i)
-    for (unsigned j = 0; j < m.getCols(); ++j)
-      m[i][j] = e(int(i), int(j));
-  return m;
-}
-
 [[noreturn]] void refuse(const char *what)
 {
   throw vpException(vpException::notImplementedError, fmt::format("{}: a model of trunks holds cylinders only", what));

@@ -66,6 +66,7 @@ FrameError answerOf(Contender &contender, const TestFlight &flight, std::size_t 
   e.complained = answer.complained;
   e.wrong = error.position_m > limits.position_m || error.rotation_deg > limits.rotation_deg;
   e.ms = answer.ms;
+  e.cMo = answer.cMo;
   return e;
 }
 } // namespace

@@ -20,6 +20,7 @@ struct FrameError
   double position_m = 0, rotation_deg = 0;
   bool complained = false, wrong = false;
   double ms = 0;
+  Pose cMo; ///< its answer
 };
 
 struct Score

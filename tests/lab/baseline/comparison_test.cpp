@@ -2,10 +2,12 @@
 #include "support/drawn_trunks.h"
 
 #include "lab/baseline/comparison_report.h"
+#include "lab/baseline/comparison_video.h"
 #include "mbt/cao_reader.h"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/videoio.hpp>
 
 #include <filesystem>
 #include <unistd.h>
@@ -210,6 +212,36 @@ TEST_F(Comparison, TheBasinOfOursOnPlainTrunksReachesSixteenPixels)
   const BasinRow row = basin(flight, m_cao, ours, false, options);
   EXPECT_EQ(row.pairs, 2);
   EXPECT_THAT(row.success, testing::Each(1.0));
+}
+
+TEST_F(Comparison, TheVideoShowsEveryTrackerWithAPriorInTheColourOfItsAnswer)
+{
+  const TestFlight flight = drawnFlight(5);
+  std::vector<Contender> contenders;
+  contenders.emplace_back(TrackerKind::trunk, Help::alone, EdgeSettings());
+  contenders.emplace_back(TrackerKind::visp_edge, Help::prior, EdgeSettings());
+  contenders.emplace_back(TrackerKind::trunk, Help::prior, EdgeSettings());
+  std::vector<Score> scores = run(flight, std::move(contenders));
+  for (FrameError &error : scores[1].errors)
+    error.wrong = true, error.complained = false;
+  const std::string path = testing::TempDir() + "comparison_" + std::to_string(::getpid()) + ".mp4";
+  writeComparisonVideo(path, flight, m_cao, scores);
+  cv::VideoCapture video(path);
+  cv::Mat picture;
+  int pictures = 0, green[2] = {0, 0}, red[2] = {0, 0};
+  for (; video.read(picture); ++pictures)
+    for (int column = 0; column < picture.cols; ++column)
+      for (int row = 0; row < picture.rows - 40; ++row) {
+        const cv::Vec3b bgr = picture.at<cv::Vec3b>(row, column);
+        green[column * 2 / picture.cols] += bgr[1] > bgr[2] + 80;
+        red[column * 2 / picture.cols] += bgr[2] > bgr[1] + 80;
+      }
+  std::filesystem::remove(path);
+  EXPECT_EQ(pictures, 4);
+  EXPECT_GT(red[0], 500);
+  EXPECT_EQ(green[0], 0);
+  EXPECT_GT(green[1], 500);
+  EXPECT_EQ(red[1], 0);
 }
 
 TEST_F(Comparison, TheReportTellsTheSameInAllThreeForms)

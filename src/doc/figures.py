@@ -1,0 +1,222 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Draws the pictures of README and documentation from runs (Debian: python3-opencv python3-matplotlib python3-pil).
+
+  bole track data/park-forward -o run && src/doc/figures.py system run data/park-forward data/figures/system.png
+  src/doc/figures.py gif run/overlay.mp4 data/figures/park-forward.gif
+  src/doc/figures.py frames data/figures/frames.svg"""
+import argparse
+import csv
+import math
+import os
+
+import cv2
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.patches as patches  # noqa: E402
+import matplotlib.pyplot as plt  # noqa: E402
+from PIL import Image  # noqa: E402
+
+BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#777777"  # Okabe and Ito
+
+
+def rows_of(path):
+    with open(path, encoding="utf-8") as text:
+        return [r for r in csv.DictReader(text) if not next(iter(r.values())).startswith("#")]
+
+
+def pictures_of(path):
+    video, pictures = cv2.VideoCapture(path), []
+    while True:
+        ok, picture = video.read()
+        if not ok:
+            return pictures
+        pictures.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+
+
+def gif(arguments):
+    """A moving picture at the speed of the video (10 frames a second), small enough for a page."""
+    pictures = pictures_of(arguments.video)[::arguments.every]
+    small = [cv2.resize(p, None, fx=arguments.width / p.shape[1], fy=arguments.width / p.shape[1],
+                        interpolation=cv2.INTER_AREA) for p in pictures]
+    pixels = np.vstack(small[:: max(1, len(small) // 8)]).reshape(-1, 3)
+    coloured = pixels[np.ptp(pixels.astype(int), axis=1) > 50]  # the palette is for what is drawn, not for the wood
+    greys = pixels[:: max(1, 2 * len(pixels) // max(1, len(coloured)))]
+    palette = Image.fromarray(np.vstack([coloured, greys])[None]).quantize(arguments.colours)
+    frames = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in small]
+    frames[0].save(arguments.out, save_all=True, append_images=frames[1:], duration=100 * arguments.every, loop=0,
+                   optimize=True)
+
+
+def pose_of(run, stamp):
+    """World pose of the body nearest to a stamp: R, t."""
+    poses = np.loadtxt(os.path.join(run, "trajectory.tum"))
+    _, x, y, z, qx, qy, qz, qw = poses[np.argmin(abs(poses[:, 0] - stamp))]
+    R = np.array([[1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)],
+                  [2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)],
+                  [2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)]])
+    return R, np.array([x, y, z]), poses[:, 1:4]
+
+
+def border_in_image(trunk, R, t, camera, side, heights):
+    """Pixels (u, v) where the border of a trunk stands at some heights: the tangents from the camera (Eq. 7)."""
+    u = []
+    for z in heights:
+        lean = (z - 1.3) * np.array([float(trunk["lean_x"]), float(trunk["lean_y"])])
+        to = np.array([float(trunk["x"]), float(trunk["y"])]) + lean - t[:2]
+        d, bearing = np.hypot(*to), math.atan2(to[1], to[0]) + side * math.asin(float(trunk["radius"]) / np.hypot(*to))
+        reach = math.sqrt(d * d - float(trunk["radius"]) ** 2)
+        body = R.T @ np.array([reach * math.cos(bearing), reach * math.sin(bearing), z - t[2]])
+        f, _, cu, cv = camera
+        u.append([cu - f * body[1] / body[0], cv - f * body[2] / body[0]])
+    return np.array(u)
+
+
+def energy_of(image, border, shifts):
+    """Minus the strength of the mean signed gradient along the border, moved sideways by so many pixels (Eq. 3)."""
+    blurred = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 1)
+    gradient = (np.roll(blurred, -1, 1) - np.roll(blurred, 1, 1)) / 2
+    (u0, v0), (u1, v1) = border[0], border[-1]
+    v = np.arange(max(0, int(min(v0, v1))), min(image.shape[0], int(max(v0, v1))))
+    u = u0 + (v - v0) / (v1 - v0) * (u1 - u0)
+    sampled = [cv2.remap(gradient, (u + s).astype(np.float32)[None], v.astype(np.float32)[None], cv2.INTER_LINEAR)
+               for s in shifts]
+    return -np.array([abs(s.mean()) for s in sampled])
+
+
+def system(arguments):
+    run, flight, k = arguments.run, arguments.flight, arguments.frame
+    images = sorted(os.listdir(os.path.join(flight, "mav0/cam0/data")))
+    image = cv2.imread(os.path.join(flight, "mav0/cam0/data", images[k]), cv2.IMREAD_GRAYSCALE)
+    stamp = float(rows_of(os.path.join(run, "frames.csv"))[k]["stamp"])
+    R, t, path = pose_of(run, stamp)
+    seen = {r["id"] for r in rows_of(os.path.join(run, "views.csv")) if int(r["frame"]) == k}
+    trunks = rows_of(os.path.join(run, "trunks.csv"))
+    shown = [r for r in trunks if r["id"] in seen]
+    camera = (200, 200, 159.5, 119.5)
+
+    figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
+    (frame, near, borders), (relative, summary, map_) = axes
+    frame.imshow(image, cmap="gray")
+    frame.set_title("1  a frame, gyro, odometry", loc="left")
+
+    saliency = pictures_of(os.path.join(run, "saliency.mp4"))[k]
+    half = saliency[:, saliency.shape[1] // 2:]
+    near.imshow(half[: int(half.shape[1] * 0.75)])
+    near.set_title("2  what is near enough to matter (Eq. 10-17)", loc="left")
+
+    borders.imshow(image, cmap="gray")
+    heights = np.linspace(0.2, 2.2, 9)
+    for trunk in shown:
+        for side in (-1, 1):
+            line = border_in_image(trunk, R, t, camera, side, heights)
+            borders.plot(line[:, 0], line[:, 1], color=ORANGE, lw=2)
+    borders.set_xlim(0, image.shape[1] - 1), borders.set_ylim(image.shape[0] - 1, 0)
+    borders.set_title("3  the borders of each trunk (Eq. 3)", loc="left")
+    for axis in (frame, near, borders):
+        axis.set_xticks([]), axis.set_yticks([])
+
+    draw_relative(relative)
+    relative.set_title("4  relative trunk: bearing, inclination, r/d", loc="left")
+
+    width = lambda r: float(r["radius"]) / np.hypot(float(r["x"]) - t[0], float(r["y"]) - t[1])  # noqa: E731
+    nearest = max(shown, key=width)
+    shifts = np.arange(-8, 8.01, 0.25)
+    line = border_in_image(nearest, R, t, camera, 1, heights)
+    energy = energy_of(image, line, shifts)
+    best = np.argmin(np.where(abs(shifts) < 4, energy, 0))
+    curvature = (energy[best + 4] - 2 * energy[best] + energy[best - 4]) / 1.0
+    summary.plot(shifts, energy, color=GREY, label="energy of the image")
+    inside = abs(shifts - shifts[best]) < 3
+    summary.plot(shifts[inside], (energy[best] + curvature / 2 * (shifts - shifts[best]) ** 2)[inside], color=ORANGE,
+                 lw=2.5, label="summary factor")
+    summary.set_ylim(energy.min() * 1.1, 0), summary.set_yticks([])
+    summary.set_xlabel(f"left border of trunk {nearest['id']}, moved sideways [px]")
+    summary.legend(frameon=False, loc="lower right")
+    summary.set_title("5  a quadratic replaces the image (Eq. 9)", loc="left")
+
+    for row in rows_of(os.path.join(run, "evidence.csv")):
+        map_.add_patch(patches.Rectangle((float(row["x"]) - .05, float(row["y"]) - .05), .1, .1, color="#DDDDDD", lw=0))
+    map_.plot(path[:, 0], path[:, 1], color=BLUE, lw=1.5)
+    map_.plot(t[0], t[1], "o", color=BLUE, ms=6)
+    truth = os.path.join(flight, "trees.csv")
+    for row in rows_of(truth) if os.path.exists(truth) else []:
+        columns = list(row.values())
+        map_.add_patch(patches.Circle((float(columns[1]), float(columns[2])), float(columns[3]), color="#999999", lw=0))
+    for row in trunks:
+        map_.add_patch(patches.Circle((float(row["x"]), float(row["y"])), float(row["radius"]), fill=False, lw=2,
+                                      color=ORANGE))
+    centre = path.mean(axis=0)
+    map_.set_xlim(path[:, 0].min() - 2, path[:, 0].max() + 7), map_.set_ylim(centre[1] - 6, centre[1] + 6)
+    map_.set_aspect("equal"), map_.set_xlabel("x [m]"), map_.set_ylabel("y [m]")
+    map_.set_title("6  path and map (Eq. 2); grey: truth", loc="left")
+    figure.tight_layout()
+    figure.savefig(arguments.out, dpi=80)
+
+
+def draw_relative(axis):
+    """A trunk from above, as the camera c sees it."""
+    d, r = 3.0, 0.55
+    half = math.asin(r / d)
+    axis.add_patch(patches.Circle((d, 0), r, color="#DDC9A8"))
+    axis.plot([0, d], [0, 0], color=GREY, lw=1)
+    for side in (-1, 1):
+        axis.plot([0, 4.2 * math.cos(half)], [0, side * 4.2 * math.sin(half)], color=ORANGE, lw=2)
+    axis.plot([d, d], [0, r], color=GREY, lw=1)
+    axis.text(d + 0.06, r / 2, "r"), axis.text(d / 2, -0.16, "d"), axis.text(-0.2, 0.08, "c")
+    axis.plot(0, 0, "o", color=BLUE)
+    axis.add_patch(patches.Arc((0, 0), 2.8, 2.8, theta1=0, theta2=math.degrees(half), color=GREEN, lw=2))
+    axis.text(1.5, 0.08, "asin r/d", color=GREEN)
+    axis.set_xlim(-0.4, 4.4), axis.set_ylim(-1.3, 1.3), axis.set_aspect("equal"), axis.axis("off")
+
+
+def frames(arguments):
+    """World, body, camera and trunk, from the side."""
+    figure, axis = plt.subplots(figsize=(8, 3.6))
+    axis.axhline(0, color="#8a7a5a", lw=2)
+    axis.add_patch(patches.Rectangle((5.6, 0), 0.5, 3, color="#DDC9A8"))
+
+    def arrows(at, name, directions):
+        for (dx, dz), label, colour in directions:
+            axis.annotate("", (at[0] + dx, at[1] + dz), at, arrowprops={"arrowstyle": "->", "color": colour, "lw": 2})
+            axis.text(at[0] + 1.12 * dx + (0.04 if not dx else 0), at[1] + 1.12 * dz + 0.04, label, color=colour)
+        axis.plot(*at, "o", color="black", ms=5)
+        axis.text(at[0] - 0.12, at[1] - 0.3, name, ha="right", fontsize=12, weight="bold")
+
+    arrows((0, 0), "w", [((0.8, 0), "x", RED), ((0, 0.8), "z up", BLUE)])
+    arrows((2, 1.5), "b", [((0.7, 0), "x ahead", RED), ((0, 0.7), "z", BLUE)])
+    arrows((3.6, 1.35), "c", [((0.7, 0), "z ahead", BLUE), ((0, -0.6), "y down", GREEN)])
+    arrows((5.85, 0), "t", [((0.7, 0), "x away", RED), ((0, 1.0), "z along the axis", BLUE)])
+    axis.plot([2, 3.6], [1.5, 1.35], color=GREY, lw=1, ls="--")
+    axis.text(2.95, 1.2, "bMc", ha="center", color=GREY)
+    axis.plot([0, 2], [0, 1.5], color=GREY, lw=1, ls="--")
+    axis.text(0.85, 0.9, "wMb", ha="right", color=GREY)
+    axis.text(2, 2.55, "y of b: left; x of c: right", color=GREY)
+    axis.set_xlim(-0.6, 7.8), axis.set_ylim(-0.5, 3.1), axis.set_aspect("equal"), axis.axis("off")
+    figure.tight_layout()
+    figure.savefig(arguments.out)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = parser.add_subparsers(required=True)
+    part = what.add_parser("system", help="how the system works, on one frame of a run")
+    part.add_argument("run"), part.add_argument("flight"), part.add_argument("out")
+    part.add_argument("--frame", type=int, default=60)
+    part.set_defaults(draw=system)
+    part = what.add_parser("gif", help="a moving picture of a video")
+    part.add_argument("video"), part.add_argument("out")
+    part.add_argument("--every", type=int, default=3, help="shows one picture in so many")
+    part.add_argument("--width", type=int, default=400), part.add_argument("--colours", type=int, default=48)
+    part.set_defaults(draw=gif)
+    part = what.add_parser("frames", help="the coordinate frames")
+    part.add_argument("out")
+    part.set_defaults(draw=frames)
+    arguments = parser.parse_args()
+    arguments.draw(arguments)
+
+
+if __name__ == "__main__":
+    main()
