@@ -13,6 +13,7 @@
 
 namespace bole
 {
+/// The limits that the laws keep.
 struct FlightLawOptions
 {
   double hover_after_s = 0.5; ///< without a new command, 0.05 to 2: five frames of a slow tracker
@@ -36,15 +37,17 @@ struct OwnState
   double battery = 1;                                 ///< share of full
 };
 
+/// What the laws make of a command.
 struct FlightOrder
 {
+  /// What the drone does.
   enum class Kind
   {
     flies, ///< at `velocity`
     hovers,
     lands
   };
-  Kind kind = Kind::hovers;
+  Kind kind = Kind::hovers;                           ///< what the drone does
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero(); ///< vx, vy, vz [m/s], wz [rad/s] of the body
   const char *law = "";                               ///< that overrules what was wanted; empty where none does
 };
@@ -54,6 +57,7 @@ struct FlightOrder
 class FlightLaws
 {
 public:
+  /// \throw vpException where an option is out of its range.
   explicit FlightLaws(const FlightLawOptions &options = {});
 
   void takeOff(double time_s);                        ///< the fence stands round the next place told

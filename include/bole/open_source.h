@@ -57,8 +57,9 @@ struct SensorCalibration
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(); ///< [rad/s]
   Eigen::Matrix3d bRo = Eigen::Matrix3d::Identity();   ///< rotation of the odometry's body in the body
   double odometry_scale = 1;                           ///< horizontal lengths of the odometry over the true ones
-  double odometry_rotation_sigma = 0, odometry_scale_sigma = 0; ///< what is left open of the two [rad], [1]
-  std::vector<CalibratedConstant> constants;                    ///< all that were measured
+  double odometry_rotation_sigma = 0;                  ///< what is left open of bRo [rad]
+  double odometry_scale_sigma = 0;                     ///< what is left open of odometry_scale [1]
+  std::vector<CalibratedConstant> constants;           ///< all that were measured
   std::vector<SensorVerdict>
       verdicts; ///< sensors that contradict the others from the start on, for which no constant helps
 };

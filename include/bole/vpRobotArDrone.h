@@ -44,12 +44,12 @@ public:
   /// Limits of what is sent.
   struct Options
   {
-    bole::FlightLawOptions laws;
-    double gain = 0.3;          ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
-    double largest_share = 0.5; ///< (0, 1]: of tilt, climb and turn
-    double largest_climb = 0.7; ///< [m/s], (0, 5): the drone's setting control:control_vz_max
-    double largest_turn = 1.74; ///< [rad/s], (0, 7): the drone's setting control:control_yaw
-    vpHomogeneousMatrix bMc;    ///< camera in the body; default: looks ahead at the body's origin
+    bole::FlightLawOptions laws; ///< kept in the robot's own loop
+    double gain = 0.3;           ///< share of the largest tilt per m/s, (0, 2): 0.5 gave 1.4 m/s^2 on a real drone
+    double largest_share = 0.5;  ///< (0, 1]: of tilt, climb and turn
+    double largest_climb = 0.7;  ///< [m/s], (0, 5): the drone's setting control:control_vz_max
+    double largest_turn = 1.74;  ///< [rad/s], (0, 7): the drone's setting control:control_yaw
+    vpHomogeneousMatrix bMc;     ///< camera in the body; default: looks ahead at the body's origin
     Options();
     /// \throws vpException where a value is out of range, with what is allowed
     void validate() const;

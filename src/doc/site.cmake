@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # The site of the documentation in build/PRESET/site: cmake --build --preset release --target doc
+# Needs Debian's doxygen and libjs-mathjax: formulas are typeset in the browser.
 find_package(Doxygen 1.9 QUIET)
-if(NOT DOXYGEN_FOUND)
+find_path(BOLE_MATHJAX MathJax.js PATHS /usr/share/javascript/mathjax NO_DEFAULT_PATH)
+if(NOT DOXYGEN_FOUND OR NOT BOLE_MATHJAX)
   return()
 endif()
 set(DOXYGEN_PROJECT_BRIEF "${PROJECT_DESCRIPTION}")
@@ -17,21 +19,16 @@ set(DOXYGEN_STRIP_FROM_INC_PATH ${PROJECT_SOURCE_DIR}/include)
 set(DOXYGEN_IMAGE_PATH ${PROJECT_SOURCE_DIR}/data/figures)
 set(DOXYGEN_EXAMPLE_PATH ${PROJECT_SOURCE_DIR}/tests/install)
 set(DOXYGEN_GENERATE_TREEVIEW YES)
+set(DOXYGEN_HTML_EXTRA_STYLESHEET ${CMAKE_CURRENT_LIST_DIR}/site.css)
 set(DOXYGEN_HAVE_DOT NO)
 set(DOXYGEN_QUIET YES)
 # headings of Markdown get the anchors that they have on the web, so that one source serves both
 set(DOXYGEN_FILTER_PATTERNS *.md=${CMAKE_CURRENT_LIST_DIR}/anchors.awk)
-# formulas are typeset in the browser, by the copy of MathJax that Debian has
-find_path(BOLE_MATHJAX MathJax.js PATHS /usr/share/javascript/mathjax NO_DEFAULT_PATH)
-if(BOLE_MATHJAX)
-  set(DOXYGEN_USE_MATHJAX YES)
-  set(DOXYGEN_MATHJAX_RELPATH mathjax)
-endif()
+set(DOXYGEN_USE_MATHJAX YES)
+set(DOXYGEN_MATHJAX_RELPATH mathjax)
 doxygen_add_docs(doc ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CONTRIBUTING.md
   ${PROJECT_SOURCE_DIR}/models/README.md ${PROJECT_SOURCE_DIR}/src/doc ${PROJECT_SOURCE_DIR}/include
   COMMENT "Making the documentation in ${PROJECT_BINARY_DIR}/site")
-if(BOLE_MATHJAX)
-  add_custom_command(TARGET doc POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/site/mathjax
+add_custom_command(TARGET doc POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/site/mathjax
     COMMAND cp -rL ${BOLE_MATHJAX}/MathJax.js ${BOLE_MATHJAX}/config ${BOLE_MATHJAX}/extensions ${BOLE_MATHJAX}/jax
       ${BOLE_MATHJAX}/fonts ${PROJECT_BINARY_DIR}/site/mathjax VERBATIM)
-endif()
