@@ -28,17 +28,30 @@ bool reaches(const GreyPlane &image, const cv::Point2f &corner)
          corner.y < static_cast<float>(image.height); // false for NaN
 }
 
-/// One level: moves \p to, the first pixel of the window; false where the window has no texture or leaves the image.
-bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations)
+/// Least and greatest eigenvalue of the gradient moments.
+std::pair<float, float> eigenvalues(const Window &window)
+{
+  const float xx = kUnit * window.xx, xy = kUnit * window.xy, yy = kUnit * window.yy;
+  const float apart = std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy);
+  return {0.5f * (xx + yy - apart), 0.5f * (xx + yy + apart)};
+}
+
+const cv::Point2f kHalf(0.5f * (kWindow_px - 1), 0.5f * (kWindow_px - 1)); // from the middle to the first pixel
+
+/// One level: moves \p to, the first pixel of the window; false where the window has no texture, is less round than
+/// \p least_roundness or leaves the image.
+bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations,
+              double least_roundness)
 {
   if (!reaches(first, from))
     return false;
   Window window;
   cutWindow(first, from.x, from.y, window);
   const float xx = kUnit * window.xx, xy = kUnit * window.xy, yy = kUnit * window.yy;
-  const float weakest = (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy)) / (2 * kWindow_px * kWindow_px);
+  const auto [weakest, strongest] = eigenvalues(window);
   const float determinant = xx * yy - xy * xy;
-  if (weakest < kLeastTexture || determinant < std::numeric_limits<float>::epsilon())
+  if (weakest < kLeastTexture * kWindow_px * kWindow_px || weakest < least_roundness * strongest ||
+      determinant < std::numeric_limits<float>::epsilon())
     return false;
   const float inverse = 1 / determinant;
   cv::Point2f before(0, 0);
@@ -69,22 +82,31 @@ void buildPyramid(const cv::Mat &image, int levels, GreyPyramid &pyramid)
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
 }
 
+double roundness(const cv::Mat &image, const cv::Point2f &at)
+{
+  if (!reaches(plane(image), at - kHalf))
+    return 0;
+  Window window;
+  cutWindow(plane(image), at.x - kHalf.x, at.y - kHalf.y, window);
+  const auto [weakest, strongest] = eigenvalues(window);
+  return strongest > 0 ? weakest / strongest : 0;
+}
+
 bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
                   const FollowOptions &options)
 {
-  const cv::Point2f half(0.5f * (kWindow_px - 1), 0.5f * (kWindow_px - 1));
   const int top = std::min({options.levels, static_cast<int>(first.size()) - 1, static_cast<int>(second.size()) - 1});
   bool is_found = false;
   to *= std::ldexp(1.f, -top);
   for (int level = top; level >= 0; --level) {
     const std::size_t l = static_cast<std::size_t>(level);
-    cv::Point2f corner = to - half;
-    is_found =
-        refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - half, corner, options.iterations);
-    to = corner + half;
+    cv::Point2f corner = to - kHalf;
+    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - kHalf, corner,
+                        options.iterations, level == 0 ? kLeastRoundness : 0);
+    to = corner + kHalf;
     if (level > 0)
       to *= 2.f;
   }
-  return is_found && reaches(plane(second[0]), to - half);
+  return is_found && reaches(plane(second[0]), to - kHalf);
 }
 } // namespace bole

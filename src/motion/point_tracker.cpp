@@ -185,7 +185,7 @@ void PointTracker::State::replenish(const cv::Mat &image)
       while (held[cell] <= level && !corners[cell].empty()) {
         const Corner corner = corners[cell].back();
         corners[cell].pop_back();
-        if (occupied.taken(corner.at)) {
+        if (occupied.taken(corner.at) || roundness(next.front(), corner.at) < kLeastRoundness) {
           continue;
         }
         PointTrack track;

@@ -76,6 +76,35 @@ TEST(PointTracker, AWhiteWallHasNoPoints)
   EXPECT_TRUE(tracker.matches(1).empty());
 }
 
+/// A jagged rope in front of a plain wall, and spots beside it; everything moved by (x, y).
+vpImage<unsigned char> rope(double x, double y)
+{
+  vpImage<unsigned char> image(240, 320, 60);
+  for (int v = 0; v < 240; ++v)
+    for (int u = 0; u < 320; ++u) {
+      const double wall_u = u - x, wall_v = v - y;
+      if (std::abs(wall_v - 0.6 * wall_u - 60) < 1.5) // the middle of the pixel alone is asked: steps, as in a render
+        image[v][u] = 190;
+      for (int spot = 0; spot < 60; ++spot) {
+        const double su = wall_u - 40 - (spot % 15) * 19.3 - 3 * (spot % 4),
+                     sv = wall_v - 20 - (spot % 3) * 5 - (spot / 15) * 9.1 + (spot / 30) * -162;
+        image[v][u] = static_cast<unsigned char>(std::min(255., image[v][u] + 90 * std::exp(-(su * su + sv * sv) / 8)));
+      }
+    }
+  return image;
+}
+
+TEST(PointTracker, NoPointSlidesAlongARope)
+{
+  PointTracker tracker(kCamera);
+  for (int k = 0; k < 4; ++k)
+    tracker.track(rope(1.3 * k, 0.4 * k));
+  const auto matches = tracker.matches(3);
+  EXPECT_GT(matches.size(), 30u);
+  for (const PointMatch &match : matches)
+    EXPECT_LT((match.b_px - match.a_px - Eigen::Vector2d(3.9, 1.2)).norm(), 0.3) << match.a_px.transpose();
+}
+
 TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
 {
   PointTracker tracker(kCamera);

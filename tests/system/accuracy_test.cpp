@@ -4,6 +4,8 @@
 
 #include <bole/evaluation.h>
 
+#include <algorithm>
+#include <cmath>
 #include <ostream>
 
 namespace
@@ -68,4 +70,21 @@ INSTANTIATE_TEST_SUITE_P(
         KnownFlight{"loop", "--seed 14 --density .08 --light sun --bark mixed --path loop --exposure 15", 4, 2, .075,
                     .075}),
     [](const auto &flight) { return std::string(flight.param.name); });
+
+/// A pole in a hall of ropes and beams, seen through a wide lens that others rendered, with their log as odometry.
+TEST(Accuracy, ThePoleInAHallStandsWhereItIs)
+{
+  const std::string sequence = BOLE_SHARED_DATA_DIR "/real/bebop-pole", folder = freshFolder("pole");
+  if (!std::filesystem::exists(sequence))
+    GTEST_SKIP() << sequence << " is absent";
+  ASSERT_EQ(run("track " + sequence + " -o " + folder + " --no-video").status, 0);
+  const bole::Evaluation evaluation = bole::evaluate(folder, sequence);
+  ASSERT_TRUE(evaluation.trunks);
+  const auto pole = std::find_if(evaluation.trunks->matches.begin(), evaluation.trunks->matches.end(),
+                                 [](const bole::TrunkMatch &match) { return match.truth_id == 0; });
+  ASSERT_NE(pole, evaluation.trunks->matches.end());
+  EXPECT_LT(pole->error[indexOf(bole::Alignment::xy_yaw)], 0.10);
+  EXPECT_LT(std::abs(pole->radius_error), 0.015);
+  EXPECT_TRUE(evaluation.trunks->false_positives.empty());
+}
 } // namespace
