@@ -10,6 +10,7 @@
 #include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <visp3/core/vpException.h>
 #include <visp3/sensor/vpV4l2Grabber.h>
 
