@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Puts a campaign's figures into the documentation, or says where the two differ.
+"""Puts the figures of campaigns and comparisons into the documentation, or says where the two differ.
 
-A page marks the place with <!-- campaign NAME RUN --> ... <!-- end -->; the figures come from data/results/NAME.csv, the
-summary.csv of the campaign config/campaign/NAME.yaml. With --check nothing is written: status 1 where a page differs."""
+A page marks the place with <!-- campaign NAME RUN... --> ... <!-- end -->; the figures come from data/results/NAME.csv,
+the summary.csv of the campaign config/campaign/NAME.yaml. <!-- compare TABLE SEQUENCE... -->, with TABLE one of trackers,
+basin and faults, shows data/results/compare/SEQUENCE.json, which --compare makes of the compare.json that `bole compare`
+has written. With --check nothing is written: status 1 where a page differs."""
 import argparse
 import csv
 import glob
+import json
 import os
 import re
 import sys
@@ -15,7 +18,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 NAMES = {"recall": "recall", "precision": "precision", "position_median_m": "position error, median of the flights [m]",
          "position_rmse_m": "position RMSE [m]", "radius_rmse_m": "radius RMSE [m]", "radius_bias_m": "radius bias [m]", "nees_half": "NEES/2 of trunks",
          "ate_m": "ATE after x, y, yaw [m]", "ate_odometry_m": "... of the odometry [m]"}
-MARK = re.compile(r"(<!-- campaign (\S+) ([^>]*?) -->\n).*?(<!-- end -->)", re.S)
+MARK = re.compile(r"(<!-- (campaign|compare) (\S+) ([^>]*?) -->\n).*?(<!-- end -->)", re.S)
 
 
 def table(name, runs):
@@ -38,15 +41,75 @@ def table(name, runs):
     return "\n".join(lines) + "\n"
 
 
+def comparison(kind, sequences):
+    found = []
+    for name in sequences:
+        with open(os.path.join(ROOT, "data/results/compare", name + ".json"), encoding="utf-8") as text:
+            found.append(json.load(text))
+    figure = lambda v, digits: "-" if v is None else f"{v:.{digits}f}"
+    lines = []
+    if kind == "trackers":
+        lines.append("| | " + " | ".join(f"{d['name']} ({d['frames'] - 1})" for d in found) + " |")
+        lines.append("|---|" + "---|" * len(found))
+        for i, row in enumerate(found[0]["trackers"]):
+            cells = [d["trackers"][i] for d in found]
+            lines.append(f"| `{row['tracker']}` {row['help']} | " + " | ".join(
+                f"{c['frames_until_loss']} ({figure(c['position_rmse_all_frames_m'], 3)}) {c['silent_failures']}, "
+                f"{figure(c['median_ms'], 1)}" for c in cells) + " |")
+        lines.append("| cost on the same trunks, true pose set every frame: EDGE, ours [ms] | " + " | ".join(
+            ", ".join(figure(c["median_ms"], 1) for c in d["cost_on_the_same_trunks"]) for d in found) + " |")
+    elif kind == "basin":
+        steps = found[0]["basin"][0]["steps_px"]
+        lines.append("| | " + " | ".join(f"{s:g} px" for s in steps) + " |")
+        lines.append("|---|" + "---|" * len(steps))
+        for i, row in enumerate(found[0]["basin"]):
+            pairs = [d["basin"][i]["pairs"] for d in found]
+            shares = [sum(d["basin"][i]["success"][k] * n for d, n in zip(found, pairs)) / sum(pairs) for k in range(len(steps))]
+            lines.append(f"| `{row['tracker']}`, {'forest' if row['clutter'] else 'plain'} | " + " | ".join(
+                f"{s:.3f}" for s in shares) + " |")
+    else:
+        faults = list(dict.fromkeys(row["fault"] for row in found[0]["faults"]))
+        trackers = list(dict.fromkeys(row["tracker"] for row in found[0]["faults"]))
+        lines.append("| silent, recovered (slowest) | " + " | ".join(faults) + " |")
+        lines.append("|---|" + "---|" * len(faults))
+        for tracker in trackers:
+            cells = []
+            for fault in faults:
+                rows = [r for d in found for r in d["faults"] if r["tracker"] == tracker and r["fault"] == fault]
+                slowest = max((r["slowest_recovery_frames"] or 0) for r in rows)
+                cells.append(f"{sum(r['silent_failures'] for r in rows)}, {sum(r['recovered'] for r in rows)} of "
+                             f"{sum(r['runs'] for r in rows)}" + (f" ({slowest})" if slowest else ""))
+            lines.append(f"| `{tracker}` | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def keep_comparison(paths):
+    """compare.json without what no table shows: errors of each frame and the sweeps of settings."""
+    os.makedirs(os.path.join(ROOT, "data/results/compare"), exist_ok=True)
+    for path in paths:
+        name = os.path.basename(os.path.dirname(os.path.abspath(path)))
+        with open(path, encoding="utf-8") as text:
+            kept = {k: v for k, v in json.load(text).items() if k != "sweeps"}
+        for tracker in kept["trackers"]:
+            tracker.pop("errors", None)
+        with open(os.path.join(ROOT, "data/results/compare", name + ".json"), "w", encoding="utf-8") as out:
+            json.dump({"name": name, **kept}, out, indent=1)
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true")
-    is_check = parser.parse_args().check
+    parser.add_argument("--compare", nargs="+", default=[], metavar="FOLDER/compare.json",
+                        help="first keep these comparisons, by the names of their folders")
+    arguments = parser.parse_args()
+    is_check = arguments.check
+    keep_comparison(arguments.compare)
     stale = []
     for page in [os.path.join(ROOT, "README.md"), *sorted(glob.glob(os.path.join(ROOT, "src/doc/*.md")))]:
         with open(page, encoding="utf-8") as text:
             old = text.read()
-        new = MARK.sub(lambda m: m.group(1) + table(m.group(2), m.group(3).split()) + m.group(4), old)
+        new = MARK.sub(lambda m: m.group(1) + (table if m.group(2) == "campaign" else comparison)(
+            m.group(3), m.group(4).split()) + m.group(5), old)
         if new != old:
             stale.append(os.path.relpath(page, ROOT))
             if not is_check:
