@@ -229,7 +229,7 @@ public:
   int reachBack(const Variable &variable) const;
   void moveLinearisation(UpdateResult &result);
   Eigen::Vector3d shiftBeyondAffected() const;
-  void dropOldContributions();
+  void dropContribution(Variable &v);
 
   // lag.cpp
   void closeBehindLag();

@@ -102,6 +102,8 @@ void Smoother::State::reeliminate(UpdateResult &result)
   for (const int id : affected) {
     eliminate(id);
     constant_cost += variables[id].share;
+    for (const int child : variables[id].children) // its part is taken in
+      dropContribution(variables[child]);
   }
   result.eliminated += affected.size();
   freeDropped();
@@ -200,23 +202,16 @@ void Smoother::State::backSubstitute(UpdateResult &result)
   moved.erase(std::remove_if(moved.begin(), moved.end(), isFine), moved.end());
 }
 
-void Smoother::State::dropOldContributions()
+/// Frees what an old pose left to its parent, but that of every eighth: where it is needed, the pose is eliminated
+/// again.
+void Smoother::State::dropContribution(Variable &v)
 {
-  if (options.fixed_lag > 0) // bounds the memory by itself, and closes a pose by its contribution
+  if (options.fixed_lag > 0 || !v.is_pose || v.number > static_cast<int>(poses.size()) - 1 - kRecentPoses ||
+      v.number % kContributionEvery ==
+          0) // a fixed lag bounds the memory by itself, and closes a pose by its contribution
     return;
-  const int newest = static_cast<int>(poses.size()) - 1;
-  const auto drop = [&](int number) {
-    Variable &v = variables[poses[number].variable];
-    if (!v.has_contribution || number % kContributionEvery == 0)
-      return;
-    v.has_contribution = false;
-    std::vector<double>().swap(v.contribution);
-  };
-  if (newest - kRecentPoses >= 0)
-    drop(newest - kRecentPoses);
-  for (const int id : affected)
-    if (variables[id].is_pose && variables[id].number < newest - kRecentPoses)
-      drop(variables[id].number);
+  v.has_contribution = false;
+  std::vector<double>().swap(v.contribution);
 }
 
 /// How far the points are shifted against the estimates just beyond what is eliminated again.
@@ -310,7 +305,8 @@ UpdateResult Smoother::State::update()
       break;
     reeliminate(result);
     backSubstitute(result);
-    dropOldContributions();
+    if (const int old = static_cast<int>(poses.size()) - 1 - kRecentPoses; old >= 0)
+      dropContribution(variables[poses[old].variable]);
     ++result.iterations;
   }
   if (options.fixed_lag > 0)

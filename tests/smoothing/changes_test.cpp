@@ -267,6 +267,18 @@ std::size_t growth(int candidates, int fixed_lag)
 
 TEST(Changes, TrunksThatAreGivenUpGiveTheirMemoryBack) { EXPECT_LT(growth(3, 0), 1.5 * growth(0, 0)); }
 
+TEST(Changes, AnOptimisationKeepsNoMoreThanTheUpdates)
+{
+  FlightOptions o;
+  o.poses = 300;
+  const Flight flight = simulateFlight(o);
+  Replay replay(flight, smootherFor(o));
+  replay.run();
+  const std::size_t online = replay.smoother.memoryBytes();
+  replay.smoother.optimize();
+  EXPECT_LT(replay.smoother.memoryBytes(), 1.1 * online);
+}
+
 TEST(Changes, TheLagGivesMemoryBack) { EXPECT_LT(growth(0, 40), 0.2 * growth(0, 0)); }
 } // namespace
 } // namespace bole
