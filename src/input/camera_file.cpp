@@ -215,6 +215,20 @@ MountedCamera readCamera(const std::string &path, int width, int height)
   return extension == ".xml" ? readXml(path, width, height) : readYaml(path);
 }
 
+std::optional<double> readFrameRate(const std::string &path)
+{
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (!std::filesystem::is_regular_file(path) || (extension != ".yaml" && extension != ".yml"))
+    return std::nullopt;
+  const SensorYaml yaml(path, {});
+  if (!yaml.has("rate_hz"))
+    return std::nullopt;
+  const auto rate = yaml.numbers("rate_hz");
+  if (rate.size() != 1 || !(rate[0] >= 1e-3 && rate[0] <= 1e4))
+    yaml.fail("rate_hz", "in [0.001, 10000]");
+  return rate[0];
+}
+
 Pose readSensorPose(const std::string &path)
 {
   if (!std::filesystem::exists(path))

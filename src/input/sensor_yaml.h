@@ -5,6 +5,7 @@
 
 #include <bole/pose.h>
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -39,4 +40,6 @@ private:
 
 /// `T_BS` of an EuRoC `sensor.yaml` of any sensor; identity when the file is absent or has no such key.
 Pose readSensorPose(const std::string &path);
+/// `rate_hz` of a camera file (readCamera()), where it tells one.
+std::optional<double> readFrameRate(const std::string &path);
 } // namespace bole

@@ -2,6 +2,7 @@
 #include "messages.h"
 
 #include "input/rectifier.h"
+#include "input/sensor_yaml.h"
 #include <bole/open_source.h>
 
 #include <cmath>
@@ -70,6 +71,18 @@ const char *const kXml = R"(<?xml version="1.0"?>
 </root>
 )";
 } // namespace
+
+TEST_F(CameraFile, TellsTheRateOfItsPictures)
+{
+  const std::string euroc = kEuroc;
+  EXPECT_EQ(readFrameRate(write("camera.yaml", euroc)), 20);
+  std::string silent = euroc, wrong = euroc;
+  silent.erase(silent.find("rate_hz: 20\n"), 12);
+  EXPECT_EQ(readFrameRate(write("silent.yaml", silent)), std::nullopt);
+  wrong.replace(wrong.find("rate_hz: 20"), 11, "rate_hz: -1");
+  EXPECT_THAT(messageOf([&] { readFrameRate(write("wrong.yaml", wrong)); }), HasSubstr("rate_hz = -1, must be"));
+  EXPECT_EQ(readFrameRate(""), std::nullopt);
+}
 
 TEST_F(CameraFile, ReadsEuroc)
 {
