@@ -427,7 +427,9 @@ void addFollow(CLI::App &app)
       ->add_option("--camera-height", arguments->camera_height,
                    "Height of the camera over the ground [m], which gives a video without odometry its scale")
       ->check(within(0.1, 100));
-  command->add_option("--rate", arguments->source.frame_rate_hz, "Frames a second of numbered images; else the camera file's rate_hz")
+  command
+      ->add_option("--rate", arguments->source.frame_rate_hz,
+                   "Frames a second of numbered images; else the camera file's rate_hz")
       ->capture_default_str();
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();

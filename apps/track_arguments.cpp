@@ -87,7 +87,8 @@ void settle(const CLI::App &command, TrackArguments &arguments)
   for (const std::string &sensor : arguments.without)
     (sensor == "gyro" ? arguments.is_without_gyro : arguments.is_without_odometry) = true;
   if (command.count("--rate") == 0)
-    arguments.source.frame_rate_hz = readFrameRate(arguments.source.camera_path).value_or(arguments.source.frame_rate_hz);
+    arguments.source.frame_rate_hz =
+        readFrameRate(arguments.source.camera_path).value_or(arguments.source.frame_rate_hz);
   arguments.is_field_of_view_given = command.count("--field-of-view") > 0;
   if (arguments.source.odometry_path == "none") {
     arguments.is_without_odometry = arguments.is_without_gyro = true;

@@ -73,6 +73,7 @@ struct PointOdometry::State
 
   double focal() const { return std::sqrt(camera.fx * camera.fy); }
   PointOdometryResult begin(const PointTracker &tracker);
+  void expectTurn(const std::vector<PointMatch> &matches);
   double unexplainedByTurning(const std::vector<PointMatch> &matches) const;
   bool start(const PointTracker &tracker, const RelativePoseEstimate &first, int back);
   PointOdometryResult place(bool turned_known);
@@ -132,6 +133,9 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int
   state.records.push_back(record);
   if (turned) {
     state.velocity.R = turned->R;
+  }
+  else if (state.started) {
+    state.expectTurn(tracker.matches(1));
   }
   PointOdometryResult result = state.started ? state.place(turned.has_value()) : state.begin(tracker);
   result.wMc = state.wMc;
@@ -204,6 +208,19 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     restart();
   }
   return result;
+}
+
+/// A turn that the last motion does not announce: from too far off the robust adjustment takes all for outliers.
+void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
+{
+  constexpr double kSurprise = 2 * kDegree;
+  if (matches.size() < RelativePoseEstimate::kLeastMatches)
+    return;
+  const Eigen::Matrix3d turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}),
+                                                   options.min_sigma_px / focal(), options.relative_pose)
+                                   .aRb;
+  if (logSo3(velocity.R.transpose() * turn).norm() > kSurprise)
+    velocity.R = turn;
 }
 
 /// Flow [px] of the bulk of the matches that a rotation leaves, at the focal length that leaves

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
+#include "motion/coarse_shift.h"
 #include "motion/lucas_kanade.h"
 #include "motion/window_loops.h"
 
@@ -9,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <optional>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -22,6 +24,7 @@ constexpr double kQuality = 0.01;        ///< of a corner against the strongest 
 constexpr double kLeastResponse = 1e-5;  ///< smallest eigenvalue of the gradient moments of a corner, grey 0 to 1
 constexpr int kLevels = 3;               ///< pyramid levels above the image: 3 follow 20 px a frame and more
 constexpr double kMostBackward_px = 0.3; ///< forward-backward error above which a track ends
+constexpr double kEnough = 0.5;          ///< of the tracks: fewer, and the picture may have turned out of their reach
 constexpr double kMargin_px = 4;         ///< from the border of the image
 } // namespace
 
@@ -35,6 +38,8 @@ struct PointTracker::State
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
 
+  template <typename Start>
+  std::pair<std::vector<std::optional<Eigen::Vector2d>>, std::size_t> search(const Start &start) const;
   void follow(const Eigen::Matrix3d &aRb);
   void replenish(const cv::Mat &image);
 };
@@ -118,25 +123,51 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
   ++m_state->frames;
 }
 
-void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
+/// Where each track is now, searched from \p start on; nothing where it ended. Second: how many go on.
+template <typename Start>
+std::pair<std::vector<std::optional<Eigen::Vector2d>>, std::size_t>
+PointTracker::State::search(const Start &start) const
 {
   FollowOptions there, back;
   there.levels = kLevels;
   back.levels = 1; // started where it came from, one level settles whether it is the same corner
-  std::vector<PointTrack> kept;
-  kept.reserve(kMostPoints);
-  for (PointTrack &track : tracks) {
-    const cv::Point2f from = toCv(track.current());
-    const Eigen::Vector3d turned = aRb.transpose() * camera.ray(track.current());
-    cv::Point2f to = turned.z() > 0.1 ? toCv(camera.project(turned)) : from, again = from;
+  std::vector<std::optional<Eigen::Vector2d>> places(tracks.size());
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const cv::Point2f from = toCv(tracks[i].current());
+    cv::Point2f to = start(tracks[i].current()), again = from;
     if (!followWindow(pyramid, next, from, to, there) || !camera.contains(toEigen(to), kMargin_px) ||
         !followWindow(next, pyramid, to, again, back) || cv::norm(again - from) > kMostBackward_px) {
       continue;
     }
+    places[i] = toEigen(to);
+    ++found;
+  }
+  return {std::move(places), found};
+}
+
+void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
+{
+  auto [places, found] = search([&](const Eigen::Vector2d &from) {
+    const Eigen::Vector3d turned = aRb.transpose() * camera.ray(from);
+    return toCv(turned.z() > 0.1 ? Eigen::Vector2d(camera.project(turned)) : from);
+  });
+  if (double(found) < kEnough * double(tracks.size())) { // turned farther than was expected?
+    const Eigen::Vector2d shift = coarseShift(pyramid.front(), next.front());
+    auto shifted = search([&](const Eigen::Vector2d &from) { return toCv(from + shift); });
+    if (shifted.second > found)
+      places = std::move(shifted.first);
+  }
+  std::vector<PointTrack> kept;
+  kept.reserve(kMostPoints);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    PointTrack &track = tracks[i];
+    if (!places[i])
+      continue;
     if (track.positions_px.size() >= static_cast<std::size_t>(PointTracker::kHistory)) {
       track.positions_px.erase(track.positions_px.begin());
     }
-    track.positions_px.push_back(toEigen(to));
+    track.positions_px.push_back(*places[i]);
     kept.push_back(std::move(track));
   }
   tracks = std::move(kept);

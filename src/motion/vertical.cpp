@@ -16,27 +16,15 @@ namespace
 constexpr double kPriorSigma = 20 * kDegree;
 constexpr double kChance = 0.2; ///< share of edges at random that agree with the best direction
 
-struct Edge
-{
-  Eigen::Vector3d normal; ///< unit, of the plane through the camera centre and the edge
-  Eigen::Vector3d ray;    ///< unit, to its middle
-
-  /// Sine of the angle, seen along the ray, between the edge and the direction to \p up. The distance of \p up from
-  /// the plane alone would be small for any edge when \p up lies along the ray: in a narrow field of view all would
-  /// agree on the optical axis.
-  double off(const Eigen::Vector3d &up) const { return normal.dot(up) / across(up); }
-  double across(const Eigen::Vector3d &up) const { return std::max(0.05, ray.cross(up).norm()); }
-};
-
 /// One straight edge a patch, where there is one: its centre and gradient direction from the
 /// moments of the gradients.
-std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, const Eigen::Vector3d &up,
-                            const VerticalOptions &options)
+std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, const Eigen::Vector3d &up,
+                                    const VerticalOptions &options)
 {
   cv::Mat gx, gy;
   cv::Sobel(grey, gx, CV_32F, 1, 0, 3, 1.0 / 8 / 255);
   cv::Sobel(grey, gy, CV_32F, 0, 1, 3, 1.0 / 8 / 255);
-  std::vector<Edge> edges;
+  std::vector<VerticalEdge> edges;
   for (int y0 = 2; y0 + options.cell_px < grey.rows - 2; y0 += options.cell_px) {
     for (int x0 = 2; x0 + options.cell_px < grey.cols - 2; x0 += options.cell_px) {
       double xx = 0, xy = 0, yy = 0, mx = 0, my = 0;
@@ -73,21 +61,23 @@ std::vector<Edge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, co
   }
   return edges;
 }
-} // namespace
+cv::Mat wrapped(const vpImage<unsigned char> &image)
+{
+  return cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
+                 const_cast<unsigned char *>(image.bitmap));
+}
 
-VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                                      const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
+/// \p frames: that the edges come from; they share the lean of their trunks.
+VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vector3d &expected, int frames,
+                       const VerticalOptions &options)
 {
   VerticalEstimate estimate;
-  const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
   estimate.up = expected;
   estimate.covariance = kPriorSigma * kPriorSigma * Eigen::Matrix2d::Identity();
-  const cv::Mat grey(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
-                     const_cast<unsigned char *>(image.bitmap));
-  const std::vector<Edge> edges = findEdges(grey, camera, expected, options);
   if (edges.size() < static_cast<std::size_t>(options.min_edges)) {
     return estimate;
   }
+  const double inflation = options.inflation * frames;
   const double sigma = options.sigma_deg * kDegree;
   constexpr double kPrior = 1 / (kPriorSigma * kPriorSigma);
   double best = 1e300;
@@ -99,10 +89,10 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const
       const Matrix32d B = directionBasis(up);
       H = kPrior * Eigen::Matrix2d::Identity();
       Eigen::Vector2d g = -kPrior * directionMinus(expected, up);
-      for (const Edge &edge : edges) {
+      for (const VerticalEdge &edge : edges) {
         const double e = edge.off(up) / (sigma * width);
         const Eigen::Vector2d J = B.transpose() * edge.normal / edge.across(up);
-        const double w = motion::weightOf(e, 1.5) / (sigma * sigma) / options.inflation;
+        const double w = motion::weightOf(e, 1.5) / (sigma * sigma) / inflation;
         H += w * J * J.transpose();
         g += w * J * edge.off(up);
       }
@@ -110,9 +100,9 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const
     }
     double cost = 0.5 * kPrior * directionMinus(expected, up).squaredNorm();
     int agreeing = 0;
-    for (const Edge &edge : edges) {
+    for (const VerticalEdge &edge : edges) {
       const double e = edge.off(up) / sigma;
-      cost += motion::costOf(e, 1.5) / options.inflation;
+      cost += motion::costOf(e, 1.5) / inflation;
       agreeing += std::abs(e) < 2;
     }
     if (cost < best) {
@@ -127,6 +117,37 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const
   if (estimate.edges >= options.min_edges && beyond_chance > 0.5 * estimate.edges)
     estimate.status = VerticalStatus::ok;
   return estimate;
+}
+} // namespace
+
+VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                                      const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
+{
+  const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
+  return fitUp(findEdges(wrapped(image), camera, expected, options), expected, 1, options);
+}
+
+VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                                      const Eigen::Matrix3d &wRc, const std::optional<Eigen::Vector3d> &expected_up)
+{
+  constexpr std::size_t kMostFrames = 12; // beyond it the path may have turned otherwise than it says
+  constexpr std::size_t kEnough = 3;      // times the least number: a trunk is in several of the frames
+  const VerticalOptions options;
+  const auto least = static_cast<std::size_t>(options.min_edges);
+  const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
+  std::vector<VerticalEdge> edges = findEdges(wrapped(image), camera, expected, options), in_w;
+  for (const VerticalEdge &edge : edges)
+    in_w.push_back({wRc * edge.normal, wRc * edge.ray});
+  int frames = 1;
+  const bool are_few = edges.size() < least;
+  for (auto earlier = m_earlier.begin(); are_few && earlier != m_earlier.end() && edges.size() < kEnough * least;
+       ++earlier, ++frames)
+    for (const VerticalEdge &edge : *earlier)
+      edges.push_back({wRc.transpose() * edge.normal, wRc.transpose() * edge.ray});
+  m_earlier.push_front(std::move(in_w));
+  if (m_earlier.size() > kMostFrames)
+    m_earlier.pop_back();
+  return fitUp(edges, expected, frames, options);
 }
 
 void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate)

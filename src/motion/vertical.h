@@ -8,6 +8,9 @@
 /// line's plane, and up is the direction u with n . u = 0 for as many as possible: a robust
 /// least-squares fit on the sphere, started at several rolls and at the expected direction.
 ///
+/// A small or leafy picture shows fewer edges than a fit needs; the edges of the frames before it, turned as the camera
+/// was, make up for that.
+///
 /// A lone trunk, or trunks all near one bearing, leave the tilt towards and away from the camera
 /// open: the covariance says so.
 ///
@@ -19,7 +22,9 @@
 #include "geometry/direction.h"
 #include <bole/camera.h>
 
+#include <deque>
 #include <optional>
+#include <vector>
 #include <visp3/core/vpImage.h>
 
 namespace bole
@@ -49,11 +54,36 @@ struct VerticalEstimate
   int edges = 0;                                            ///< patches that agree
 };
 
+/// A straight edge that may be vertical, in the frame of a camera or of a path.
+struct VerticalEdge
+{
+  Eigen::Vector3d normal; ///< unit, of the plane through the camera centre and the edge
+  Eigen::Vector3d ray;    ///< unit, to its middle
+
+  /// Sine of the angle, seen along the ray, between the edge and the direction to \p up. The distance of \p up from
+  /// the plane alone would be small for any edge when \p up lies along the ray: in a narrow field of view all would
+  /// agree on the optical axis.
+  double off(const Eigen::Vector3d &up) const { return normal.dot(up) / across(up); }
+  double across(const Eigen::Vector3d &up) const { return std::max(0.05, ray.cross(up).norm()); }
+};
+
 /// \param expected_up where up was last, or nullopt: the image is then taken to be upright within
 /// max_tilt_deg and the pitch near zero (prior of 20 degrees).
 VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
                                       const std::optional<Eigen::Vector3d> &expected_up = std::nullopt,
                                       const VerticalOptions &options = {});
+
+/// Up from the edges of an image and, where these are fewer than VerticalOptions::min_edges, of images shortly before.
+class VerticalFinder
+{
+public:
+  /// \p wRc: rotation of the camera of \p image on its path; the rest as gravityFromVerticals().
+  VerticalEstimate find(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
+                        const std::optional<Eigen::Vector3d> &expected_up);
+
+private:
+  std::deque<std::vector<VerticalEdge>> m_earlier; ///< of the last images, in w
+};
 
 /// Up in the frame w of a path, from many frames: directions \p up seen with \p covariance in the
 /// camera at \p wRc are averaged (robustly) as the flight goes on.

@@ -96,7 +96,7 @@ PointOdometryResult MonocularMotion::place(const Frame &frame, const std::option
   const PointOdometryResult placed = m_odometry.process(m_points.tracker(), frame.stamp_ns, rotated);
   m_pointsMc = placed.wMc;
   m_placed.push_back(m_frame);
-  const VerticalEstimate vertical = gravityFromVerticals(frame.image, m_camera, up());
+  const VerticalEstimate vertical = m_verticals.find(frame.image, m_camera, placed.wMc.R, up());
   m_vertical.add(placed.wMc.R, vertical);
   m_frames_with_up += vertical.status == VerticalStatus::ok;
   if (vertical.status == VerticalStatus::ok)

@@ -52,6 +52,7 @@ private:
   VisualOdometryOptions m_options;
   MotionModel m_model; ///< for the gyro, and for what the images do not show
   PointOdometry m_odometry;
+  VerticalFinder m_verticals;
   VerticalFilter m_vertical; ///< in the world of m_odometry
   ScaleFromHeight m_height_scale;
   std::size_t m_frame = 0;                   ///< number of the frame at hand

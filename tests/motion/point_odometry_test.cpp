@@ -52,6 +52,24 @@ TEST(PointOdometry, KeepsItsUnitOfLengthAlongThePath)
   EXPECT_GT(near, 30);
 }
 
+TEST(PointOdometry, ASwingOfTheCameraCostsItNoUnit)
+{
+  PointTracker tracker(kCamera);
+  PointOdometry odometry(kCamera);
+  const double yaw[] = {0, 0.12, 0.36, 0.6, 0.6, 0.4, 0.1, 0}; // up to 14 degrees a frame
+  Pose truth;
+  for (int k = 0; k < 24; ++k) {
+    const double turned = k < 12 || k >= 20 ? 0 : yaw[k - 12];
+    truth = {expSo3({0, turned, 0}), {0.1 * k, 0, 0.04 * k}};
+    tracker.track(drawWalls(kCamera, truth));
+    const auto result = odometry.process(tracker, k * 100000000LL);
+    EXPECT_LT(logSo3(result.wMc.R.transpose() * truth.R).norm(), 0.02) << k;
+  }
+  const auto path = odometry.trajectory();
+  const double unit = path[11].wMc.t.norm() / 11, after = (path[23].wMc.t - path[20].wMc.t).norm() / 3;
+  EXPECT_NEAR(after / unit, 1, 0.1);
+}
+
 TEST(PointOdometry, ACameraThatOnlyTurnsNeverGetsAUnitOfLength)
 {
   PointTracker tracker(kCamera);
@@ -148,6 +166,29 @@ TEST(Vertical, TrunksPointToTheZenith)
     EXPECT_EQ(estimate.status, VerticalStatus::ok);
     EXPECT_LT(directionMinus(up, estimate.up).norm(), 0.02) << tilt.transpose();
   }
+}
+
+TEST(Vertical, SmallPicturesTellTogetherWhatEachCannot)
+{
+  PinholeCamera small = kCamera;
+  small.width = 100;
+  small.height = 18;
+  small.fx = small.fy = 70;
+  small.cx = 49.5;
+  small.cy = 8.5;
+  const Eigen::Vector3d w_up = expSo3({0.05, 0, -0.15}) * Eigen::Vector3d(0, -1, 0); // in the first camera
+  VerticalFinder finder;
+  VerticalEstimate together;
+  Eigen::Matrix3d wRc = Eigen::Matrix3d::Identity();
+  for (int k = 0; k < 8; ++k) {
+    wRc = expSo3({0, 0.03 * k, 0.02 * k});
+    const auto image = drawTrunks(small, wRc.transpose() * w_up);
+    EXPECT_EQ(gravityFromVerticals(image, small).status, VerticalStatus::too_few_edges);
+    together = finder.find(image, small, wRc, std::nullopt);
+  }
+  EXPECT_EQ(together.status, VerticalStatus::ok);
+  const Eigen::Vector3d up = wRc.transpose() * w_up;
+  EXPECT_LT(std::abs(std::atan2(together.up.x(), -together.up.y()) - std::atan2(up.x(), -up.y())), 0.03); // roll
 }
 
 TEST(Vertical, ANarrowFieldOfViewDoesNotTakeTheOpticalAxisForTheZenith)

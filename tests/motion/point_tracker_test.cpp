@@ -105,6 +105,20 @@ TEST(PointTracker, NoPointSlidesAlongARope)
     EXPECT_LT((match.b_px - match.a_px - Eigen::Vector2d(3.9, 1.2)).norm(), 0.3) << match.a_px.transpose();
 }
 
+TEST(PointTracker, FollowsATurnOfAQuarterOfThePicture)
+{
+  PointTracker tracker(kCamera);
+  const Pose turned(expSo3({0.03, 0.4, 0}), {0.02, 0, 0.05}); // 85 px
+  tracker.track(drawWalls(kCamera, {}));
+  tracker.track(drawWalls(kCamera, turned));
+  const auto matches = tracker.matches(1);
+  EXPECT_GT(matches.size(), 40u);
+  int right = 0;
+  for (const PointMatch &match : matches)
+    right += (kCamera.project(turned.R.transpose() * kCamera.ray(match.a_px)) - match.b_px).norm() < 6; // parallax
+  EXPECT_GT(right, 0.9 * double(matches.size()));
+}
+
 TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
 {
   PointTracker tracker(kCamera);
