@@ -338,6 +338,10 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
                    "What the task is told: real (the tracker), truth-map (images tracked against the true trunks) or "
                    "truth (no image is looked at)")
       ->capture_default_str();
+  task->add_option("--missing", trial.missing,
+                   "By truth: share of the trunks that the map never has, while no bark has points")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
   task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();
   task->add_option("--samples", trial.robot.renderer.samples_per_pixel, "Rays a pixel")->capture_default_str();
   task->add_option("--latency", trial.robot.video_delay_s,

@@ -175,10 +175,10 @@ TaskCommand GapTask::fly(std::vector<Obstacle> surfaces, const Pose &wMb)
   goal.y_low = -goal.y_high;
   goal.detour = [this](double, double y) { return m_options.off_axis * std::abs(y); };
   goal.is_wall = [half = 0.5 * m_gap->width](double x, double y) { return std::abs(x) < kWall && std::abs(y) > half; };
-  const auto is_seen = [&](double x, double y) {
-    return around().isSeen(m_gap->middle + axes.transpose() * Eigen::Vector2d(x, y));
+  const auto room_at = [&](double x, double y) {
+    return around().roomAt(m_gap->middle + axes.transpose() * Eigen::Vector2d(x, y));
   };
-  m_way = planWay(surfaces, axes * (response().rest() - m_gap->middle), goal, m_options.way, m_way, is_seen);
+  m_way = planWay(surfaces, axes * (response().rest() - m_gap->middle), goal, m_options.way, m_way, room_at);
   const Eigen::Vector2d velocity = axes.transpose() * (m_way.speed / response().obeyed() * m_way.ahead);
   const Eigen::Vector2d look =
       m_ahead < -kStopsTurning ? m_gap->middle - wMb.t.head<2>() : m_gap->along; // keeps both in view

@@ -17,8 +17,9 @@ constexpr double kRemembered_s = 3;   ///< of what is out of view
 constexpr int kSeen = 6;              ///< points in a column before it counts
 constexpr double kUpright = 0.5;      ///< and their least extent in height [m]
 constexpr double kPointRadius = 0.05; ///< of the bark round a point [m]
-constexpr double kCell = 0.2;         ///< of the space seen [m]
-constexpr int kRays = 12;             ///< through a cell before it counts as seen
+constexpr double kCell = 0.1;         ///< of the space seen [m]
+constexpr double kGraze = 0.035;      ///< a ray farther from a cell's middle tells nothing of it [m]
+constexpr int kRays = 4;              ///< through a cell before it counts as seen
 constexpr double kSeenFor_s = 10;     ///< and how long it does
 } // namespace
 
@@ -114,8 +115,12 @@ void SeenSpace::see(const std::vector<TriangulatedRay> &sights, const Eigen::Vec
     const double level = sight.ray.head<2>().norm();
     const double surely_free = level / (std::max(sight.inverse_distance, 0.0) + 2 * sight.sigma) - kCell;
     const double end = std::min({surely_free, kFar, kHeight * level / std::max(std::abs(sight.ray.z()), 1e-6)});
+    const Eigen::Vector2d along = sight.ray.head<2>() / level;
     for (double range = 0; range < end; range += 0.7 * kCell) {
-      Cell &cell = cellAt(from.head<2>() + range / level * sight.ray.head<2>());
+      Cell &cell = cellAt(from.head<2>() + range * along);
+      const Eigen::Vector2d w = kCell * Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5) - from.head<2>();
+      if (std::abs(w.x() * along.y() - w.y() * along.x()) > kGraze)
+        continue;
       ++cell.rays;
       cell.last_s = time_s;
     }
@@ -124,18 +129,56 @@ void SeenSpace::see(const std::vector<TriangulatedRay> &sights, const Eigen::Vec
 
 void SeenSpace::stand(const Eigen::Vector2d &p)
 {
-  for (const double dx : {-kCell, 0.0, kCell})
-    for (const double dy : {-kCell, 0.0, kCell}) {
-      Cell &cell = cellAt(p + Eigen::Vector2d(dx, dy));
+  constexpr int kBody = 3; // cells from its middle to its hull
+  for (int dx = -kBody; dx <= kBody; ++dx)
+    for (int dy = -kBody; dy <= kBody; ++dy) {
+      Cell &cell = cellAt(p + kCell * Eigen::Vector2d(dx, dy));
       cell.rays = kRays;
       cell.last_s = m_time_s;
     }
+  measureRoom(p);
 }
 
-bool SeenSpace::isSeen(const Eigen::Vector2d &p) const
+bool SeenSpace::isSeen(std::int32_t x, std::int32_t y) const
 {
-  const std::int32_t x = cellNumber(p.x()), y = cellNumber(p.y());
   const Cell &cell = m_cells[placeIn(kSide, x, y)];
   return cell.x == x && cell.y == y && cell.rays >= kRays && m_time_s - cell.last_s < kSeenFor_s;
+}
+
+/// Distance to the nearest cell that was not seen: first along the rows, then over them.
+void SeenSpace::measureRoom(const Eigen::Vector2d &p)
+{
+  constexpr int kMost = static_cast<int>(kMostRoom / kCell), kHalf = static_cast<int>(kRoomRange / kCell);
+  constexpr int kCells = 2 * kHalf + 1;
+  m_room_x = cellNumber(p.x()) - kHalf;
+  m_room_y = cellNumber(p.y()) - kHalf;
+  m_room.resize(kCells * kCells);
+  std::vector<int> along(kCells * kCells);
+  for (int row = 0; row < kCells; ++row) {
+    int *const free = &along[static_cast<std::size_t>(row * kCells)];
+    for (int k = 0; k < kCells; ++k)
+      free[k] = isSeen(m_room_x + k, m_room_y + row) ? std::min(k > 0 ? free[k - 1] + 1 : 1, kMost) : 0;
+    for (int k = kCells - 2; k >= 0; --k)
+      free[k] = std::min(free[k], free[k + 1] + 1);
+  }
+  for (int row = 0; row < kCells; ++row)
+    for (int k = 0; k < kCells; ++k) {
+      int least = kMost * kMost;
+      for (int dy = -kMost; dy <= kMost; ++dy) {
+        const int other = row + dy,
+                  free = other < 0 || other >= kCells ? 0 : along[static_cast<std::size_t>(other * kCells + k)];
+        least = std::min(least, free * free + dy * dy);
+      }
+      m_room[static_cast<std::size_t>(row * kCells + k)] =
+          static_cast<float>(kCell * std::max(0.0, std::sqrt(least) - 0.5));
+    }
+}
+
+double SeenSpace::roomAt(const Eigen::Vector2d &p) const
+{
+  constexpr int kCells = 2 * static_cast<int>(kRoomRange / kCell) + 1;
+  const int x = cellNumber(p.x()) - m_room_x, y = cellNumber(p.y()) - m_room_y;
+  const bool is_near = !m_room.empty() && x >= 0 && x < kCells && y >= 0 && y < kCells;
+  return is_near ? m_room[static_cast<std::size_t>(y * kCells + x)] : 0;
 }
 } // namespace bole

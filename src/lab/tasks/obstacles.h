@@ -59,7 +59,8 @@ private:
 };
 
 /// Free space: a grid of the cells that rays to triangulated points pass through. All other cells may be occupied: dark
-/// bark has no corners and may show only one border, and outside the image nothing is observed.
+/// bark has no corners and may show only one border, and outside the image nothing is observed. No ray
+/// passes the middle of a cell that lies in bark, and a trunk as thick as two cells holds such a middle.
 class SeenSpace
 {
 public:
@@ -67,8 +68,11 @@ public:
   void see(const std::vector<TriangulatedRay> &sights, const Eigen::Vector3d &from, double time_s);
   /// Where the drone is, nothing else stands.
   void stand(const Eigen::Vector2d &p);
-  /// Whether \p p (world, [m]) was seen through in the last seconds; to the width of a cell of 0.2 m.
-  bool isSeen(const Eigen::Vector2d &p) const;
+  /// How far round \p p (world, [m]) all was seen through in the last seconds: a body of that radius fits there.
+  /// 0 to kMostRoom, to half a cell of 0.1 m; 0 more than kRoomRange from where the drone stood last.
+  double roomAt(const Eigen::Vector2d &p) const;
+
+  static constexpr double kMostRoom = 1, kRoomRange = 4; ///< [m]
 
 private:
   struct Cell
@@ -78,9 +82,13 @@ private:
     double last_s = 0;
   };
   Cell &cellAt(const Eigen::Vector2d &p);
+  bool isSeen(std::int32_t x, std::int32_t y) const;
+  void measureRoom(const Eigen::Vector2d &p);
 
-  static constexpr std::int32_t kSide = 64; ///< cells; the grid is a torus, so cells behind the drone are reused
+  static constexpr std::int32_t kSide = 128; ///< cells; the grid is a torus, so cells behind the drone are reused
   std::vector<Cell> m_cells = std::vector<Cell>(kSide * kSide);
+  std::int32_t m_room_x = 0, m_room_y = 0; ///< first cell of those with a room
+  std::vector<float> m_room;               ///< [m]
   double m_time_s = 0;
 };
 } // namespace bole

@@ -82,15 +82,15 @@ TaskCommand SlalomTask::act(const FrameReport &report)
     surface.xy = axes * (surface.xy - m_start.t.head<2>());
     surface.covariance = axes * surface.covariance * axes.transpose();
   }
-  const auto is_seen = [&](double x, double y) {
-    return around().isSeen(m_start.t.head<2>() + axes.transpose() * Eigen::Vector2d(x, y));
+  const auto room_at = [&](double x, double y) {
+    return around().roomAt(m_start.t.head<2>() + axes.transpose() * Eigen::Vector2d(x, y));
   };
   WayGoal goal;
   goal.x_end = m_place.x() + kAhead;
   goal.y_high = std::max(m_options.reach, std::abs(m_place.y()) + 1);
   goal.y_low = -goal.y_high;
   goal.detour = [this](double x, double y) { return m_options.off_line * std::abs(y - line(x)); };
-  m_way = planWay(surfaces, axes * (response().rest() - m_start.t.head<2>()), goal, m_options.way, m_way, is_seen);
+  m_way = planWay(surfaces, axes * (response().rest() - m_start.t.head<2>()), goal, m_options.way, m_way, room_at);
   const Eigen::Vector2d velocity = m_way.speed / response().obeyed() * m_way.ahead;
   const Eigen::Vector2d look = m_way.lookedAt(m_place, kLookAt);
   const double turned = std::clamp(std::atan2(look.y(), look.x()), -kLargestLook, kLargestLook);

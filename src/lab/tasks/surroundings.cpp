@@ -53,8 +53,8 @@ Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vecto
     return safe;
   const Eigen::Vector2d ahead = safe / speed;
   const double coast = std::max(0.0, (rest - p).dot(ahead)), wanted = coast + speed * options.stopping_s;
-  double free = options.hull; // where it is, it is
-  while (free < wanted && around.isSeen(p + free * ahead))
+  double free = 0;
+  while (free < wanted && around.roomAt(p + free * ahead) >= options.hull + options.least_free)
     free += kLook;
   return safe * (std::clamp((free - coast) / options.stopping_s, options.unseen_speed, speed) / speed);
 }

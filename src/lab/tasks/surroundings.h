@@ -28,7 +28,8 @@ public:
   /// Trunks of the map, candidates that have \p observations views among them, and what stands upright by the points,
   /// within \p range [m] of the drone.
   std::vector<Obstacle> surfaces(const FrameReport &report, double range, int observations) const;
-  bool isSeen(const Eigen::Vector2d &p) const { return m_seen.isSeen(p); }
+  /// Round \p p (world), as far as it was seen to be free [m].
+  double roomAt(const Eigen::Vector2d &p) const { return m_seen.roomAt(p); }
 
 private:
   NearPoints m_near_points;
@@ -38,7 +39,8 @@ private:
 /// \p velocity [m/s, world] at \p p, cut to what the laws allow a drone that would coast to \p rest:
 /// - towards a believed surface (confirmed trunks that are rather trunks than none, upright points) no faster than lets
 ///   the drone stop least_free before it; nothing pushes back: what is no trunk must not drive the drone into one;
-/// - no faster than lets it stop within what was seen to be free, or at unseen_speed.
+/// - no faster than lets it stop where its whole width, and least_free beside it, was seen to be free, or at
+///   unseen_speed.
 Eigen::Vector2d safeVelocity(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p, const Eigen::Vector2d &rest,
                              const std::vector<Obstacle> &surfaces, const Surroundings &around,
                              const SafetyOptions &options);

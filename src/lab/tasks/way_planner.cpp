@@ -51,7 +51,7 @@ class Field
 {
 public:
   Field(const std::vector<Obstacle> &surfaces, const Eigen::Vector2d &from, const WayGoal &goal,
-        const WayOptions &options, const Way &last, const IsSeen &is_seen)
+        const WayOptions &options, const Way &last, const RoomAt &room_at)
       : m_low(onGrid(from.x() - kBehind), onGrid(goal.y_low)),
         m_columns(std::max(2, static_cast<int>((goal.x_end - m_low.x()) / kGrid) + 1)),
         m_rows(static_cast<int>((goal.y_high - goal.y_low) / kGrid) + 1),
@@ -65,8 +65,9 @@ public:
       const Eigen::Vector2d p = place(k);
       const bool is_wall = goal.is_wall && goal.is_wall(p.x(), p.y());
       m_speed[k] = speedAt(m_clearance[k], options);
-      if (is_seen && (p - from).norm() < kNearSight && !is_seen(p.x(), p.y()))
-        m_speed[k] = std::min(m_speed[k], options.unseen_speed);
+      if (room_at && (p - from).norm() < kNearSight) // what was not seen may be bark
+        m_speed[k] = std::min(m_speed[k],
+                              std::max(options.unseenSpeed(), speedAt(room_at(p.x(), p.y()) - options.hull, options)));
       const double lost = 1 + (goal.detour ? goal.detour(p.x(), p.y()) : 0);
       const double other = last.places.empty() || isOn(last, p) ? 1 : kOtherMind;
       m_pace[k] = is_wall ? kInfinite : lost * other * (m_speed[k] > 0 ? 1 / m_speed[k] : kTouchPace);
@@ -193,7 +194,6 @@ void WayOptions::validate() const
   requireRange("free", free, 0, 2);
   requireRange("stopping_s", stopping_s, 0.1, 5);
   requireRange("sigmas", sigmas, 0, 5);
-  requireRange("unseen_speed", unseen_speed, 0.02, 3);
 }
 
 Eigen::Vector2d Way::lookedAt(const Eigen::Vector2d &from, double range) const
@@ -205,9 +205,9 @@ Eigen::Vector2d Way::lookedAt(const Eigen::Vector2d &from, double range) const
 }
 
 Way planWay(const std::vector<Obstacle> &surfaces, const Eigen::Vector2d &from, const WayGoal &goal,
-            const WayOptions &options, const Way &last, const IsSeen &is_seen)
+            const WayOptions &options, const Way &last, const RoomAt &room_at)
 {
-  const Field field(surfaces, from, goal, options, last, is_seen);
+  const Field field(surfaces, from, goal, options, last, room_at);
   Way way;
   way.clearance = kInfinite;
   std::size_t k = field.nearest(from);

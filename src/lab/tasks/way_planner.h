@@ -21,13 +21,14 @@ namespace bole
 /// Lengths in metres.
 struct WayOptions
 {
-  double speed = 1;          ///< largest [m/s], 0.05 to 3
-  double hull = 0.28;        ///< radius of the drone, 0.05 to 2
-  double free = 0.15;        ///< between hull and bark that it plans to keep: what it errs from its way, 0 to 2
-  double stopping_s = 1;     ///< way to stop over the speed [s]: lags of video, radio, tilt and velocity, 0.1 to 5
-  double sigmas = 1.5;       ///< of a surface's place that count as surface, 0 to 5
-  double unseen_speed = 0.3; ///< in what was not seen to be free [m/s], 0.02 to 3: a bump that breaks nothing
+  double speed = 1;      ///< largest [m/s], 0.05 to 3
+  double hull = 0.28;    ///< radius of the drone, 0.05 to 2
+  double free = 0.15;    ///< between hull and bark that it plans to keep: what it errs from its way, 0 to 2
+  double stopping_s = 1; ///< way to stop over the speed [s]: lags of video, radio, tilt and velocity, 0.1 to 5
+  double sigmas = 1.5;   ///< of a surface's place that count as surface, 0 to 5
 
+  /// Where hull and free were not seen to be free: what lets it stop within free [m/s].
+  double unseenSpeed() const { return free / stopping_s; }
   void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
@@ -41,8 +42,8 @@ struct WayGoal
   std::function<bool(double x, double y)> is_wall = {}; ///< never crossed: what is beside a gap
 };
 
-/// Whether the place x ahead, y left [m] was seen to be free.
-using IsSeen = std::function<bool(double x, double y)>;
+/// How far round the place x ahead, y left [m] all was seen to be free [m].
+using RoomAt = std::function<double(double x, double y)>;
 
 struct Way
 {
@@ -58,5 +59,5 @@ struct Way
 
 /// \p last: the way before, which is kept where another is hardly quicker; none: empty.
 Way planWay(const std::vector<Obstacle> &surfaces, const Eigen::Vector2d &from, const WayGoal &goal,
-            const WayOptions &options, const Way &last, const IsSeen &is_seen = {});
+            const WayOptions &options, const Way &last, const RoomAt &room_at = {});
 } // namespace bole

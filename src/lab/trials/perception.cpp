@@ -46,7 +46,10 @@ FrameReport reportOn(const Frame &frame)
 class TruthPerception : public Perception
 {
 public:
-  TruthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest) : m_sight(camera, bMc, forest) {}
+  TruthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing)
+      : m_sight(camera, bMc, forest, missing)
+  {
+  }
   FrameReport process(Frame &frame, const Pose &truth) override
   {
     FrameReport report = reportOn(frame);
@@ -179,9 +182,10 @@ std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Po
 {
   return std::make_unique<RealPerception>(camera, bMc, options);
 }
-std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest)
+std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
+                                            double missing)
 {
-  return std::make_unique<TruthPerception>(camera, bMc, forest);
+  return std::make_unique<TruthPerception>(camera, bMc, forest, missing);
 }
 std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest)
 {

@@ -32,7 +32,9 @@ public:
 };
 
 std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options);
-std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+/// \p missing: share of the trunks that the map never has; where it is not 0 no bark has points either.
+std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
+                                            double missing = 0);
 /// \p sensors: the noise of the odometry, which is the prior of the tracking.
 std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
 
@@ -44,7 +46,8 @@ std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, cons
 class TrueSight
 {
 public:
-  TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+  /// \p missing: as truthPerception.
+  TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing = 0);
   /// Fills poses, trunks, map and points of \p report. \p truth: from where it looks; \p estimate: where it believes to
   /// be, in the world of the truth; \p is_tracked: trunks in view were measured.
   void look(const Pose &truth, const Pose &estimate, bool is_tracked, FrameReport &report);
@@ -54,12 +57,14 @@ private:
   {
     Trunk cylinder;
     int views = 0;
+    bool is_missing = false;
   };
   void cast(const Pose &wMc, FrameReport &report) const;
 
   PinholeCamera m_camera;
   Pose m_bMc;
   const Forest &m_forest;
+  bool m_has_points_on_bark;
   std::vector<Known> m_known; ///< of the trunks of the forest, in their order
 };
 } // namespace bole

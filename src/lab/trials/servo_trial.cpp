@@ -189,7 +189,7 @@ std::unique_ptr<Perception> makePerception(const ServoTrialOptions &options, con
                                            const Forest &forest)
 {
   if (options.perception == PerceptionKind::truth)
-    return truthPerception(robot.camera(), robot.bMc(), forest);
+    return truthPerception(robot.camera(), robot.bMc(), forest, options.missing);
   if (options.perception == PerceptionKind::truth_map)
     return truthMapPerception(robot.camera(), robot.bMc(), forest);
   return realPerception(robot.camera(), robot.bMc(), options.pipeline);

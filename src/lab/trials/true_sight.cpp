@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/perception.h"
 
+#include "lab/simulation/random.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -31,11 +33,12 @@ double toCircle(const Eigen::Vector2d &from, const Eigen::Vector2d &u, const Eig
 }
 } // namespace
 
-TrueSight::TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest)
-    : m_camera(camera), m_bMc(bMc), m_forest(forest)
+TrueSight::TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing)
+    : m_camera(camera), m_bMc(bMc), m_forest(forest), m_has_points_on_bark(missing <= 0)
 {
+  Random random(forest.options.seed, 900);
   for (const SimulatedTrunk &trunk : forest.trunks)
-    m_known.push_back({trunk.cylinder(), 0});
+    m_known.push_back({trunk.cylinder(), 0, random.uniform() < missing});
 }
 
 void TrueSight::look(const Pose &truth, const Pose &estimate, bool is_tracked, FrameReport &report)
@@ -63,7 +66,7 @@ void TrueSight::look(const Pose &truth, const Pose &estimate, bool is_tracked, F
     for (const Silhouette &other : seen)
       if (other.distance < trunk.distance)
         hidden += std::max(0.0, std::min(trunk.right, other.right) - std::max(trunk.left, other.left));
-    if (hidden > 0.5 * (trunk.right - trunk.left))
+    if (hidden > 0.5 * (trunk.right - trunk.left) || m_known[trunk.trunk].is_missing)
       continue;
     ++m_known[trunk.trunk].views;
     TrunkInView view;
@@ -109,9 +112,11 @@ void TrueSight::cast(const Pose &wMc, FrameReport &report) const
       double range = kReach / level;
       if (ray.z() < 0)
         range = std::min(range, (wMc.t.z() - m_forest.terrain.height(wMc.t.x(), wMc.t.y())) / -ray.z());
+      double bark = std::numeric_limits<double>::infinity();
       for (const auto &[xy, radius] : near)
-        range = std::min(range, toCircle(wMc.t.head<2>(), ray.head<2>() / level, xy, radius) / level);
-      report.points.push_back({ray, 1 / range, kRaySigma});
+        bark = std::min(bark, toCircle(wMc.t.head<2>(), ray.head<2>() / level, xy, radius) / level);
+      if (bark > range || m_has_points_on_bark)
+        report.points.push_back({ray, 1 / std::min(range, bark), kRaySigma});
     }
 }
 } // namespace bole

@@ -87,6 +87,23 @@ TEST(SafeVelocity, IntoWhatWasNotSeenItFliesNoFasterThanABumpAllows)
   EXPECT_NEAR(safeVelocity({0.4, 0}, {12, 0}, {12, 0}, {}, around, options).norm(), 0.4, 1e-9);
 }
 
+TEST(SafeVelocity, WhereNotItsWholeWidthWasSeenToBeFreeItFliesNoFasterThanABumpAllows)
+{
+  const SafetyOptions options;
+  for (const double half : {0.2, 0.9}) { // of a lane ahead
+    Surroundings around;
+    FrameReport report;
+    report.points.push_back({{1, 0, 0}, 1 / 8.0, 0.001});
+    for (int k = 0; k < 6; ++k)
+      for (double y = -half; y <= half; y += 0.02) {
+        report.wMc.t = {0, y, 1.2};
+        around.see(report);
+      }
+    const double speed = safeVelocity({1, 0}, {1, 0}, {1, 0}, {}, around, options).norm();
+    EXPECT_NEAR(speed, half > options.hull + options.least_free ? 1 : options.unseen_speed, 1e-9) << half;
+  }
+}
+
 TEST(SafeVelocity, ItSlowsDownInTimeBeforeWhatWasNotSeen)
 {
   const SafetyOptions options;
@@ -111,8 +128,8 @@ TEST(Surroundings, WhereTheDroneHasBeenIsFree)
     report.wMb.t = {0, 0.05 * k, 1.2};
     around.see(report);
   }
-  EXPECT_TRUE(around.isSeen({0, 0.3}));
-  EXPECT_FALSE(around.isSeen({0, 1.7}));
+  EXPECT_GT(around.roomAt({0, 0.3}), 0.2); // no more than its hull
+  EXPECT_EQ(around.roomAt({0, 1.7}), 0);
 }
 
 TEST(SafetyOptions, RefusesAHullWithoutSize)

@@ -27,7 +27,7 @@ struct Flown
 };
 
 /// A drone that is late, slow, and obeys by a share, along planned ways.
-Flown fly(const std::vector<Obstacle> &trunks, double length, double obeyed = 1, const IsSeen &is_seen = {})
+Flown fly(const std::vector<Obstacle> &trunks, double length, double obeyed = 1)
 {
   const WayOptions options;
   const ResponseOptions response;
@@ -43,7 +43,7 @@ Flown fly(const std::vector<Obstacle> &trunks, double length, double obeyed = 1,
     goal.y_low = -4;
     goal.y_high = 4;
     goal.detour = [](double, double y) { return 0.4 * std::abs(y); };
-    way = planWay(trunks, believed.rest(), goal, options, way, is_seen);
+    way = planWay(trunks, believed.rest(), goal, options, way);
     const Eigen::Vector2d v = way.speed / believed.obeyed() * way.ahead;
     believed.send(v);
     drone.advance(t);
@@ -109,14 +109,14 @@ TEST(WayPlanner, StopsBeforeAWallWithoutOpening)
   EXPECT_LT(flown.x, 4);
 }
 
-Way planned(const std::vector<Obstacle> &trunks, const IsSeen &is_seen = {}, const Way &last = {})
+Way planned(const std::vector<Obstacle> &trunks, const RoomAt &room_at = {}, const Way &last = {})
 {
   WayGoal goal;
   goal.x_end = 7;
   goal.y_low = -4;
   goal.y_high = 4;
   goal.detour = [](double, double y) { return 0.4 * std::abs(y); };
-  return planWay(trunks, {0, 0}, goal, {}, last, is_seen);
+  return planWay(trunks, {0, 0}, goal, {}, last, room_at);
 }
 
 double widest(const Way &way)
@@ -134,20 +134,26 @@ TEST(WayPlanner, KeepsFartherFromWhatIsLessWellKnown)
   EXPECT_GT(widest(planned({vague})), widest(planned({sure})) + 0.3);
 }
 
-TEST(WayPlanner, GoesRoundWhatWasNotSeenThrough)
+TEST(WayPlanner, GoesRoundWhatWasNotSeenThroughWithItsWholeWidth)
 {
-  const Way way = planned({}, [](double x, double y) { return x < 1 || y < -0.2; });
-  EXPECT_LT(way.lookedAt({0, 0}, 1.5).y(), -0.2);
-  EXPECT_NEAR(planned({}, [](double, double) { return true; }).ahead.y(), 0, 1e-9);
+  const WayOptions options;
+  const Way way = planned( // a corner of what was not seen
+      {}, [](double x, double y) { return std::hypot(std::max(1 - x, 0.0), std::max(-0.2 - y, 0.0)); });
+  for (const Eigen::Vector2d &place : way.places)
+    if (place.x() > 1 && place.norm() < 2.5) {
+      EXPECT_LT(place.y(), -0.2 - options.hull) << place.x();
+    }
+  EXPECT_NEAR(planned({}, [](double, double) { return 1; }).ahead.y(), 0, 1e-9);
 }
 
 TEST(WayPlanner, DoesNotFlyFastWhereNothingIsKnown)
 {
   const WayOptions options;
-  EXPECT_NEAR(planned({}, [](double, double) { return false; }).speed, options.unseen_speed, 0.25);
-  const double half_seen = planned({}, [](double x, double) { return x < 0.6; }).speed;
-  EXPECT_GT(half_seen, options.unseen_speed + 0.15);
-  EXPECT_LT(half_seen, options.unseen_speed + 0.6);
+  EXPECT_NEAR(planned({}, [](double, double) { return 0; }).speed, options.unseenSpeed(), 1e-9);
+  const double half_seen =
+      planned({}, [](double x, double y) { return std::max(1 - std::max(x, std::abs(y)), 0.0); }).speed;
+  EXPECT_GT(half_seen, options.unseenSpeed() + 0.15);
+  EXPECT_LT(half_seen, options.unseenSpeed() + 0.6);
   EXPECT_EQ(planned({}).speed, options.speed);
 }
 

@@ -178,6 +178,24 @@ TEST(ClosedLoop, ADroneThatFliesHeadlongTouchesNothingThatItBelievesWhateverSens
   }
 }
 
+TEST(ClosedLoop, ASlalomTouchesNothingThoughTheMapLacksThreeTrunksInTenAndNoBarkHasPoints)
+{
+  int arrived = 0;
+  for (const std::uint64_t seed : {400, 402, 406, 409}) {
+    ServoTrialOptions options;
+    options.scenario.kind = ServoKind::slalom;
+    options.scenario.seed = seed;
+    options.perception = PerceptionKind::truth;
+    options.missing = 0.3;
+    options.robot.has_images = false;
+    options.loop.duration_s = 90;
+    const ServoTrialResult result = runServoTrial(options);
+    EXPECT_FALSE(result.record.is_contact) << seed;
+    arrived += result.is_success;
+  }
+  EXPECT_GE(arrived, 3);
+}
+
 TEST(Scenario, SameSeedSameForestAndAnotherSeedAnother)
 {
   ScenarioOptions options;
