@@ -79,11 +79,8 @@ void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion
     compareOdometry(*frame.wMb_odometry, duration);
     ++m_compared;
   }
-  if (seen != motions.end()) {
-    if (seen->points.hasDirection())
-      compareDirection(*seen);
-    compareRotation(*seen, duration);
-  }
+  if (seen != motions.end())
+    comparePoints(seen->points, duration);
   begin(frame);
 }
 
@@ -237,33 +234,32 @@ void InertialScale::compareOdometry(const Pose &wMb, double duration)
   update(H, m_wRb * in_body - factor.cwiseProduct(m_moved), Matrix3d(noise.asDiagonal()));
 }
 
-/// The direction of the displacement of the camera, by the points.
-void InertialScale::compareDirection(const RelativeMotion &motion)
+/// The motion of the camera since the anchor, by the points: its rotation, which shows the bias of the gyro, and the
+/// direction of its displacement. The points hardly tell one from the other, so that their errors go together: where
+/// the gyro knows the rotation, the direction is known much better than by itself.
+void InertialScale::comparePoints(const RelativePoseEstimate &points, double duration)
 {
-  const Matrix3d aRb = m_bMc.R * motion.points.aRb * m_bMc.R.transpose(), wRa = m_wRb * aRb.transpose();
-  const Vector3d moved = m_moved + (m_wRb - wRa) * m_bMc.t;
   constexpr double kLeast = 0.02; // [m]: shorter displacements have no direction
+  const Matrix3d wRa = m_wRb * m_turned.transpose();
+  const Vector3d moved = m_moved + (m_wRb - wRa) * m_bMc.t;
   const double length = moved.norm();
-  if (length < kLeast)
-    return;
-  const Vector3d direction = wRa * m_bMc.R * motion.points.direction;
-  const Eigen::Matrix<double, 2, 3> rows = across(direction);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
-  H.middleCols<3>(kMoved) = rows / length;
-  H.middleCols<3>(kAttitude) = rows * m_wRb * skew(m_wRb.transpose() * direction);
-  const double variance = 0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace();
-  update(H, -rows * moved / length, variance * Eigen::Matrix2d::Identity());
-}
-
-/// The rotation by the points: it shows the bias of the gyro.
-void InertialScale::compareRotation(const RelativeMotion &motion, double duration)
-{
-  const Matrix3d aRb = m_bMc.R * motion.points.aRb * m_bMc.R.transpose();
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, kStates);
-  H.middleCols<3>(kGyro) = -duration * Matrix3d::Identity();
-  const Matrix3d noise = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose() +
-                         std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
-  update(H, logSo3(m_turned.transpose() * aRb), noise);
+  const Eigen::Index rows = points.hasDirection() && length >= kLeast ? 5 : 3;
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(5, kStates);
+  Eigen::VectorXd residual(5);
+  H.block<3, 3>(0, kGyro) = -duration * Matrix3d::Identity();
+  residual.head<3>() = logSo3(m_turned.transpose() * m_bMc.R * points.aRb * m_bMc.R.transpose());
+  const Vector3d direction = wRa * m_bMc.R * points.direction;
+  const Eigen::Matrix<double, 2, 3> across = (wRa * m_bMc.R * directionBasis(points.direction)).transpose();
+  const Eigen::Matrix<double, 2, 3> by_attitude = across * m_wRb * skew(m_wRb.transpose() * direction);
+  H.block<2, 3>(3, kMoved) = across / std::max(length, kLeast);
+  H.block<2, 3>(3, kAttitude) = by_attitude;
+  H.block<2, 3>(3, kGyro) = duration * by_attitude;
+  residual.tail<2>() = -across * moved / std::max(length, kLeast);
+  Matrix5d to_body = Matrix5d::Identity();
+  to_body.topLeftCorner<3, 3>() = m_bMc.R;
+  Eigen::MatrixXd noise = to_body * points.covariance * to_body.transpose();
+  noise.topLeftCorner(3, 3) += std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
+  update(H.topRows(rows), residual.head(rows), noise.topLeftCorner(rows, rows));
 }
 
 std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64_t from_ns) const

@@ -92,8 +92,7 @@ private:
   void propagate(const Eigen::Vector3d &rate, const Eigen::Vector3d &force, double dt);
   void compareTilt(const Pose &wMb);
   void compareOdometry(const Pose &wMb, double duration);
-  void compareRotation(const RelativeMotion &motion, double duration);
-  void compareDirection(const RelativeMotion &motion);
+  void comparePoints(const RelativePoseEstimate &points, double duration);
   void update(const Eigen::MatrixXd &H, const Eigen::VectorXd &residual, const Eigen::MatrixXd &noise);
 
   Pose m_bMc;

@@ -44,6 +44,20 @@ TEST(InertialScale, NoiseAndBiasStayWithinThreeStandardDeviations)
   EXPECT_LT(std::abs(scale->mean - std::log(made.factor)), 3 * scale->sigma);
 }
 
+TEST(InertialScale, ARotationThatPointsTookForATranslationIsUndoneByTheGyro)
+{
+  MadeFlight made;
+  made.sway = 0.6;
+  made.odometry_noise = 0.012;
+  made.force_noise = 0.1;
+  made.points_turn = 0.01;
+  made.points_slip = 20;
+  const auto scale = fly(12, made).scale(kWide);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->mean, 0, 0.02);
+  EXPECT_LT(scale->sigma, 0.018);
+}
+
 TEST(InertialScale, ASteadyFlightLeavesTheScaleUnknown)
 {
   MadeFlight made;

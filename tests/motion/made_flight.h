@@ -20,6 +20,8 @@ struct MadeFlight
   double odometry_noise = 0; ///< horizontal, a frame [m]
   double force_noise = 0;    ///< a sample [m/s^2]
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero();
+  double points_turn = 0; ///< error of the points' rotation about the camera's vertical [rad]
+  double points_slip = 0; ///< and of their direction of translation, sideways, for each radian of that
   bool has_constant_force = false;
   std::mt19937 random{1};
   Eigen::Vector3d walked = Eigen::Vector3d::Zero(); ///< of the odometry from the truth
@@ -67,7 +69,7 @@ struct MadeFlight
   }
 
   /// What points say of the motion since three frames before.
-  std::vector<RelativeMotion> seen(std::size_t index) const
+  std::vector<RelativeMotion> seen(std::size_t index)
   {
     if (index < 3)
       return {};
@@ -86,7 +88,25 @@ struct MadeFlight
     motion.points.parallax_px = 3;
     motion.points.covariance = 1e-4 * Matrix5d::Identity();
     motion.points.covariance.topLeftCorner<3, 3>() *= 1e-2;
+    if (points_turn > 0)
+      confuse(motion.points);
     return {motion};
+  }
+
+  /// Takes some rotation for a translation, and says so.
+  void confuse(RelativePoseEstimate &points)
+  {
+    const Eigen::Vector3d turn = white().x() * points_turn * Eigen::Vector3d::UnitY();
+    Vector5d together = Vector5d::Zero();
+    together.head<3>() = Eigen::Vector3d::UnitY();
+    const Eigen::Matrix<double, 3, 2> basis = directionBasis(points.direction);
+    together.tail<2>() = points_slip * basis.transpose() * Eigen::Vector3d::UnitX();
+    points.direction =
+        (points.direction + points_slip * turn.y() * basis * (basis.transpose() * Eigen::Vector3d::UnitX()))
+            .normalized();
+    points.aRb = points.aRb * expSo3(turn);
+    points.covariance = points_turn * points_turn * together * together.transpose();
+    points.covariance += 1e-6 * Matrix5d::Identity();
   }
 };
 } // namespace bole::test
