@@ -76,8 +76,9 @@ void readFrames(const fs::path &run, double since_s, Result &result)
     if (result.named_s < 0 && stamp_s > since_s - kFrame_s)
       result.named_s = stamp_s;
     const std::string reason = fields.size() > 9 && !fields[9].empty() ? fields[9] : fields[2];
-    const std::string name =
-        fields[2] == "doubtful" ? reason.substr(0, reason.find_first_of(":0123456789")) : fields[2];
+    const std::size_t figures =
+        std::min(reason.find_first_of(":0123456789"), reason.find(" of ")); // frames differ in them
+    const std::string name = fields[2] == "doubtful" ? reason.substr(0, figures) : fields[2];
     if (std::find(names.begin(), names.end(), name) == names.end())
       names.push_back(name);
   }
