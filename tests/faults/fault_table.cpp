@@ -31,7 +31,7 @@ constexpr double kSoon_s = 1; ///< in which a fault must be named
 constexpr double kFrame_s = 1 / kRate_hz;
 
 /// What is known to fall short, with the reason in the documentation.
-const std::set<std::string> kKnown = {"rolling_20", "stamps_15ms", "stamps_30ms"};
+const std::set<std::string> kKnown = {"jpeg", "rolling_20", "stamps_15ms", "stamps_30ms"};
 
 /// No run may take longer, or more memory: a hang and a hoard are findings.
 #if defined(__SANITIZE_ADDRESS__)
@@ -76,9 +76,12 @@ void readFrames(const fs::path &run, double since_s, Result &result)
     if (result.named_s < 0 && stamp_s > since_s - kFrame_s)
       result.named_s = stamp_s;
     const std::string reason = fields.size() > 9 && !fields[9].empty() ? fields[9] : fields[2];
-    const std::size_t figures =
-        std::min(reason.find_first_of(":0123456789"), reason.find(" of ")); // frames differ in them
-    const std::string name = fields[2] == "doubtful" ? reason.substr(0, figures) : fields[2];
+    std::string name = fields[2];
+    if (name == "doubtful") { // without the figures in which frames differ
+      name = reason.substr(0, reason.find_first_of(":0123456789"));
+      if (const std::size_t of = name.rfind(" of "); of != std::string::npos && of + 4 == name.size())
+        name.resize(of);
+    }
     if (std::find(names.begin(), names.end(), name) == names.end())
       names.push_back(name);
   }
