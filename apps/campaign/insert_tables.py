@@ -3,8 +3,8 @@
 """Puts the figures of campaigns and comparisons into the documentation, or says where the two differ.
 
 A page marks the place with <!-- campaign NAME RUN... --> ... <!-- end -->; the figures come from data/results/NAME.csv,
-the summary.csv of the campaign config/campaign/NAME.yaml. <!-- compare TABLE SEQUENCE... -->, with TABLE one of trackers,
-basin and faults, shows data/results/compare/SEQUENCE.json, which --compare makes of the compare.json that `bole compare`
+the summary.csv of the campaign config/campaign/NAME.yaml. <!-- compare TABLE SEQUENCE... -->, with TABLE one of prior,
+trackers, basin and faults, shows data/results/compare/SEQUENCE.json, which --compare makes of the compare.json that `bole compare`
 has written. With --check nothing is written: status 1 where a page differs."""
 import argparse
 import csv
@@ -48,7 +48,13 @@ def comparison(kind, sequences):
             found.append(json.load(text))
     figure = lambda v, digits: "-" if v is None else f"{v:.{digits}f}"
     lines = []
-    if kind == "trackers":
+    if kind == "prior":  # the trackers that are helped by odometry, on one sequence
+        lines += ["| | frames until it is lost | right | wrong in silence | position RMSE, all frames [m] | median ms |", "|---|" + "---|" * 5]
+        for row in found[0]["trackers"]:
+            if row["help"] == "prior":
+                lines.append(f"| `{row['tracker']}` | {row['frames_until_loss']} of {row['frames']} | {row['frames_right']} | "
+                             f"{row['silent_failures']} | {figure(row['position_rmse_all_frames_m'], 3)} | {figure(row['median_ms'], 1)} |")
+    elif kind == "trackers":
         lines.append("| | " + " | ".join(f"{d['name']} ({d['frames'] - 1})" for d in found) + " |")
         lines.append("|---|" + "---|" * len(found))
         for i, row in enumerate(found[0]["trackers"]):
