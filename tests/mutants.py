@@ -61,12 +61,14 @@ def build(folder, *targets):
     return run(["cmake", "--build", folder, "--target", *targets], 3600) == 0
 
 
+def fails(folder, name):
+    """Whether the tests of a stage notice something; an endless loop is noticed, too."""
+    return run([f"./test_{name}", "--gtest_fail_fast", "--gtest_brief=1"], 300, cwd=folder) != 0
+
+
 def killer_of(folder, stage):
-    """The test program that notices, "" when none does. An endless loop is noticed, too."""
-    for name in (stage, *LATER):
-        if run([f"./test_{name}", "--gtest_fail_fast", "--gtest_brief=1"], 300, cwd=folder) != 0:
-            return name
-    return ""
+    """The test program that notices, "" when none does."""
+    return next((name for name in (stage, *LATER) if fails(folder, name)), "")
 
 
 def main():
@@ -88,9 +90,9 @@ def main():
     if run(["cmake", "-S", source, "-B", binary, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
             "-DCMAKE_CXX_FLAGS_RELEASE=-O1", "-DBOLE_BUILD_TESTS=ON", *launcher], 600) or not build(binary, *tests):
         sys.exit(f"{arguments.folder}: the sources as they are do not build")
-    for stage in STAGES:
-        if killer_of(binary, stage):
-            sys.exit(f"test_{killer_of(binary, stage)} fails on the sources as they are")
+    for name in (*STAGES, *LATER):
+        if fails(binary, name):
+            sys.exit(f"test_{name} fails on the sources as they are")
 
     found = []
     for stage in STAGES:
