@@ -9,6 +9,7 @@ import argparse
 import csv
 import math
 import os
+import re
 
 import cv2
 import matplotlib
@@ -50,6 +51,13 @@ def gif(arguments):
                    optimize=True)
 
 
+def intrinsics_of(flight):
+    """fx, fy, cx, cy of a flight whose camera looks ahead, as the simulated ones do."""
+    with open(os.path.join(flight, "mav0/cam0/sensor.yaml"), encoding="utf-8") as text:
+        found = re.search(r"^intrinsics: *\[(.*?)\]", text.read(), re.M | re.S)
+    return tuple(float(v) for v in found.group(1).split(","))
+
+
 def pose_of(run, stamp):
     """World pose of the body nearest to a stamp: R, t."""
     poses = np.loadtxt(os.path.join(run, "trajectory.tum"))
@@ -69,8 +77,8 @@ def border_in_image(trunk, R, t, camera, side, heights):
         d, bearing = np.hypot(*to), math.atan2(to[1], to[0]) + side * math.asin(float(trunk["radius"]) / np.hypot(*to))
         reach = math.sqrt(d * d - float(trunk["radius"]) ** 2)
         body = R.T @ np.array([reach * math.cos(bearing), reach * math.sin(bearing), z - t[2]])
-        f, _, cu, cv = camera
-        u.append([cu - f * body[1] / body[0], cv - f * body[2] / body[0]])
+        fx, fy, cu, cv = camera
+        u.append([cu - fx * body[1] / body[0], cv - fy * body[2] / body[0]])
     return np.array(u)
 
 
@@ -95,7 +103,7 @@ def system(arguments):
     seen = {r["id"] for r in rows_of(os.path.join(run, "views.csv")) if int(r["frame"]) == k}
     trunks = rows_of(os.path.join(run, "trunks.csv"))
     shown = [r for r in trunks if r["id"] in seen]
-    camera = (200, 200, 159.5, 119.5)
+    camera = intrinsics_of(flight)
 
     figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
     (frame, near, borders), (relative, summary, map_) = axes
