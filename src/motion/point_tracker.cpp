@@ -2,6 +2,7 @@
 #include "motion/point_tracker.h"
 
 #include "motion/coarse_shift.h"
+#include "motion/image_view.h"
 #include "motion/lucas_kanade.h"
 #include "motion/window_loops.h"
 
@@ -46,12 +47,6 @@ struct PointTracker::State
 
 namespace
 {
-cv::Mat wrap(const vpImage<unsigned char> &image)
-{
-  return cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
-                 const_cast<unsigned char *>(image.bitmap));
-}
-
 cv::Point2f toCv(const Eigen::Vector2d &p) { return {float(p.x()), float(p.y())}; }
 Eigen::Vector2d toEigen(const cv::Point2f &p) { return {double(p.x), double(p.y)}; }
 
@@ -108,7 +103,7 @@ PointTracker &PointTracker::operator=(PointTracker &&) noexcept = default;
 
 void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matrix3d &aRb)
 {
-  const cv::Mat current = wrap(image);
+  const cv::Mat current = viewOf(image);
   if (current.cols != m_state->camera.width || current.rows != m_state->camera.height) {
     throw vpException(vpException::dimensionError,
                       fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,

@@ -3,6 +3,7 @@
 
 #include "geometry/constants.h"
 #include "motion/epipolar.h"
+#include "motion/image_view.h"
 #include <Eigen/Dense>
 #include <opencv2/imgproc.hpp>
 
@@ -60,11 +61,6 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
     }
   }
   return edges;
-}
-cv::Mat wrapped(const vpImage<unsigned char> &image)
-{
-  return cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U,
-                 const_cast<unsigned char *>(image.bitmap));
 }
 
 /// \p frames: that the edges come from; they share the lean of their trunks.
@@ -124,7 +120,7 @@ VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const
                                       const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
 {
   const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
-  return fitUp(findEdges(wrapped(image), camera, expected, options), expected, 1, options);
+  return fitUp(findEdges(viewOf(image), camera, expected, options), expected, 1, options);
 }
 
 VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const PinholeCamera &camera,
@@ -135,7 +131,7 @@ VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const
   const VerticalOptions options;
   const auto least = static_cast<std::size_t>(options.min_edges);
   const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
-  std::vector<VerticalEdge> edges = findEdges(wrapped(image), camera, expected, options), in_w;
+  std::vector<VerticalEdge> edges = findEdges(viewOf(image), camera, expected, options), in_w;
   for (const VerticalEdge &edge : edges)
     in_w.push_back({wRc * edge.normal, wRc * edge.ray});
   int frames = 1;
