@@ -206,9 +206,10 @@ void Smoother::State::backSubstitute(UpdateResult &result)
 /// again.
 void Smoother::State::dropContribution(Variable &v)
 {
-  if (options.fixed_lag > 0 || !v.is_pose || v.number > static_cast<int>(poses.size()) - 1 - kRecentPoses ||
-      v.number % kContributionEvery ==
-          0) // a fixed lag bounds the memory by itself, and closes a pose by its contribution
+  if (options.fixed_lag > 0) // bounds the memory by itself, and closes a pose by its contribution
+    return;
+  const int oldest_recent = static_cast<int>(poses.size()) - kRecentPoses;
+  if (!v.is_pose || v.number >= oldest_recent || v.number % kContributionEvery == 0)
     return;
   v.has_contribution = false;
   std::vector<double>().swap(v.contribution);

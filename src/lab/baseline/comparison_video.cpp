@@ -3,7 +3,6 @@
 
 #include "output/video_writer.h"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
