@@ -10,7 +10,6 @@
 #include "geometry/so3.h"
 #include "geometry/visp_matrix.h"
 #include "input/live_video.h"
-#include "input/sensor_yaml.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
 #include "output/figure.h"
@@ -427,10 +426,8 @@ void addFollow(CLI::App &app)
       ->add_option("--camera-height", arguments->camera_height,
                    "Height of the camera over the ground [m], which gives a video without odometry its scale")
       ->check(within(0.1, 100));
-  command
-      ->add_option("--rate", arguments->source.frame_rate_hz,
-                   "Frames a second of numbered images; else the camera file's rate_hz")
-      ->capture_default_str();
+  command->add_option("--rate", arguments->source.frame_rate_hz,
+                      "Frames a second of numbered images; else the camera file's rate_hz, else 25");
   command->add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();
   command->add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)")->check(within(0, 1e9));
@@ -450,11 +447,6 @@ void addFollow(CLI::App &app)
       "  bole follow monday.mp4 --model sunday.cao --camera phone.yaml -o run\n"
       "  bole follow data/park-forward --model map.cao --init 0,0,1.5,0 -o run\n"
       "  bole follow rtsp://192.168.0.20/stream --model map.cao --init click --show -o run");
-  command->callback([arguments, command] {
-    if (command->count("--rate") == 0)
-      arguments->source.frame_rate_hz =
-          readFrameRate(arguments->source.camera_path).value_or(arguments->source.frame_rate_hz);
-    follow(*arguments);
-  });
+  command->callback([arguments] { follow(*arguments); });
 }
 } // namespace bole::apps

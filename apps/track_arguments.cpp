@@ -2,8 +2,6 @@
 #include "track_arguments.h"
 #include "data_files.h"
 
-#include "input/sensor_yaml.h"
-
 #include <algorithm>
 #include <visp3/core/vpException.h>
 
@@ -39,10 +37,8 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
       ->check(within(0.1, 100));
   command.add_option("--without", arguments->without, "Withhold one sensor: gyro or odometry (may be given twice)")
       ->check(CLI::IsMember({"gyro", "odometry"}));
-  command
-      .add_option("--rate", arguments->source.frame_rate_hz,
-                  "Frames a second of numbered images; else the camera file's rate_hz")
-      ->capture_default_str();
+  command.add_option("--rate", arguments->source.frame_rate_hz,
+                     "Frames a second of numbered images; else the camera file's rate_hz, else 25");
   command.add_option("--max-width", arguments->source.max_width_px, "Wider frames are made smaller [px]")
       ->capture_default_str();
   command.add_option("--frames", arguments->frames_most, "Stop after so many frames (0: all)")->check(within(0, 1e9));
@@ -86,9 +82,6 @@ void settle(const CLI::App &command, TrackArguments &arguments)
       throw CLI::RequiredError(needed);
   for (const std::string &sensor : arguments.without)
     (sensor == "gyro" ? arguments.is_without_gyro : arguments.is_without_odometry) = true;
-  if (command.count("--rate") == 0)
-    arguments.source.frame_rate_hz =
-        readFrameRate(arguments.source.camera_path).value_or(arguments.source.frame_rate_hz);
   arguments.is_field_of_view_given = command.count("--field-of-view") > 0;
   if (arguments.source.odometry_path == "none") {
     arguments.is_without_odometry = arguments.is_without_gyro = true;

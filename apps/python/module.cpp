@@ -198,8 +198,8 @@ PYBIND11_MODULE(_bole, module)
 
   module.def(
       "open",
-      [](const std::string &input, const std::string &camera, const std::string &odometry, double rate,
-         double field_of_view, int max_width) {
+      [](const std::string &input, const std::string &camera, const std::string &odometry,
+         const std::optional<double> &rate, double field_of_view, int max_width) {
         SourceOptions options;
         options.camera_path = camera;
         options.odometry_path = odometry;
@@ -208,12 +208,10 @@ PYBIND11_MODULE(_bole, module)
         options.max_width_px = max_width;
         return openSource(input, options);
       },
-      py::arg("input"), py::arg("camera") = "", py::arg("odometry") = "",
-      py::arg("rate") = SourceOptions().frame_rate_hz, py::arg("field_of_view") = SourceOptions().field_of_view_deg,
-      py::arg("max_width") = SourceOptions().max_width_px,
-      "Opens an ASL folder, a video or numbered images. rate [Hz] is that of numbered images, field_of_view [degrees] "
-      "is "
-      "assumed where no camera is known.");
+      py::arg("input"), py::arg("camera") = "", py::arg("odometry") = "", py::arg("rate") = py::none(),
+      py::arg("field_of_view") = SourceOptions().field_of_view_deg, py::arg("max_width") = SourceOptions().max_width_px,
+      "Opens an ASL folder, a video or numbered images. rate [Hz] is that of numbered images (None: the camera file's "
+      "rate_hz, else 25), field_of_view [degrees] is assumed where no camera is known.");
 
   py::class_<FrameReport>(module, "Report", "All that is known right after a frame.")
       .def_readonly("index", &FrameReport::index)

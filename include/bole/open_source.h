@@ -6,6 +6,7 @@
 #include <bole/frame.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -75,8 +76,8 @@ struct SourceOptions
   /// a body in flight is not where a straight line says after longer.
   double max_odometry_gap_s = 1;
   /// [Hz], > 0, 1e-3 to 1e4: rate of numbered images, which have no stamps of their own.
-  /// Default 25.
-  double frame_rate_hz = 25;
+  /// Default: `rate_hz` of the camera file, else 25.
+  std::optional<double> frame_rate_hz;
   /// [px], 0 (keep) or >= 64: wider images are shrunk to this. Default 640: see Rectifier.
   int max_width_px = 640;
   /// [degrees], 10 to 150: horizontal field of view that is assumed, and said, where no camera is

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/sequence_source.h"
 
+#include "input/sensor_yaml.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -128,7 +130,9 @@ SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &
     throw vpException(vpException::ioError, fmt::format("{}: no numbered images in it", pattern));
   state.numbers = numbersOf(m_name);
   state.at = state.numbers.first;
-  state.rate_hz = options.frame_rate_hz;
+  constexpr double kUsual_hz = 25;
+  state.rate_hz =
+      options.frame_rate_hz ? *options.frame_rate_hz : readFrameRate(options.camera_path).value_or(kUsual_hz);
   const ImageFile first = firstReadable(m_name, state.numbers);
   const MountedCamera camera =
       cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), m_note);

@@ -55,6 +55,24 @@ protected:
 };
 } // namespace
 
+TEST_F(Sources, ASequenceWithoutARateHasThatOfItsCameraFile)
+{
+  writeImages("image%04d.png", {0, 1});
+  m_flight.write("camera.yaml",
+                 "rate_hz: 8\nresolution: [96, 64]\ncamera_model: pinhole\nintrinsics: [80, 80, 47.5, 31.5]\n"
+                 "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n");
+  SourceOptions options;
+  const auto secondStamp = [&] {
+    SequenceSource source(path("image%04d.png"), options);
+    return readAll(source).at(1).stamp_ns;
+  };
+  EXPECT_EQ(secondStamp(), 40000000);
+  options.camera_path = path("camera.yaml");
+  EXPECT_EQ(secondStamp(), 125000000);
+  options.frame_rate_hz = 20;
+  EXPECT_EQ(secondStamp(), 50000000);
+}
+
 TEST_F(Sources, ASequenceKeepsThePlaceOfImagesThatAreMissing)
 {
   writeImages("image%04d.png", {3, 4, 6, 7});
