@@ -2,7 +2,7 @@
 /// \file
 /// What the point stage measures on the rendered flights, and what it costs in one thread.
 ///
-///     benchmark_motion                 the tables of README, "Point features"
+///     benchmark_motion                 the tables of src/doc/points.md
 ///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
 
 #include "input/asl_source.h"
