@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The README's table of faults: the emulator flies park-forward with each of them, a consumer takes
+// The table of faults of src/doc/ardrone.md: the emulator flies park-forward with each of them, a consumer takes
 // what the live source gives, and every picture called `ok` is looked up among the pictures flown.
 // Then reboots at many times, for how soon a good frame is there once the drone is back.
 //
