@@ -66,6 +66,20 @@ TEST(CameraModel, TheFovLensIsThatOfDevernayAndFaugeras)
   EXPECT_NEAR(std::tan(bent.norm() * 0.9) / (2 * std::tan(0.45)), xy.norm(), 1e-12);
 }
 
+/// The pixels are those of cv2.projectPoints and cv2.fisheye.projectPoints (OpenCV 4.6) with the same numbers.
+TEST(CameraModel, LensesOfBothKindsProjectAsThoseOfOpenCvDo)
+{
+  CameraModel model;
+  model.pinhole = kCamera;
+  model.distortion = Distortion::radial_tangential;
+  model.coefficients = {{-0.28, 0.07, 0.0012, -0.0021}};
+  EXPECT_LT((model.distort({0.5, -0.2}) - Eigen::Vector2d(259.74161195, 83.57696028)).norm(), 1e-7);
+  model.distortion = Distortion::equidistant;
+  model.coefficients = {{-0.02, 0.013, -0.007, 0.004}};
+  EXPECT_LT((model.distort({0.5, -0.2}) - Eigen::Vector2d(258.9424249, 83.8751459)).norm(), 1e-6);
+  EXPECT_EQ(model.distort({0, 0}), Eigen::Vector2d(kCamera.cx, kCamera.cy)); // on the axis, where r is 0
+}
+
 TEST(CameraModel, WithoutDistortionShowsThePinhole)
 {
   CameraModel model;

@@ -60,6 +60,17 @@ TEST(RelativeTrunk, JacobiansAgreeWithCentralDifferences)
   EXPECT_NEAR(error_trunk / (differences<5>(1e-3) - J_trunk).norm(), 4, 0.3);
 }
 
+TEST(RelativeTrunk, EitherJacobianCanBeAskedForAlone)
+{
+  Matrix46d J_pose, J_pose_alone = Matrix46d::Constant(NAN);
+  Matrix45d J_trunk, J_trunk_alone = Matrix45d::Constant(NAN);
+  relativeTrunk(tiltedBody(), kBodyToCamera, leaningTrunk(), &J_pose, &J_trunk);
+  relativeTrunk(tiltedBody(), kBodyToCamera, leaningTrunk(), &J_pose_alone, nullptr);
+  relativeTrunk(tiltedBody(), kBodyToCamera, leaningTrunk(), nullptr, &J_trunk_alone);
+  EXPECT_EQ(J_pose_alone, J_pose);
+  EXPECT_EQ(J_trunk_alone, J_trunk);
+}
+
 TEST(RelativeTrunk, PlusAndMinusAreInverse)
 {
   const RelativeTrunk x = relativeTrunk(tiltedBody(), kBodyToCamera, leaningTrunk());

@@ -137,6 +137,23 @@ TEST(BorderScan, SeesNothingBeyondItsHalfWidthOrBelowTheLeastContrast)
   EXPECT_THAT(scanBorder(g, lineAt(40), 8, 0.02, 1), SizeIs(1));
 }
 
+TEST(ContrastCost, FallsWithTheContrastFrom4To0WhereNothingWasSeenBefore)
+{
+  EXPECT_EQ(contrastCost(0, {}), 4);
+  EXPECT_NEAR(contrastCost(0.015, {}), 3, 1e-12);
+  EXPECT_NEAR(contrastCost(-0.03, {}), 2, 1e-12); // either sign
+  EXPECT_EQ(contrastCost(0.06, {}), 0);
+  EXPECT_EQ(contrastCost(0.5, {}), 0);
+}
+
+TEST(ContrastCost, GrowsWithTheDifferenceFromTheFramesBeforeUpTo8)
+{
+  EXPECT_EQ(contrastCost(0.1, 0.1), 0);
+  EXPECT_NEAR(contrastCost(0.14, 0.1), 0.5, 1e-12); // one sigma: 0.3 * 0.1 + 0.01
+  EXPECT_NEAR(contrastCost(0.02, 0.1), 2, 1e-12);
+  EXPECT_EQ(contrastCost(-0.1, 0.1), 8); // the other polarity
+}
+
 TEST(PairPeaks, PrefersWhatThePredictionExpects)
 {
   PairPrior prior;

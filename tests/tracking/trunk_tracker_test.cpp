@@ -63,6 +63,21 @@ TEST(TrunkTracker, FindsADarkTrunk) { expectFound(drawn(PinholeCamera(), seen(),
 TEST(TrunkTracker, FindsABrightTrunk) { expectFound(drawn(PinholeCamera(), seen(), 220, 90), seen()); }
 TEST(TrunkTracker, FindsATrunkUnderRoll) { expectFound(drawn(PinholeCamera(), seen(0.25), 40, 200), seen(0.25)); }
 
+/// A prediction that leans, tips and is too thin: each has to be mended by the polish, in steps of about a pixel.
+TEST(TrunkTracker, MendsTiltAndWidthOfThePredictionTogether)
+{
+  const PinholeCamera camera;
+  TrackingPrediction prediction = predictionNear(seen(), {0.02, 0.02, 0.02, -0.2});
+  prediction.covariance.diagonal() << 1e-3, 1e-3, 4e-4, 1e-2;
+  const TrackingResult result =
+      trackTrunk(computeGradient(drawn(camera, seen(), 40, 200)), camera, prediction, TrackingOptions());
+  ASSERT_EQ(result.status, TrackingStatus::tracked) << toString(result.status);
+  const Vector4d error = result.optimum.minus(seen());
+  EXPECT_LT(std::abs(error(0)), 0.01);                              // a lean of 0.02 in the prediction
+  EXPECT_LT(std::abs(error(2)) * camera.fx, 0.25);                  // bearing [px]; 0.5 with the prediction's lean
+  EXPECT_LT(std::abs(error(3)) * seen().ratio() * camera.fx, 0.08); // half the width [px]
+}
+
 TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
 {
   vpImage<unsigned char> image(240, 320, 0);
@@ -122,6 +137,26 @@ TEST(TrunkEnergy, GradientAgreesWithCentralDifferencesAtTwoStepSizes)
     EXPECT_NEAR(far / near, 4, 0.5) << "parameter " << i;
     EXPECT_LT(std::abs(near), 0.03 * std::abs(f(i))) << "parameter " << i;
   }
+}
+
+/// Where the gradient grows to both sides of a border, a sideways move of the border only makes it better.
+TEST(TrunkEnergy, SaysThatABorderStandsWhereTheImageIsWorst)
+{
+  const PinholeCamera camera;
+  const RelativeTrunk at = seen();
+  const auto curvatureOf = [&](double bend) {
+    Gradient gradient;
+    gradient.signed_x.resize(240, 320);
+    const double u_left = borderLine(camera, at, Border::left, {}).x_top; // upright: one column
+    for (int v = 0; v < 240; ++v)
+      for (int u = 0; u < 320; ++u)
+        gradient.signed_x[v][u] = static_cast<float>(0.1 + bend * (u - u_left) * (u - u_left));
+    return TrunkEnergy(gradient, camera, {}, {true, 0.1}, {false, 0.1}, EnergyOptions()).curvature(at);
+  };
+  const auto worst = curvatureOf(1e-4), best = curvatureOf(-1e-4);
+  EXPECT_TRUE(worst.negative);
+  EXPECT_LT(worst.F.norm(), 1e-3 * best.F.norm()); // what is not convex is left out
+  EXPECT_FALSE(best.negative);
 }
 
 TEST(TrunkEnergy, BrightnessScalesNothing)
