@@ -26,6 +26,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <visp3/core/vpException.h>
+#include <visp3/gui/vpDisplayX.h>
 
 namespace bole::apps
 {

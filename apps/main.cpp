@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The command `bole`: one subcommand a file, see commands.h.
+#include "command_module.h"
 #include "commands.h"
 #include "suggestion.h"
 
@@ -34,20 +35,15 @@ void addCommands(CLI::App &app)
   addExport(app);
   addOptions(app);
   addLocalise(app);
-  addFollow(app);
   addRecord(app);
   addGraph(app);
   addSolve(app);
-#ifdef BOLE_LAB
-  addCompare(app);
-  addSimulate(app);
-  addServo(app);
-  addReplay(app);
-  addEmulate(app);
-  addShowSaliency(app);
-  addReproduce(app);
-  addFitOdds(app);
-#endif
+}
+
+/// Those of the module, and the documentation of all.
+void addMoreCommands(CLI::App &app)
+{
+  fromModule<void(CLI::App &)>("boleAddMoreCommands")(app);
   addDocumentation(app, "bole " BOLE_VERSION);
 }
 
@@ -99,9 +95,24 @@ int refuse(const CLI::App &app, const CLI::ParseError &error)
   return static_cast<int>(ExitCode::usage);
 }
 
+/// Whether the first argument is answered by the commands of \p app.
+bool isEnough(const CLI::App &app, int argc, char **argv)
+{
+  const std::vector<std::string> known = commandsOf(app);
+  const std::string first = argc > 1 ? argv[1] : "";
+  return first == "--version" || std::find(known.begin(), known.end(), first) != known.end();
+}
+
 int run(CLI::App &app, int argc, char **argv)
 {
   try {
+    addCommands(app);
+    if (!isEnough(app, argc, argv))
+      addMoreCommands(app);
+    if (argc == 1) {
+      std::fputs(app.help().c_str(), stdout);
+      return static_cast<int>(ExitCode::good);
+    }
     app.parse(argc, argv);
   }
   catch (const CLI::RuntimeError &end) {
@@ -145,11 +156,6 @@ int start(int argc, char **argv)
   app.footer("`bole COMMAND --help` tells the options of a command, with examples.\n"
              "Exit status: 0 good; 1 error; 2 unknown command or option; 3 done, but the result is not to be trusted;\n"
              "130 interrupted, what was known is kept.");
-  addCommands(app);
-  if (argc == 1) {
-    std::fputs(app.help().c_str(), stdout);
-    return static_cast<int>(ExitCode::good);
-  }
   return run(app, argc, argv);
 }
 } // namespace

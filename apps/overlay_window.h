@@ -3,11 +3,12 @@
 /// \file
 /// A picture in a ViSP window, where one was asked for.
 
+#include "command_module.h"
+
 #include <bole/visp.h>
 #include <memory>
 #include <string>
 #include <visp3/core/vpDisplay.h>
-#include <visp3/gui/vpDisplayX.h>
 
 namespace bole::apps
 {
@@ -26,7 +27,8 @@ public:
       return;
     m_picture = picture;
     if (!m_display)
-      m_display = std::make_unique<vpDisplayX>(m_picture, 100, 100, m_title);
+      m_display.reset(
+          fromModule<vpDisplay *(vpImage<vpRGBa> &, const std::string &)>("boleMakeWindow")(m_picture, m_title));
     vpDisplay::display(m_picture);
     vpDisplay::flush(m_picture);
   }
@@ -35,6 +37,6 @@ private:
   bool m_is_shown;
   std::string m_title;
   vpImage<vpRGBa> m_picture;
-  std::unique_ptr<vpDisplayX> m_display;
+  std::unique_ptr<vpDisplay> m_display;
 };
 } // namespace bole::apps

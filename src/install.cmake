@@ -5,10 +5,11 @@ include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bole)
 set(BOLE_DATA_DIR ${CMAKE_INSTALL_DATADIR}/bole)
 
-install(TARGETS bole_library EXPORT boleTargets
+install(TARGETS bole_library bole_derived EXPORT boleTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
 install(DIRECTORY include/bole DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN *.h)
 install(TARGETS bole RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+install(TARGETS bole_commands LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/bole COMPONENT command)
 install(DIRECTORY config models data DESTINATION ${BOLE_DATA_DIR} COMPONENT command PATTERN figures EXCLUDE)
 
 install(EXPORT boleTargets NAMESPACE bole:: DESTINATION ${package_dir} COMPONENT development)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/flight_folder.h"
 #include "input/asl_text.h"
+#include "input/picture_codec.h"
 
 #include <cerrno>
 #include <cstring>
@@ -10,7 +11,6 @@
 #include <fstream>
 #include <unistd.h>
 #include <visp3/core/vpException.h>
-#include <visp3/io/vpImageIo.h>
 
 namespace bole
 {
@@ -76,7 +76,8 @@ void FlightFolder::write(const LiveFrame &frame)
     vpImage<unsigned char> image;
     frame.picture.toGrey(image);
     const std::string part = m_cam0 + "/part.png";
-    vpImageIo::write(image, part);
+    if (!(std::ofstream(part, std::ios::binary) << encodePng(image)).flush())
+      throw vpException(vpException::ioError, part + ": cannot be written");
     fs::rename(part, fs::path(m_cam0) / "data" / name);
     ++m_images;
   }

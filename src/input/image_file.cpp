@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/image_file.h"
+#include "input/picture_codec.h"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +9,12 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
-#include <iterator>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core/types.hpp>
 #include <optional>
+
+extern "C" {
+#include <libavutil/crc.h>
+}
 
 namespace bole
 {
@@ -20,27 +24,6 @@ using Bytes = std::vector<unsigned char>;
 
 constexpr std::uint64_t kLargestSide = std::uint64_t{1} << 30; // px, of what a header may say
 
-std::array<std::uint32_t, 256> crcTable()
-{
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t n = 0; n < 256; ++n) {
-    std::uint32_t c = n;
-    for (int k = 0; k < 8; ++k)
-      c = (c & 1) ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-    table[n] = c;
-  }
-  return table;
-}
-
-std::uint32_t crc32(const unsigned char *data, std::size_t size)
-{
-  static const auto kTable = crcTable();
-  std::uint32_t c = 0xFFFFFFFFu;
-  for (std::size_t i = 0; i < size; ++i)
-    c = kTable[(c ^ data[i]) & 0xFF] ^ (c >> 8);
-  return ~c;
-}
-
 std::uint32_t bigEndian32(const unsigned char *p)
 {
   return (std::uint32_t(p[0]) << 24) | (std::uint32_t(p[1]) << 16) | (std::uint32_t(p[2]) << 8) | p[3];
@@ -49,12 +32,13 @@ std::uint32_t bigEndian32(const unsigned char *p)
 /// Walks the chunks of a PNG: all of them whole, each with its checksum, the last one IEND.
 std::string pngFault(const Bytes &bytes)
 {
+  static const AVCRC *const kCrc = av_crc_get_table(AV_CRC_32_IEEE_LE);
   std::size_t at = 8;
   while (at + 12 <= bytes.size()) {
     const std::size_t length = bigEndian32(&bytes[at]);
     if (length > bytes.size() - at - 12)
       break;
-    if (crc32(&bytes[at + 4], length + 4) != bigEndian32(&bytes[at + 8 + length]))
+    if (~av_crc(kCrc, ~0u, &bytes[at + 4], length + 4) != bigEndian32(&bytes[at + 8 + length]))
       return fmt::format("checksum error in the PNG chunk at byte {}", at);
     if (std::memcmp(&bytes[at + 4], "IEND", 4) == 0)
       return {};
@@ -209,10 +193,13 @@ ImageFile readImageFile(const std::string &path, int width, int height)
   if (!std::filesystem::is_regular_file(path, error))
     return broken(FrameStatus::missing, path,
                   std::filesystem::exists(path, error) ? "is no file of an image" : "no such image");
-  if (std::filesystem::file_size(path, error) > kLargestFile)
+  const std::uintmax_t size_of_file = std::filesystem::file_size(path, error);
+  if (!error && size_of_file > kLargestFile)
     return broken(FrameStatus::corrupt, path, "larger than 256 MB");
   std::ifstream file(path, std::ios::binary);
-  const Bytes bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  Bytes bytes(error ? 0 : static_cast<std::size_t>(size_of_file));
+  file.read(reinterpret_cast<char *>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
   if (!file.is_open() || file.bad())
     return broken(FrameStatus::missing, path, "cannot be read");
   const std::string fault = containerFault(bytes);
@@ -229,19 +216,9 @@ ImageFile readImageFile(const std::string &path, int width, int height)
         FrameStatus::corrupt, path,
         fmt::format("image of {}x{} px, must be at most {:g} pixels", size->width, size->height, kMostPixels));
 
-  cv::Mat grey;
-  try {
-    grey = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-  }
-  catch (const cv::Exception &) {
-    grey.release();
-  }
-  if (grey.empty())
-    return broken(FrameStatus::corrupt, path, "cannot be decoded");
   ImageFile result;
-  result.image.resize(static_cast<unsigned>(grey.rows), static_cast<unsigned>(grey.cols));
-  cv::Mat target(grey.rows, grey.cols, CV_8UC1, result.image.bitmap);
-  grey.copyTo(target);
+  if (!decodeGrey(bytes, result.image))
+    return broken(FrameStatus::corrupt, path, "cannot be decoded");
   return result;
 }
 } // namespace bole

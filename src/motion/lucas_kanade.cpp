@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/video/tracking.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace bole
 {
@@ -78,8 +78,25 @@ bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f
 
 void buildPyramid(const cv::Mat &image, int levels, GreyPyramid &pyramid)
 {
-  cv::buildOpticalFlowPyramid(image, pyramid, cv::Size(kWindowReach, kWindowReach), levels, false,
-                              cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+  constexpr int kReach = kWindowReach;
+  pyramid.resize(static_cast<std::size_t>(levels) + 1);
+  cv::Size size = image.size();
+  for (std::size_t level = 0; level < pyramid.size(); ++level) {
+    cv::Mat &at = pyramid[level];
+    if (at.size() == size)
+      at.adjustROI(kReach, kReach, kReach, kReach); // the memory of an image before
+    else
+      at.create(size.height + 2 * kReach, size.width + 2 * kReach, CV_8U);
+    cv::Mat inside = at(cv::Rect(kReach, kReach, size.width, size.height));
+    if (level > 0)
+      cv::pyrDown(pyramid[level - 1], inside, size);
+    cv::copyMakeBorder(level > 0 ? inside : image, at, kReach, kReach, kReach, kReach,
+                       cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
+    at = inside;
+    size = {(size.width + 1) / 2, (size.height + 1) / 2};
+    if (size.width <= kReach || size.height <= kReach) // reflection would need more than there is
+      pyramid.resize(level + 1);
+  }
 }
 
 double roundness(const cv::Mat &image, const cv::Point2f &at)

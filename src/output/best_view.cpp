@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/best_view.h"
+#include "input/picture_codec.h"
 
 #include <bole/overlay.h>
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace bole
@@ -56,18 +56,18 @@ std::string BestViews::jpeg(int id) const
   const cv::Mat grey(static_cast<int>(view.crop.getHeight()), static_cast<int>(view.crop.getWidth()), CV_8UC1,
                      view.crop.bitmap);
   const double factor = std::min(double(kHeight) / grey.rows, 1.5 * kHeight / grey.cols);
-  cv::Mat picture;
-  cv::resize(grey, picture, {}, factor, factor, factor < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
-  cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
+  cv::Mat scaled;
+  cv::resize(grey, scaled, {}, factor, factor, factor < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
+  vpImage<vpRGBa> picture(static_cast<unsigned>(scaled.rows), static_cast<unsigned>(scaled.cols));
+  cv::Mat canvas(scaled.rows, scaled.cols, CV_8UC4, picture.bitmap);
+  cv::cvtColor(scaled, canvas, cv::COLOR_GRAY2RGBA);
   const vpRGBa colour = colourOf(id);
   const auto at = [&](int column) {
     const Eigen::Vector2d u = ((view.ends.col(column).array() + 0.5) * factor - 0.5) * (1 << kShift);
     return cv::Point(static_cast<int>(std::lround(u.x())), static_cast<int>(std::lround(u.y())));
   };
   for (const int border : {0, 2})
-    cv::line(picture, at(border), at(border + 1), cv::Scalar(colour.B, colour.G, colour.R), 1, cv::LINE_AA, kShift);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
-  return {bytes.begin(), bytes.end()};
+    cv::line(canvas, at(border), at(border + 1), cv::Scalar(colour.R, colour.G, colour.B, 255), 1, cv::LINE_AA, kShift);
+  return encodeJpeg(picture);
 }
 } // namespace bole

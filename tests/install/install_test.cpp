@@ -154,6 +154,13 @@ TEST_F(Install, TheCommandFindsItsPresetsAndItsFlightByName)
   EXPECT_TRUE(fs::exists(folder / "trunks.csv"));
 }
 
+TEST_F(Install, TheCommandFindsTheCommandsOfItsModule)
+{
+  const Outcome ran = bole::test::runShell("cd / && " + (s_prefix / "bin/bole").string() + " follow --help");
+  EXPECT_EQ(ran.status, 0) << ran.text;
+  EXPECT_THAT(ran.text, HasSubstr("--model"));
+}
+
 TEST_F(Install, TheCommandTellsItsVersions)
 {
   const Outcome ran = bole::test::runShell((s_prefix / "bin/bole").string() + " --version");

@@ -210,6 +210,17 @@ TEST(Command, SuggestsTheNearestOfWhatItDoesNotKnow)
   EXPECT_THAT(preset.text, HasSubstr("did you mean paper?"));
 }
 
+/// What ViSP's trackers and robots and the decoders of other programs bring takes longer to load than a frame to map.
+TEST(Command, LoadsWhatItNeeds)
+{
+  const Outcome outcome = run("", "LD_TRACE_LOADED_OBJECTS=1 ");
+  EXPECT_THAT(outcome.text, HasSubstr("libbole_core.so"));
+  for (const char *heavy : {"libbole.so", "libvisp_mbt", "libvisp_robot", "libvisp_io", "libvisp_gui", "imgcodecs",
+                            "opencv_video", "libgdal", "libCoin"})
+    EXPECT_THAT(outcome.text, testing::Not(HasSubstr(heavy)));
+  EXPECT_THAT(run("follow --help").text, HasSubstr("--model"));
+}
+
 TEST(Command, FindsItsPresetsFromAnyFolder)
 {
   const std::string folder = freshFolder("preset");
