@@ -214,6 +214,8 @@ public:
   RelativeTrunk predictedRelative(std::size_t trunk) const;
   /// Its covariance, from the joint marginal of the newest pose and the trunk.
   Matrix4d relativeCovariance(std::size_t trunk) const;
+  /// Of its bearing alone, its element (2, 2), cheaper.
+  double bearingVariance(std::size_t trunk) const;
 
   /// All that is open, at the estimates. Removed trunks are left out; ids: pose i is i, trunk j is
   /// poseCount() + j.

@@ -300,7 +300,7 @@ std::vector<KnownTrunk> Engine::known(const std::vector<PredictedTrunk> &predict
     const double variance = looked_for != predicted.end()
                                 ? looked_for->tracking.covariance(2, 2) - looked_for->missed_variance
                             : is_new ? (J * trunk.covariance * J.transpose())(2, 2)
-                                     : m_smoother.relativeCovariance(trunk.smoother_id)(2, 2);
+                                     : m_smoother.bearingVariance(trunk.smoother_id);
     trunks.push_back({trunk.id, trunk.status, trunk.trunk, trunk.observations, m_map.evidence(trunk),
                       trunk.lookedThrough(), trunk.covariance(2, 2), variance});
   }

@@ -10,9 +10,9 @@ namespace bole
 {
 template <int Columns>
 Eigen::Matrix<double, Columns, Columns>
-Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X, int count)
+Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, Columns, 6> *X, int count)
 {
-  using Rows = Eigen::Map<Eigen::Matrix<double, 6, Columns>>;
+  using Rows = Eigen::Map<Eigen::Matrix<double, Columns, 6>>; // a row of X stands together
   position.resize(variables.size(), -1);
   path.clear();
   for (int i = 0; i < count; ++i)
@@ -36,18 +36,18 @@ Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, 6,
     const int rows = v.dim + v.separator_dim;
     for (int c = 0; c < v.dim; ++c) {
       const double *column = v.columns.data() + c * rows;
-      y.row(c) /= column[c];
+      y.col(c) /= column[c];
       for (int i = c + 1; i < v.dim; ++i)
-        y.row(i) -= column[i] * y.row(c);
+        y.col(i) -= column[i] * y.col(c);
+      form += y.col(c) * y.col(c).transpose();
     }
-    form.noalias() += y.topRows(v.dim).transpose() * y.topRows(v.dim);
     int row = v.dim;
     for (const int s : v.separator) {
       Rows b(path_rows[position[s]].data());
       for (int c = 0; c < v.dim; ++c) {
         const double *column = v.columns.data() + c * rows + row;
         for (int i = 0; i < variables[s].dim; ++i)
-          b.row(i) -= column[i] * y.row(c);
+          b.col(i) -= column[i] * y.col(c);
       }
       row += variables[s].dim;
     }
@@ -64,8 +64,7 @@ Matrix5d Smoother::State::trunkCovariance(int trunk)
     return state.closed_covariance;
   if (!variables[state.variable].eliminated)
     return state.prior.sigma.cwiseAbs2().asDiagonal();
-  Eigen::Matrix<double, 6, 5> X = Eigen::Matrix<double, 6, 5>::Zero();
-  X.topRows<5>().setIdentity();
+  Eigen::Matrix<double, 5, 6> X = Eigen::Matrix<double, 5, 6>::Identity();
   return inverseForm<5>(&state.variable, &X, 1);
 }
 
@@ -80,7 +79,10 @@ Matrix6d Smoother::State::poseCovariance(int pose)
   return inverseForm<6>(&state.variable, &X, 1);
 }
 
-Matrix4d Smoother::State::relativeCovariance(int trunk)
+/// That of \p which of the coordinates of the relative trunk: \p which takes them from it.
+template <int Columns>
+Eigen::Matrix<double, Columns, Columns>
+Smoother::State::relativeCovariance(int trunk, const Eigen::Matrix<double, Columns, 4> &which)
 {
   const TrunkState &seen = trunks[trunk];
   const PoseState &newest = poses.back();
@@ -90,16 +92,25 @@ Matrix4d Smoother::State::relativeCovariance(int trunk)
   if (!J_pose.allFinite() || !J_trunk.allFinite())
     throw vpException(vpException::badValue, "trunk = %d, must not contain the camera", trunk);
   if (!isOpen(seen.variable) || !variables[seen.variable].eliminated) {
-    return J_pose * poseCovariance(static_cast<int>(poses.size()) - 1) * J_pose.transpose() +
-           J_trunk * trunkCovariance(trunk) * J_trunk.transpose();
+    const Matrix4d whole = J_pose * poseCovariance(static_cast<int>(poses.size()) - 1) * J_pose.transpose() +
+                           J_trunk * trunkCovariance(trunk) * J_trunk.transpose();
+    return which * whole * which.transpose();
   }
   if (!variables[newest.variable].eliminated)
     throw vpException(vpException::notInitialized, "newest pose, must be taken in by update() first");
   const int ids[2] = {newest.variable, seen.variable};
-  Eigen::Matrix<double, 6, 4> X[2];
-  X[0] = J_pose.transpose();
+  Eigen::Matrix<double, Columns, 6> X[2];
+  X[0] = which * J_pose;
   X[1].setZero();
-  X[1].topRows<5>() = J_trunk.transpose();
-  return inverseForm<4>(ids, X, 2);
+  X[1].template leftCols<5>() = which * J_trunk;
+  return inverseForm<Columns>(ids, X, 2);
+}
+
+Matrix4d Smoother::State::relativeCovariance(int trunk) { return relativeCovariance<4>(trunk, Matrix4d::Identity()); }
+
+double Smoother::State::bearingVariance(int trunk)
+{
+  constexpr int kBearing = 2;
+  return relativeCovariance<1>(trunk, Eigen::RowVector4d::Unit(kBearing))(0, 0);
 }
 } // namespace bole

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Eliminating one variable from its front, and solving for it afterwards.
+#include "smoothing/front_loops.h"
 #include "smoothing/state.h"
 
 #include <algorithm>
@@ -9,6 +10,7 @@ namespace bole
 namespace
 {
 using Map = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+constexpr int kLargestBlock = 6; // rows of a variable
 
 /// Adds [J_a J_b]^T [J_a J_b r] to the lower triangle of the front.
 template <int Rows, int A, int B> void addBinary(const double *linear, double *front, int ld, int at_a, int at_b)
@@ -36,45 +38,6 @@ template <int Rows, int A> void addUnary(const double *linear, double *front, in
   F.block<1, A>(ld - 1, at_a) += r.transpose().lazyProduct(J);
 }
 
-/// Cholesky of the first D columns, in place: L_vv over L_sv (with y_v^T in the last row), the
-/// Schur complement in the rest. Returns how many directions had no information beyond rounding;
-/// those are held (their delta is zero).
-template <int D> int factorFront(double *front, int ld)
-{
-  int held = 0;
-  for (int c = 0; c < D; ++c) {
-    double *column = front + c * ld;
-    const double before = column[c];
-    for (int k = 0; k < c; ++k) {
-      const double *earlier = front + k * ld;
-      const double scale = earlier[c];
-      for (int i = c; i < ld; ++i)
-        column[i] -= scale * earlier[i];
-    }
-    if (!(column[c] > 1e-13 * std::abs(before)) || !std::isfinite(column[c])) {
-      ++held;
-      std::fill(column + c, column + ld, 0.0);
-      column[c] = 1;
-      continue;
-    }
-    const double inverse = 1 / std::sqrt(column[c]);
-    for (int i = c; i < ld; ++i)
-      column[i] *= inverse;
-  }
-  for (int j = D; j < ld - 1; ++j) {
-    double w[D];
-    for (int k = 0; k < D; ++k)
-      w[k] = front[k * ld + j];
-    double *column = front + j * ld;
-    for (int i = j; i < ld; ++i) {
-      double sum = 0;
-      for (int k = 0; k < D; ++k)
-        sum += w[k] * front[k * ld + i];
-      column[i] -= sum;
-    }
-  }
-  return held;
-}
 } // namespace
 
 void Smoother::State::assemble(const Factor &factor)
@@ -184,7 +147,9 @@ void Smoother::State::eliminate(int id)
   }
   const int ld = front_rows = columns + 1;
   v.separator_dim = columns - v.dim;
-  front.assign(static_cast<std::size_t>(ld) * columns, 0.0);
+  front.resize(std::max(front.size(), static_cast<std::size_t>(ld) * columns));
+  for (int c = 0; c < columns; ++c) // what is above the blocks of the diagonal is never read
+    std::fill(front.data() + c * ld + std::max(0, c - kLargestBlock), front.data() + (c + 1) * ld, 0.0);
 
   // numbers
   for (const int f : v.assembled)
@@ -204,7 +169,7 @@ void Smoother::State::eliminate(int id)
   if (damping > 0)
     for (int i = 0; i < v.dim; ++i)
       front[i * ld + i] += damping * damping_scale[id](i);
-  held_directions += v.is_pose ? factorFront<6>(front.data(), ld) : factorFront<5>(front.data(), ld);
+  held_directions += factorFront(front.data(), ld, v.dim);
 
   // keep the columns of L, y, and the contribution
   const int rows = ld - 1;

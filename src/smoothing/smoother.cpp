@@ -254,6 +254,13 @@ Matrix4d Smoother::relativeCovariance(std::size_t trunk) const
   return m_state->relativeCovariance(static_cast<int>(trunk));
 }
 
+double Smoother::bearingVariance(std::size_t trunk) const
+{
+  m_state->checkTrunk(trunk);
+  require(!m_state->poses.empty(), "bearingVariance, must follow addFirstPose");
+  return m_state->bearingVariance(static_cast<int>(trunk));
+}
+
 Graph Smoother::graph() const { return m_state->graph(); }
 std::size_t Smoother::memoryBytes() const { return m_state->memoryBytes(); }
 } // namespace bole

@@ -244,13 +244,16 @@ public:
   void orderAffected();
 
   // covariance.cpp
-  /// y = L^-1 X with X zero but for the rows of the variables given; returns y^T y.
+  /// y = L^-1 X^T with X zero but for the columns of the variables given; returns y^T y.
   template <int Columns>
-  Eigen::Matrix<double, Columns, Columns> inverseForm(const int *variable, const Eigen::Matrix<double, 6, Columns> *X,
+  Eigen::Matrix<double, Columns, Columns> inverseForm(const int *variable, const Eigen::Matrix<double, Columns, 6> *X,
                                                       int count);
   Matrix5d trunkCovariance(int trunk);
   Matrix6d poseCovariance(int pose);
+  template <int Columns>
+  Eigen::Matrix<double, Columns, Columns> relativeCovariance(int trunk, const Eigen::Matrix<double, Columns, 4> &which);
   Matrix4d relativeCovariance(int trunk);
+  double bearingVariance(int trunk);
 
   // export.cpp
   Graph graph() const;
