@@ -163,15 +163,17 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   const Matrix3d turn = expSo3((rate - m_gyro_bias) * dt);
   const Vector3d specific = force - m_force_bias;
   const Matrix3d by_attitude = -m_wRb * skew(specific) * dt;
-  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(kStates, kStates);
-  F.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
-  F.block<3, 3>(kAttitude, kGyro) = -dt * Matrix3d::Identity();
-  F.block<3, 3>(kVelocity, kAttitude) = by_attitude;
-  F.block<3, 3>(kVelocity, kForce) = -dt * m_wRb;
-  F.block<3, 3>(kMoved, kVelocity) = dt * Matrix3d::Identity();
-  F.block<3, 3>(kMoved, kAttitude) = 0.5 * dt * by_attitude;
-  F.block<3, 3>(kMoved, kForce) = -0.5 * dt * dt * m_wRb;
-  m_covariance = (F * m_covariance * F.transpose()).eval();
+  const auto advance = [&] { // the rows of the covariance
+    using Rows = Eigen::Matrix<double, 3, kStates>;
+    const Rows attitude = m_covariance.middleRows<3>(kAttitude), velocity = m_covariance.middleRows<3>(kVelocity);
+    const Rows pushed = by_attitude * attitude - dt * m_wRb * m_covariance.middleRows<3>(kForce);
+    m_covariance.middleRows<3>(kAttitude) = turn.transpose() * attitude - dt * m_covariance.middleRows<3>(kGyro);
+    m_covariance.middleRows<3>(kVelocity) += pushed;
+    m_covariance.middleRows<3>(kMoved) += dt * velocity + 0.5 * dt * pushed;
+  };
+  advance();
+  m_covariance.transposeInPlace(); // F P F^T = F (F P)^T
+  advance();
   const auto white = [&](int at, double density, double longer) {
     m_covariance.diagonal().segment<3>(at).array() += density * density * dt * longer;
   };

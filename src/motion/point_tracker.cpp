@@ -38,6 +38,7 @@ struct PointTracker::State
   std::size_t frames = 0;
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
+  std::vector<unsigned char> peaks; ///< of a row
 
   template <typename Start>
   std::pair<std::vector<std::optional<Eigen::Vector2d>>, std::size_t> search(const Start &start) const;
@@ -69,19 +70,6 @@ struct Corner
   float response;
   cv::Point at;
 };
-
-/// No neighbour is stronger.
-bool isPeak(const cv::Mat &response, int x, int y)
-{
-  const float here = response.at<float>(y, x);
-  for (int i = y - 1; i <= y + 1; ++i) {
-    const float *row = response.ptr<float>(i);
-    if (std::max({row[x - 1], row[x], row[x + 1]}) > here) {
-      return false;
-    }
-  }
-  return true;
-}
 
 /// The corner to a fraction of a pixel: the vertex of the parabola through the responses, per axis.
 Eigen::Vector2d refined(const cv::Mat &response, const cv::Point &at)
@@ -192,12 +180,14 @@ void PointTracker::State::replenish(const cv::Mat &image)
   }
   std::vector<std::vector<Corner>> corners(static_cast<std::size_t>(cells));
   const int margin = std::max(2, cvCeil(kMargin_px) + 1);
+  peaks.resize(static_cast<std::size_t>(image.cols));
   for (int y = margin; y < image.rows - margin; ++y) {
     const float *r = response.ptr<float>(y);
-    for (int x = margin; x < image.cols - margin; ++x) {
-      if (r[x] > threshold && isPeak(response, x, y)) {
-        corners[cellOf(x, y)].push_back({r[x], {x, y}});
-      }
+    peaksOfRow(r, image.cols, threshold, peaks.data());
+    const auto end = peaks.end() - margin;
+    for (auto peak = std::find(peaks.begin() + margin, end, 1); peak != end; peak = std::find(peak + 1, end, 1)) {
+      const int x = static_cast<int>(peak - peaks.begin());
+      corners[cellOf(x, y)].push_back({r[x], {x, y}});
     }
   }
   for (auto &cell : corners) {

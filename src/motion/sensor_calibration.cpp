@@ -16,6 +16,7 @@ namespace bole
 {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
 
 namespace calibration
 {
@@ -126,13 +127,23 @@ double failingOf(const std::vector<double> &squares)
   return squares.empty() ? 1 : double(failing) / double(squares.size());
 }
 
-/// Rows of linear measurements r + J x of three unknowns, each row block with its information.
+/// A linear measurement r + J x of three unknowns with its information W.
 struct Row
 {
-  Eigen::MatrixXd J;
-  Eigen::VectorXd r;
-  Eigen::MatrixXd information;
-  double overlap = 1; ///< blocks that share what they measured
+  template <int N>
+  Row(const Eigen::Matrix<double, N, 3> &J, const Eigen::Matrix<double, N, 1> &r, const Eigen::Matrix<double, N, N> &W,
+      double overlap_)
+      : JWJ(J.transpose() * W * J), JWr(J.transpose() * W * r), rWr(r.dot(W * r)), size(N), overlap(overlap_)
+  {
+  }
+  /// Of what is left of it at \p x, as of three numbers.
+  double squares(const Vector3d &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
+
+  Matrix3d JWJ;
+  Vector3d JWr;
+  double rWr = 0;
+  int size = 3;
+  double overlap = 1; ///< measurements that share what they measured
 };
 
 /// Robust solution; \p prior2: variance of each unknown.
@@ -148,15 +159,13 @@ Fitted solve(const std::vector<Row> &rows, double prior2, double scatter = 0)
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row &row = rows[i];
       const double w = (iteration == 0 ? 1 : weightFor(squares[i])) / row.overlap;
-      H += w * row.J.transpose() * row.information * row.J;
-      g += w * row.J.transpose() * row.information * row.r;
+      H += w * row.JWJ;
+      g += w * row.JWr;
     }
     fit.covariance = H.inverse();
     fit.value = -fit.covariance * g;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Eigen::VectorXd left = rows[i].r + rows[i].J * fit.value;
-      squares[i] = left.dot(rows[i].information * left) * 3 / double(left.size());
-    }
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      squares[i] = rows[i].squares(fit.value);
   }
   fit.failing = failingOf(squares);
   const double inflation = scatter > 0 ? scatter : scatterOf(squares);
@@ -173,8 +182,8 @@ Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late
   for (const Turn &turn : turns) {
     const auto turned = path.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
     if (turned) // the rates less the bias: what is left of it turns the other way
-      rows.push_back({turn.duration() * Matrix3d::Identity(), logSo3(orthonormalized(turned->transpose() * turn.aRb)),
-                      turn.information, overlap});
+      rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
+                        logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
   }
   return solve(rows, kWideBias * kWideBias, scatter);
 }
@@ -366,11 +375,11 @@ void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row
         0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() +
         (std::pow(noise.odometry_walk, 2) * dt + std::pow(noise.odometry_height_sigma, 2)) / (length * length) +
         std::pow(noise.odometry_relative, 2);
-    Eigen::Matrix<double, 2, 3> across;
+    Matrix23d across;
     across.row(0) = by_points.unitOrthogonal().transpose();
     across.row(1) = by_points.cross(Vector3d(across.row(0))).transpose();
-    rows.push_back({-across * skew(by_odometry), across * (by_odometry - by_points),
-                    Eigen::Matrix2d::Identity() / variance, m_overlap});
+    rows.emplace_back(Matrix23d(-across * skew(by_odometry)), Eigen::Vector2d(across * (by_odometry - by_points)),
+                      Eigen::Matrix2d(Eigen::Matrix2d::Identity() / variance), m_overlap);
   }
 }
 
@@ -412,8 +421,8 @@ void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Row> &
     const Vector3d acceleration = (velocity(last - 3) - velocity(first)) / std::max(0.1, dt - lag);
     const Vector3d up = sum / count - acceleration;
     const double sigma = std::hypot(kSigma, 0.1 / (kGravity * dt)); // 0.1 m/s: of a velocity
-    rows.push_back({by_rotation.topRows<2>() / count / kGravity, up.head<2>() / kGravity,
-                    Eigen::Matrix2d::Identity() / (sigma * sigma), double(kParts)});
+    rows.emplace_back(Matrix23d(by_rotation.topRows<2>() / count / kGravity), Eigen::Vector2d(up.head<2>() / kGravity),
+                      Eigen::Matrix2d(Eigen::Matrix2d::Identity() / (sigma * sigma)), double(kParts));
   }
 }
 
@@ -439,7 +448,8 @@ void Estimation::addTurns(const std::vector<Frame> &frames, const GyroPath &path
         logSo3(orthonormalized(frames[a].wMb_odometry->R.transpose() * frames[b].wMb_odometry->R));
     const double dt = secondsOf(frames[b].stamp_ns - frames[a].stamp_ns);
     const double variance = kTurnSigma * kTurnSigma + std::pow(m_gyro.bias_sigma * dt, 2);
-    rows.push_back({-skew(by_odometry), by_odometry - by_gyro, Matrix3d::Identity() / variance, kShared});
+    rows.emplace_back(Matrix3d(-skew(by_odometry)), Vector3d(by_odometry - by_gyro),
+                      Matrix3d(Matrix3d::Identity() / variance), kShared);
   }
 }
 

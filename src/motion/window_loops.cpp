@@ -177,7 +177,15 @@ float cornerResponse(const unsigned char *image, int width, int height, CornerSc
   scratch.sums.assign(n, 0);
   scratch.most.assign(static_cast<std::size_t>(width), 0.f);
   const int *sums = scratch.sums.data();
-  std::fill_n(response, static_cast<std::ptrdiff_t>(width) * height, 0.f);
+  const auto clear = [&](int row, int from, int to) {
+    float *at = response + static_cast<std::ptrdiff_t>(row) * width;
+    std::fill(at + from, at + to, 0.f);
+  };
+  for (int i = 0; i < height; ++i) { // what no window fits round
+    const bool is_inside = i >= kCornerMargin && i < height - kCornerMargin && width > 2 * kCornerMargin;
+    clear(i, 0, is_inside ? kCornerMargin : width);
+    clear(i, is_inside ? width - kCornerMargin : width, width);
+  }
   for (int i = 1; i + 1 < height; ++i) {
     const unsigned char *row = image + static_cast<std::ptrdiff_t>(i) * width;
     replaceRow(row - width, row, row + width, width, &scratch.products[static_cast<std::size_t>(i % kMomentRows) * n],
@@ -187,5 +195,18 @@ float cornerResponse(const unsigned char *image, int width, int height, CornerSc
                        response + static_cast<std::ptrdiff_t>(i - 2) * width, scratch.most.data());
   }
   return *std::max_element(scratch.most.begin(), scratch.most.end());
+}
+
+BOLE_VECTOR_CLONES
+void peaksOfRow(const float *row, int width, float threshold, unsigned char *__restrict is_peak)
+{
+  const float *above = row - width, *below = row + width;
+  for (int j = 1; j < width - 1; ++j) {
+    const auto larger = [](float a, float b) { return a > b ? a : b; };
+    const float most_above = larger(larger(above[j - 1], above[j]), above[j + 1]);
+    const float most_below = larger(larger(below[j - 1], below[j]), below[j + 1]);
+    const float most = larger(larger(most_above, most_below), larger(row[j - 1], row[j + 1]));
+    is_peak[j] = (row[j] > threshold) & (row[j] >= most) ? 1 : 0;
+  }
 }
 } // namespace bole

@@ -45,4 +45,8 @@ constexpr int kCornerMargin = 3;
 /// cv::cornerMinEigenVal(image, response, 5, 3) gives; 0 in the kCornerMargin outermost rows and columns. Returns the
 /// largest.
 float cornerResponse(const unsigned char *image, int width, int height, CornerScratch &scratch, float *response);
+
+/// 1 where a response of the row, which has one above and one below it, is beyond \p threshold and no neighbour's is
+/// larger; 0 elsewhere. The first and the last pixel are left as they are.
+void peaksOfRow(const float *row, int width, float threshold, unsigned char *is_peak);
 } // namespace bole

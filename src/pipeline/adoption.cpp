@@ -73,16 +73,17 @@ Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const 
   constexpr int kIterations = 4; // from a detection's guess it has settled after two or three
   const TrunkPrior prior = priorOf(guess, options);
   const double robust = options.summary_loss.width;
+  std::vector<std::pair<SquareRootSummary, Pose>> usable;
+  for (const AdoptedView &view : views)
+    if (SquareRootSummary root; squareRoot(view.summary, root) != SummaryStatus::indefinite)
+      usable.emplace_back(root, view.wMb);
   Trunk trunk = guess;
   for (int i = 0; i < kIterations; ++i) {
     Matrix5d H = prior.sigma.cwiseAbs2().cwiseInverse().asDiagonal();
     Vector5d g = H * trunk.minus(prior.mean);
-    for (const AdoptedView &view : views) {
-      SquareRootSummary root;
-      if (squareRoot(view.summary, root) == SummaryStatus::indefinite)
-        continue;
+    for (const auto &[root, wMb] : usable) {
       Matrix45d J;
-      const Vector4d r = residual(root, options.bMc, view.wMb, trunk, nullptr, &J);
+      const Vector4d r = residual(root, options.bMc, wMb, trunk, nullptr, &J);
       const double weight = r.norm() > robust ? robust / r.norm() : 1;
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * r;

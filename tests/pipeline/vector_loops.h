@@ -9,6 +9,7 @@
 #include "saliency/evidence_loops.h"
 #include "saliency/label_loops.h"
 #include "saliency/rotation_loops.h"
+#include "smoothing/front_loops.h"
 #include "tracking/profile_loops.h"
 
 #include <cmath>
@@ -30,6 +31,7 @@ public:
     }
     saliency();
     points();
+    front();
     lines();
     window();
   }
@@ -112,11 +114,29 @@ private:
     }
   }
 
+  void front()
+  {
+    constexpr int kRows = 23;
+    for (const int columns : {5, 6}) {
+      std::vector<double> front(kRows * (kRows - 1));
+      for (int c = 0; c + 1 < kRows; ++c)
+        for (int r = c; r < kRows; ++r)
+          front[static_cast<std::size_t>(c * kRows + r)] = r == c ? 3 : std::sin(0.7 * r + 1.3 * c) / kRows;
+      m_all.push_back(factorFront(front.data(), kRows, columns));
+      keep(front);
+    }
+  }
+
   void points()
   {
     CornerScratch scratch;
     std::vector<float> response(kPixels);
     m_all.push_back(cornerResponse(m_grey.data(), kWidth, kHeight, scratch, response.data()));
+    std::vector<unsigned char> is_peak(kWidth, 0);
+    for (int row = kCornerMargin; row < kHeight - kCornerMargin; ++row) {
+      peaksOfRow(response.data() + row * kWidth, kWidth, 1e-5f, is_peak.data());
+      keep(is_peak);
+    }
     keep(response);
     const GreyPlane plane{m_grey.data(), kWidth, kWidth, kHeight};
     Window window;

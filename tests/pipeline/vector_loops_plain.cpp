@@ -12,6 +12,7 @@
 #include "saliency/evidence_loops.cpp"
 #include "saliency/label_loops.cpp"
 #include "saliency/rotation_loops.cpp"
+#include "smoothing/front_loops.cpp"
 #include "tracking/profile_loops.cpp"
 #include "vector_loops.h"
 
