@@ -42,6 +42,7 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
     const Matrix4d expected = J_pose * C.block(p, p, 6, 6) * J_pose.transpose() +
                               J_trunk * C.block(t, t, 5, 5) * J_trunk.transpose() + cross + cross.transpose();
     EXPECT_TRUE(smoother.relativeCovariance(j).isApprox(expected, 1e-4)) << j;
+    EXPECT_NEAR(smoother.bearingVariance(j), expected(2, 2), 1e-4 * expected(2, 2)) << j;
   }
 }
 
