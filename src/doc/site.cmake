@@ -19,6 +19,7 @@ set(DOXYGEN_STRIP_FROM_INC_PATH ${PROJECT_SOURCE_DIR}/include)
 set(DOXYGEN_IMAGE_PATH ${PROJECT_SOURCE_DIR}/data/figures)
 set(DOXYGEN_EXAMPLE_PATH ${PROJECT_SOURCE_DIR}/tests/install)
 set(DOXYGEN_GENERATE_TREEVIEW YES)
+set(DOXYGEN_TREEVIEW_WIDTH 320)
 set(DOXYGEN_HTML_EXTRA_STYLESHEET ${CMAKE_CURRENT_LIST_DIR}/site.css)
 set(DOXYGEN_HAVE_DOT NO)
 set(DOXYGEN_QUIET YES)
@@ -26,8 +27,14 @@ set(DOXYGEN_QUIET YES)
 set(DOXYGEN_FILTER_PATTERNS *.md=${CMAKE_CURRENT_LIST_DIR}/anchors.awk)
 set(DOXYGEN_USE_MATHJAX YES)
 set(DOXYGEN_MATHJAX_RELPATH mathjax)
-doxygen_add_docs(doc ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CONTRIBUTING.md
-  ${PROJECT_SOURCE_DIR}/models/README.md ${PROJECT_SOURCE_DIR}/src/doc ${PROJECT_SOURCE_DIR}/include
+# in the order in which they are read: what is not named here comes after the classes
+set(pages tutorial-map tutorial-video tutorial-localise tutorial-compare tutorial-servo tutorial-ardrone tutorial-python
+  tutorial-graph tutorial-energy concepts formats options troubleshooting paper deviations accuracy saliency points smoothing
+  visp-trackers servoing ardrone campaigns speed faults)
+list(TRANSFORM pages PREPEND ${CMAKE_CURRENT_LIST_DIR}/)
+list(TRANSFORM pages APPEND .md)
+doxygen_add_docs(doc ${PROJECT_SOURCE_DIR}/README.md ${pages} ${PROJECT_SOURCE_DIR}/models/README.md
+  ${PROJECT_SOURCE_DIR}/CONTRIBUTING.md ${PROJECT_SOURCE_DIR}/src/doc ${PROJECT_SOURCE_DIR}/include
   COMMENT "Making the documentation in ${PROJECT_BINARY_DIR}/site")
 add_custom_command(TARGET doc POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/site/mathjax
     COMMAND cp -rL ${BOLE_MATHJAX}/MathJax.js ${BOLE_MATHJAX}/config ${BOLE_MATHJAX}/extensions ${BOLE_MATHJAX}/jax
