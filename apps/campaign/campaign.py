@@ -115,6 +115,9 @@ class Campaign:
             wanted += [f"results/servo-{name}/{seed:06d}.json" for seed in seeds_of(task["seeds"], f"servo.{name}.seeds")]
         return wanted
 
+    def flown(self):
+        return [path for path in self.results() if os.path.exists(path)]
+
 
 def read(config):
     return Campaign(dict(config))
@@ -289,6 +292,10 @@ def comparisons(campaign, flights, trunks):
     return rows
 
 
+class Tables:
+    flights, trunks, summary, compare, failures = (name + ".csv" for name in ("flights", "trunks", "summary", "compare", "failures"))
+
+
 def write_tables(campaign, paths, output):
     flights, trunks, failures = collect(campaign, paths)
     write_csv(output.flights, flights, columns_of(flights) or ["run"])
@@ -430,14 +437,15 @@ def cost(campaign):
             times = [float(t) for t in re.findall(r"^# status -?\d+, cpu_s ([0-9.]+)$", text.read(), re.M)]
         if times:
             spent["simulated" if os.path.basename(path).startswith("simulate-") else "flown"].append(sum(times))
-    sizes = [os.path.getsize(p) for p in campaign.results() if os.path.exists(p)]
-    flights = max(1, len(campaign.flights) + len(campaign.logs))
+    flown = campaign.flown()
+    sizes = [os.path.getsize(p) for p in flown]
+    flights = len({os.path.basename(p) for p in flown})
     if not spent["flown"] or not sizes:
         return []
     hours = sum(map(sum, spent.values())) / 3600
     bytes_ = sum(sizes)
     rows = []
-    for n, name in ((flights, "this campaign"), (100000, "100,000 flights")):
+    for n, name in ((flights, f"these {flights} flights"), (100000, "100,000 flights")):
         scale = n / flights
         rows.append({"": name, "core hours": f"{hours * scale:.2f}" if n == flights else f"{hours * scale:.0f}",
                      "results [MB]": f"{bytes_ * scale / 1e6:.0f}", "on 1,000 cores [h]": f"{hours * scale / 1000:.2f}"})
@@ -457,10 +465,10 @@ def as_table(rows, columns):
 
 
 def write_page(campaign, path):
-    flights, trunks, failures = collect(campaign, campaign.results())
+    flights, trunks, failures = collect(campaign, campaign.flown())
     runs = [r for r in campaign.runs if any(f["run"] == r for f in flights)]
     parts = [f"<h1>{html.escape(campaign.name)}</h1>",
-             f"<p>{len(campaign.flights) + len(campaign.logs)} flights, {len(flights)} results, {len(failures)} failed. "
+             f"<p>{len(flights)} of {len(campaign.results())} results, {len(failures)} failed. "
              f"Intervals hold 95 %; whole flights are drawn anew for them, since trunks of one flight go together.</p>"]
     summary = summaries(campaign, flights)
     wide = []

@@ -29,10 +29,14 @@ pkill -KILL -f "$folder" 2>/dev/null || true
 first=$(stat -c %Y "$folder"/results/default/*.json | head -n 1)
 BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 -d "$folder" \
   --unlock >/dev/null 2>&1
+BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 -d "$folder" \
+  so_far >/dev/null 2>&1
+grep -q 'of 8 results' "$folder/page.html" && ! grep -q '8 of 8 results' "$folder/page.html" ||
+  { echo "no page of what was flown so far"; exit 1; }
 fly || { cat "$folder/log.txt"; exit 1; }
 [ "$(ls "$folder"/results/default | wc -l)" -eq 4 ] || { echo "not four results"; exit 1; }
 [ "$(stat -c %Y "$folder"/results/default/*.json | sort -n | head -n 1)" -eq "$first" ] || { echo "a finished flight was flown twice"; exit 1; }
 [ "$(tail -n +2 "$folder/failures.csv" | wc -l)" -eq 4 ] || { echo "the four failures are not reported"; exit 1; }
 grep -q '^default,all,,recall,' "$folder/summary.csv" || { echo "no recall in summary.csv"; exit 1; }
-grep -q '<h1>four</h1>' "$folder/page.html" || { echo "no page"; exit 1; }
+grep -q '8 of 8 results' "$folder/page.html" || { echo "no page"; exit 1; }
 [ -z "$(ls "$folder/flights" 2>/dev/null)" ] || { echo "pictures were not cleared"; exit 1; }
