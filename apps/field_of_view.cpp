@@ -12,7 +12,7 @@ FieldOfView fieldOfView(const std::string &input, const SourceOptions &options, 
   const auto source = openSource(input, options);
   const PinholeCamera camera = source->camera();
   PointTracker tracker(camera);
-  FocalFromTurning focal(camera);
+  FocalFinder focal(camera);
   for (int i = 0; i < frames_most; ++i) {
     Frame frame;
     if (!source->next(frame))
@@ -20,7 +20,7 @@ FieldOfView fieldOfView(const std::string &input, const SourceOptions &options, 
     if (frame.status != FrameStatus::ok)
       continue;
     tracker.track(frame.image);
-    focal.add(tracker);
+    focal.add(tracker, frame.stamp_ns);
   }
   const FocalEstimate estimate = focal.estimate();
   if (!estimate.known)

@@ -31,7 +31,7 @@ namespace bole::apps
 {
 namespace
 {
-/// A video without a camera file is looked through for a pan that tells its field of view.
+/// A video without a camera file is looked through for turns and curves that tell its field of view.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
   const bool is_stream = LiveVideoSource::accepts(arguments.input);
@@ -47,8 +47,9 @@ std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &ma
   arguments.source.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
   source = openSource(arguments.input, arguments.source);
   made.is_camera_known = true;
+  made.field_of_view_sigma_deg = view.sigma_degrees;
   made.note = fmt::format(
-      "no camera file: the camera rotates as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
+      "no camera file: the camera moves as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
       view.degrees, view.sigma_degrees, source->camera().fx);
   return source;
 }

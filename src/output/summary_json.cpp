@@ -115,7 +115,8 @@ std::string toJson(const RunSummary &summary)
                     {"fy_px", camera.fy},
                     {"cx_px", camera.cx},
                     {"cy_px", camera.cy},
-                    {"known", summary.is_camera_known}};
+                    {"known", summary.is_camera_known},
+                    {"field_of_view_sigma_deg", positiveOrNull(summary.field_of_view_sigma_deg)}};
   json["preset"] = textOrNull(summary.preset);
   json["options"] = textOrNull(summary.options);
   json["scale"] = toString(summary.reference.scale);

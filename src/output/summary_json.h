@@ -27,7 +27,8 @@ struct RunSummary
   std::optional<InputDigest> digest;
   std::string note; ///< FrameSource::note()
   PinholeCamera camera;
-  bool is_camera_known = true; ///< false: the field of view is a guess
+  bool is_camera_known = true;        ///< false: the field of view is a guess
+  double field_of_view_sigma_deg = 0; ///< of one that was measured in the video, 0: of a calibration
   bool has_odometry = false, has_gyro = false;
 
   // what came of it

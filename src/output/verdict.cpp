@@ -60,18 +60,30 @@ std::size_t confirmedIn(const RunSummary &summary)
                     [](const TrunkRecord &trunk) { return trunk.status == TrunkStatus::confirmed; }));
 }
 
+std::string viewText(const RunSummary &summary)
+{
+  const double view = 2 * std::atan2(0.5 * summary.camera.width, summary.camera.fx) * 180 / M_PI;
+  const bool is_measured = summary.field_of_view_sigma_deg > 0;
+  return fmt::format("field of view: {:.1f} degrees, {}", view,
+                     !summary.is_camera_known ? "a guess"
+                     : is_measured            ? fmt::format("measured +- {:.1f}", summary.field_of_view_sigma_deg)
+                                              : "calibrated");
+}
+
 void addFacts(Verdict &verdict, const RunSummary &summary)
 {
   const bool has_ranges = summary.reference.has_ranges;
   const std::size_t confirmed = confirmedIn(summary);
-  const double view = 2 * std::atan2(0.5 * summary.camera.width, summary.camera.fx) * 180 / M_PI;
+  if (goodFrames(summary) == 0) {
+    verdict.facts.push_back(fmt::format("{:.1f} s; {}", summary.duration_s, framesText(summary)));
+    return;
+  }
   if (has_ranges)
     verdict.facts.push_back(fmt::format("path {} in {:.1f} s; {}", withUnit(summary.path_m, 2, "m"), summary.duration_s,
                                         framesText(summary)));
   else
     verdict.facts.push_back(fmt::format("{:.1f} s; {}", summary.duration_s, framesText(summary)));
-  verdict.facts.push_back(fmt::format("{}; field of view: {:.1f} degrees, {}", describe(summary.reference), view,
-                                      summary.is_camera_known ? "calibrated" : "a guess"));
+  verdict.facts.push_back(describe(summary.reference) + "; " + viewText(summary));
   for (const CalibratedConstant &constant : summary.calibration)
     if (constant.used)
       verdict.facts.push_back(fmt::format("{}: measured and taken out", constant.text));
@@ -95,9 +107,11 @@ void judgeMotion(Verdict &verdict, const RunSummary &summary)
   };
   const bool has_moved = summary.reference.has_ranges && !(summary.extent_m < kAtRest_m);
   const bool has_rotated = summary.rotated_deg > kAtRest_deg;
-  if (goodFrames(summary) == 0)
+  if (goodFrames(summary) == 0) {
     distrust("THE CAMERA SAW NOTHING: no frame could be used.");
-  else if (!has_moved && !has_rotated)
+    return;
+  }
+  if (!has_moved && !has_rotated)
     distrust("THE CAMERA NEVER MOVED: without motion there is no distance. Move it sideways by a tenth of the distance "
              "of the trunks.");
   else if (!has_moved)
@@ -132,7 +146,8 @@ Verdict judge(const RunSummary &summary)
   if (!summary.is_complete)
     verdict.doubts.push_back("The run was interrupted: this is what was known by then.");
   judgeMotion(verdict, summary);
-  judgeReference(verdict, summary);
+  if (goodFrames(summary) > 0)
+    judgeReference(verdict, summary);
   for (const SensorVerdict &sensor : summary.sensors) {
     verdict.is_trusted = false;
     verdict.doubts.push_back(fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));

@@ -62,6 +62,15 @@ TEST(Verdict, NamesTheOptionThatWouldTellWhatIsGuessed)
   EXPECT_THAT(textOf(summary), HasSubstr("--field-of-view"));
 }
 
+TEST(Verdict, TellsHowWellAFieldOfViewWasMeasured)
+{
+  RunSummary summary = goodRun();
+  EXPECT_THAT(textOf(summary), HasSubstr("degrees, calibrated"));
+  summary.field_of_view_sigma_deg = 2.14;
+  EXPECT_THAT(textOf(summary), testing::AllOf(HasSubstr("degrees, measured +- 2.1"), testing::Not(HasSubstr("guess"))));
+  EXPECT_NEAR(nlohmann::json::parse(toJson(summary)).at("camera").at("field_of_view_sigma_deg").get<double>(), 2.14, 1e-12);
+}
+
 TEST(Verdict, ACameraThatOnlyRotatedIsNotTrustedAndHasNoLengths)
 {
   RunSummary summary = goodRun();
@@ -85,7 +94,8 @@ TEST(Verdict, ACameraThatNeverMovedOrSawNothingIsNotTrusted)
   RunSummary blind = goodRun();
   blind.frames = {{FrameStatus::corrupt, 100}};
   EXPECT_FALSE(judge(blind).is_trusted);
-  EXPECT_THAT(textOf(blind), HasSubstr("SAW NOTHING"));
+  EXPECT_THAT(textOf(blind), testing::AllOf(HasSubstr("SAW NOTHING"), testing::Not(HasSubstr("field of view")),
+                                            testing::Not(HasSubstr("a frame")), testing::Not(HasSubstr("lengths"))));
   RunSummary meadow = goodRun();
   meadow.trunks.clear();
   EXPECT_FALSE(judge(meadow).is_trusted);
