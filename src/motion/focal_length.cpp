@@ -43,8 +43,8 @@ PinholeCamera withFocal(PinholeCamera camera, double factor)
   return camera;
 }
 
-/// Cost of a frame by focal length: the log of the residual [px] for each point that is explained. Empty where the frame
-/// cannot tell: no start yet under most of them, or lost.
+/// Cost of a frame by focal length: the log of the residual [px] for each point that is explained. Empty where the
+/// frame cannot tell: no start yet under most of them, or lost.
 std::vector<double> costsOf(const std::vector<PointOdometryResult> &placed)
 {
   std::vector<double> costs;
@@ -63,8 +63,8 @@ std::vector<double> costsOf(const std::vector<PointOdometryResult> &placed)
   return costs;
 }
 
-/// Where the sum of the costs has its minimum, one part of the video left out (kParts: none); nothing when it lies at the
-/// end of the range or nowhere.
+/// Where the sum of the costs has its minimum, one part of the video left out (kParts: none); nothing when it lies at
+/// the end of the range or nowhere.
 std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &costs, std::size_t left_out)
 {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(kSteps);

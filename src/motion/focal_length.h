@@ -4,9 +4,9 @@
 /// The focal length of a video that came without a camera file, from the points that the camera sees.
 ///
 /// Idea: a rigid world is explained well by a moving camera only under its own focal length. The video goes through the
-/// point odometry under a grid of focal lengths; each frame tells how many points each explains and how closely, and the
-/// one that explains best over all frames wins. Where the camera only turns, nothing is needed but a rotation between two
-/// frames: under a wrong focal length it leaves the points at the border of the image behind.
+/// point odometry under a grid of focal lengths; each frame tells how many points each explains and how closely, and
+/// the one that explains best over all frames wins. Where the camera only turns, nothing is needed but a rotation
+/// between two frames: under a wrong focal length it leaves the points at the border of the image behind.
 ///
 /// Laws (each a test): a camera that turns tells its focal length from a guess that is off by a factor of two, one that
 /// flies a curve from a guess that is off by a third; one that flies straight on without turning says that it cannot.

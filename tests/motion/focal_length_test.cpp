@@ -36,8 +36,9 @@ template <typename PoseOf> FocalEstimate estimateOf(double off, PoseOf poseOf)
 TEST(FocalLength, ATurningCameraTellsItFromAGuessThatIsOffByTwo)
 {
   for (const double off : {0.5, 2.0}) {
-    const FocalEstimate estimate =
-        estimateOf(off, [](int k) { return Pose{expSo3({0.002 * k, 0.02 * k - 0.3, 0}), {0, 0, 0}}; });
+    const FocalEstimate estimate = estimateOf(off, [](int k) {
+      return Pose{expSo3({0.002 * k, 0.02 * k - 0.3, 0}), {0, 0, 0}};
+    });
     ASSERT_TRUE(estimate.known) << off;
     EXPECT_NEAR(estimate.factor * off, 1, 0.05) << off;
   }
@@ -63,8 +64,9 @@ TEST(FocalLength, AFlightThroughAWoodTellsItFromAGuessThatIsOffByAThird)
 
 TEST(FocalLength, AStraightFlightDoesNotTellIt)
 {
-  const FocalEstimate estimate =
-      estimateOf(1, [](int k) { return Pose{Eigen::Matrix3d::Identity(), {0.12 * k, 0, 0.1 * k}}; });
+  const FocalEstimate estimate = estimateOf(1, [](int k) {
+    return Pose{Eigen::Matrix3d::Identity(), {0.12 * k, 0, 0.1 * k}};
+  });
   EXPECT_FALSE(estimate.known);
 }
 } // namespace

@@ -68,7 +68,8 @@ TEST(Verdict, TellsHowWellAFieldOfViewWasMeasured)
   EXPECT_THAT(textOf(summary), HasSubstr("degrees, calibrated"));
   summary.field_of_view_sigma_deg = 2.14;
   EXPECT_THAT(textOf(summary), testing::AllOf(HasSubstr("degrees, measured +- 2.1"), testing::Not(HasSubstr("guess"))));
-  EXPECT_NEAR(nlohmann::json::parse(toJson(summary)).at("camera").at("field_of_view_sigma_deg").get<double>(), 2.14, 1e-12);
+  EXPECT_NEAR(nlohmann::json::parse(toJson(summary)).at("camera").at("field_of_view_sigma_deg").get<double>(), 2.14,
+              1e-12);
 }
 
 TEST(Verdict, ACameraThatOnlyRotatedIsNotTrustedAndHasNoLengths)
