@@ -27,6 +27,18 @@ double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &c
   const Vector3d error = logSo3(orthonormalized(aRb.transpose() * aRb_other));
   return error.dot(covariance.ldlt().solve(error));
 }
+/// \p frame with what is believed of it: itself, or \p room.
+const Frame &only(const Frame &frame, bool gyro, bool odometry, Frame &room)
+{
+  if (gyro && odometry)
+    return frame;
+  room = frame;
+  if (!gyro)
+    room.gyro.clear();
+  if (!odometry)
+    room.wMb_odometry.reset();
+  return room;
+}
 } // namespace
 
 const char *toString(Sensor sensor)
@@ -54,24 +66,14 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
   checkTilt(frame);
 }
 
-Frame SensorMonitor::withoutLiars(const Frame &frame) const
+const Frame &SensorMonitor::withoutLiars(const Frame &frame, Frame &room) const
 {
-  Frame result = frame;
-  if (!trusts(Sensor::gyro))
-    result.gyro.clear();
-  if (!trusts(Sensor::odometry))
-    result.wMb_odometry.reset();
-  return result;
+  return only(frame, trusts(Sensor::gyro), trusts(Sensor::odometry), room);
 }
 
-Frame SensorMonitor::trusted(const Frame &frame) const
+const Frame &SensorMonitor::trusted(const Frame &frame, Frame &room) const
 {
-  Frame result = frame;
-  if (!trustsNow(Sensor::gyro))
-    result.gyro.clear();
-  if (!trustsNow(Sensor::odometry))
-    result.wMb_odometry.reset();
-  return result;
+  return only(frame, trustsNow(Sensor::gyro), trustsNow(Sensor::odometry), room);
 }
 
 void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts)

@@ -72,9 +72,9 @@ public:
   /// Whether what a sensor says of the motion to the newest frame may be used.
   bool trustsNow(Sensor sensor) const { return trusts(sensor) && !m_wrong_now[static_cast<int>(sensor)]; }
   /// \p frame without the sensors whose verdict lasts: for a frame that is yet to be processed.
-  Frame withoutLiars(const Frame &frame) const;
+  const Frame &withoutLiars(const Frame &frame, Frame &room) const;
   /// The frame processed last, without what is not trusted in it.
-  Frame trusted(const Frame &frame) const;
+  const Frame &trusted(const Frame &frame, Frame &room) const;
 
 private:
   struct Comparison ///< of the rotations over one interval

@@ -60,14 +60,15 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   std::vector<RelativeMotion> seen;
   if (m_odometry_alone)
     return seen;
+  Frame room;
   if (m_use_points)
-    seen = m_points.process(m_monitor.withoutLiars(frame));
+    seen = m_points.process(m_monitor.withoutLiars(frame, room));
   m_monitor.process(frame, seen);
   if (!m_monitor.trustsNow(Sensor::gyro))
     seen = pointsAlone(std::move(seen));
   else if (m_monitor.trustsNow(Sensor::images))
     m_points.learn(seen);
-  const Frame trusted = m_monitor.trusted(frame);
+  const Frame &trusted = m_monitor.trusted(frame, room);
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
   m_last_ns = frame.stamp_ns;
@@ -79,7 +80,8 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   Motion motion;
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
   const std::vector<RelativeMotion> seen = observe(frame);
-  const Frame trusted = m_monitor.trusted(frame);
+  Frame room;
+  const Frame &trusted = m_monitor.trusted(frame, room);
   motion.step = m_model.step(trusted, wMa, bias, velocity, m_inertial_step);
   motion.is_rotation_seen = motion.step.is_step_measured || !trusted.gyro.empty();
   if (m_monitor.trustsNow(Sensor::images))

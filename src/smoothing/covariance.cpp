@@ -44,12 +44,12 @@ Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, Co
     int row = v.dim;
     for (const int s : v.separator) {
       Rows b(path_rows[position[s]].data());
-      for (int c = 0; c < v.dim; ++c) {
-        const double *column = v.columns.data() + c * rows + row;
-        for (int i = 0; i < variables[s].dim; ++i)
-          b.col(i) -= column[i] * y.col(c);
+      for (int i = 0; i < variables[s].dim; ++i, ++row) {
+        Eigen::Matrix<double, Columns, 1> left = b.col(i);
+        for (int c = 0; c < v.dim; ++c)
+          left -= v.columns[static_cast<std::size_t>(c * rows + row)] * y.col(c);
+        b.col(i) = left;
       }
-      row += variables[s].dim;
     }
   }
   for (const int v : path)

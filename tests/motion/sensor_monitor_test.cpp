@@ -174,7 +174,8 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
       eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 1)); });
     monitor.process(frame, flight.seen(i));
     EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30) << i;
-    EXPECT_EQ(monitor.trusted(frame).gyro.empty(), i == 0 || i == 30) << i;
+    Frame room;
+    EXPECT_EQ(monitor.trusted(frame, room).gyro.empty(), i == 0 || i == 30) << i;
   }
   EXPECT_TRUE(monitor.verdicts().empty());
   EXPECT_TRUE(monitor.trusts(Sensor::gyro));
@@ -208,7 +209,8 @@ TEST(SensorMonitor, ATrustedFrameHasNothingOfALiar)
 {
   const SensorMonitor monitor = fly(faults()[1].damage);
   Frame frame = MadeFlight().frame(5);
-  EXPECT_TRUE(monitor.trusted(frame).gyro.empty());
-  EXPECT_TRUE(monitor.trusted(frame).wMb_odometry);
+  Frame room;
+  EXPECT_TRUE(monitor.trusted(frame, room).gyro.empty());
+  EXPECT_TRUE(monitor.trusted(frame, room).wMb_odometry);
 }
 } // namespace bole
