@@ -60,6 +60,7 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
       compare(frame, motion);
   judgeFrame(frame);
   checkRotations();
+  checkStamps();
   checkReturn(Sensor::gyro);
   checkReturn(Sensor::odometry);
   checkDirection();
@@ -145,6 +146,65 @@ std::optional<Matrix3d> SensorMonitor::gyroBetween(std::int64_t from_ns, std::in
   const std::vector<GyroSample> samples(m_samples.begin(), m_samples.end());
   const GyroRotation turned = integrateGyro(samples, from_ns, to_ns);
   return turned.complete ? std::optional<Matrix3d>(turned.R) : std::nullopt;
+}
+
+/// Mean of the gyro's samples around a time.
+Vector3d SensorMonitor::rateAt(std::int64_t stamp_ns) const
+{
+  constexpr std::int64_t kAround_ns = 20'000'000;
+  Vector3d sum = Vector3d::Zero();
+  int count = 0;
+  for (const GyroSample &sample : m_samples)
+    if (std::abs(sample.stamp_ns - stamp_ns) <= kAround_ns) {
+      sum += sample.rate;
+      ++count;
+    }
+  return count > 0 ? Vector3d(sum / count) : sum;
+}
+
+/// An image taken tau later than its stamp says turns the points' rotation by rate * tau against the gyro's, at both
+/// ends of an interval. Errors tau of each image for itself make the differences larger along the rates alone, by
+/// sigma^2 (rate_a rate_a^T + rate_b rate_b^T), and of opposite signs in two intervals that share an image. What a
+/// bias, a scale or other axes of the gyro leave lies along other directions, or has one sign. It is the gyro that is
+/// left out: it is the only sensor so exact that a wrong time makes it useless.
+void SensorMonitor::checkStamps()
+{
+  constexpr std::size_t kLeast = 10; // comparisons
+  constexpr double kMostEach = 6;    // of one comparison: more would be a wrong match
+  constexpr double kSigmas_s[] = {0.004, 0.008, 0.016, 0.032};
+  if (m_comparisons.size() < kLeast)
+    return;
+  double best = m_options.limit_stamps, best_sigma_s = 0;
+  for (const double sigma_s : kSigmas_s) {
+    double ratio = 0, left = 0;
+    int count = 0;
+    for (const Comparison &c : m_comparisons) {
+      if (!c.gyro)
+        continue;
+      const Matrix3d scattered =
+          c.error_covariance + sigma_s * sigma_s * (c.rate_a * c.rate_a.transpose() + c.rate_b * c.rate_b.transpose());
+      const double misfit = c.error.dot(scattered.ldlt().solve(c.error));
+      ratio += std::min(kMostEach, 0.5 * (c.gyro_points - misfit -
+                                          std::log(scattered.determinant() / c.error_covariance.determinant())));
+      left += misfit;
+      ++count;
+    }
+    constexpr double kExplained = 3; // mean squared difference of a component that may be left
+    if (count >= static_cast<int>(kLeast) && ratio > best && left < kExplained * 3 * count) {
+      best = ratio;
+      best_sigma_s = sigma_s;
+    }
+  }
+  if (best_sigma_s == 0)
+    return;
+  double together = 0; // of the errors of two intervals that share an image, along its rate
+  for (const Comparison &c : m_comparisons)
+    for (const Comparison &next : m_comparisons)
+      if (c.gyro && next.gyro && next.a_ns == c.b_ns)
+        together += c.error.dot(c.rate_b) * next.error.dot(next.rate_a);
+  if (together < 0)
+    raise(Sensor::gyro, "stamps", inSeconds(m_comparisons.front().a_ns),
+          fmt::format("gyro: the stamps of the images scatter against it, by {:.0f} ms or more", 1e3 * best_sigma_s));
 }
 
 /// A gyro that repeats its value or says nothing more.
@@ -274,8 +334,13 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
                            std::pow(m_options.odometry_relative, 2);
     }
   }
-  if (now.gyro)
-    now.gyro_points = squared(*now.gyro, *now.points, now.points_covariance + bias2 * one);
+  if (now.gyro) {
+    now.error_covariance = now.points_covariance + bias2 * one;
+    now.error = logSo3(orthonormalized(now.gyro->transpose() * *now.points));
+    now.gyro_points = now.error.dot(now.error_covariance.ldlt().solve(now.error));
+    now.rate_a = now.gyro->transpose() * rateAt(now.a_ns);
+    now.rate_b = rateAt(now.b_ns);
+  }
   if (now.odometry)
     now.odometry_points = squared(*now.odometry, *now.points, now.points_covariance + turn2 * one);
   if (now.gyro && now.odometry)

@@ -7,7 +7,8 @@
 /// squared difference over its variance; the sensor that stands in both failing pairs is the one that lies. Further
 /// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, leans against the accelerometer
 /// or flies askew to the points' direction; a gyro that repeats its value or ends. A pair fails when at least
-/// `of_window` of the last `window` comparisons exceed a limit, so that one false match raises no alarm.
+/// `of_window` of the last `window` comparisons exceed a limit, so that one false match raises no alarm. Stamps of the
+/// images that are off by an error of their own show otherwise: see checkStamps().
 ///
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
 /// taken, and nothing wrong enters the map before the alarm. A sensor that was silent or repeated itself is trusted
@@ -55,6 +56,7 @@ struct SensorMonitorOptions
   double direction_limit = 0.1;        ///< of a constant rotation between odometry and camera [rad]
   double silence_s = 0.5;              ///< without a sample from a sensor that had some
   double stuck_s = 0.5;                ///< with one value
+  double limit_stamps = 15; ///< of the log-likelihood ratio of stamps that scatter; 42 clean flights stay below 2
 };
 
 class SensorMonitor
@@ -85,6 +87,10 @@ private:
     Eigen::Vector3d askew = Eigen::Vector3d::Zero(); ///< rotation from the odometry's direction to the points' [rad]
     double askew_variance = 0;                       ///< 0: no direction
     double gyro_points = 0, gyro_odometry = 0, odometry_points = 0; ///< squared differences over their variances
+    Eigen::Vector3d error = Eigen::Vector3d::Zero();                ///< rotation from the gyro's to the points' [rad]
+    Eigen::Matrix3d error_covariance = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d rate_a = Eigen::Vector3d::Zero(),
+                    rate_b = Eigen::Vector3d::Zero(); ///< at both ends, as seen from b [rad/s]
   };
   struct Step ///< of the odometry from frame to frame
   {
@@ -105,10 +111,12 @@ private:
   void judgeFrame(const Frame &frame);
   void checkRotations();
   void checkReturn(Sensor sensor);
+  void checkStamps();
   void checkDirection();
   void checkTilt(const Frame &frame);
   void nameGyro();
   std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
+  Eigen::Vector3d rateAt(std::int64_t stamp_ns) const;
   std::optional<Eigen::Matrix3d> gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const;
   enum class Lasts
   {

@@ -148,6 +148,45 @@ TEST(SensorMonitor, ASensorThatAgreesAgainAfterASilenceIsTrustedAgain)
   }
 }
 
+/// Eight seconds in which each image was taken at another time than its stamp says, by normal errors and by a constant.
+SensorMonitor flyByWrongStamps(double sigma_s, double late_s)
+{
+  MadeFlight flight;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, sigma_s);
+  std::vector<std::int64_t> stamps;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 80; ++i) {
+    Frame frame = flight.frame(i);
+    std::vector<RelativeMotion> seen = flight.seen(i);
+    stamps.push_back(frame.stamp_ns + MadeFlight::nanoseconds(late_s + std::clamp(normal(random), -0.04, 0.04)));
+    frame.stamp_ns = stamps.back();
+    for (RelativeMotion &motion : seen) {
+      motion.a_ns = stamps[i - 3];
+      motion.b_ns = stamps[i];
+    }
+    monitor.process(frame, seen);
+  }
+  return monitor;
+}
+
+TEST(SensorMonitor, StampsThatScatterAreNamedAndLeaveTheGyroOut)
+{
+  const SensorMonitor monitor = flyByWrongStamps(0.015, 0);
+  ASSERT_FALSE(monitor.verdicts().empty());
+  EXPECT_EQ(monitor.verdicts().front().kind, "stamps") << monitor.verdicts().front().text;
+  EXPECT_LT(monitor.verdicts().front().since_s, 2);
+  EXPECT_FALSE(monitor.trusts(Sensor::gyro));
+  EXPECT_TRUE(monitor.trusts(Sensor::odometry) && monitor.trusts(Sensor::images));
+}
+
+TEST(SensorMonitor, StampsThatHoldOrAreLateAllAlikeDoNotScatter)
+{
+  for (const double late_s : {0.0, 0.03})
+    for (const SensorVerdict &verdict : flyByWrongStamps(0.0003, late_s).verdicts())
+      EXPECT_NE(verdict.kind, "stamps") << late_s << ": " << verdict.text;
+}
+
 TEST(SensorMonitor, AHeldPoseIsNoStepFromItsFirstFrameOn)
 {
   MadeFlight flight;
