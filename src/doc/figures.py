@@ -4,12 +4,16 @@
 
   bole track data/park-forward -o run && src/doc/figures.py system run data/park-forward data/figures/system.png
   src/doc/figures.py gif run/overlay.mp4 data/figures/park-forward.gif
-  src/doc/figures.py frames data/figures/frames.svg"""
+  src/doc/figures.py frames data/figures/frames.svg
+  src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse
 import csv
 import math
 import os
 import re
+import resource
+import subprocess
+import tempfile
 
 import cv2
 import matplotlib
@@ -207,6 +211,66 @@ def frames(arguments):
     figure.savefig(arguments.out)
 
 
+def processor_ms(command):
+    """Of all threads of a command."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return 1e3 * (after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+
+
+def things_that_grow():
+    """Of each curve its label and its points: name, place on the axis (None: trunks in view), scene, settings, frames
+    from and to which is counted."""
+    sizes = [(320, 240), (640, 480), (960, 540), (1280, 720), (1920, 1080)]
+    camera = "camera: {{width: {0}, height: {1}, fx: {2}, fy: {2}, cx: {3}, cy: {4}}}\n".format
+    yield "megapixels", [(f"{w} x {h}", 1e-6 * w * h, camera(w, h, 0.625 * w, (w - 1) / 2, (h - 1) / 2), [], 20, 50)
+                         for w, h in sizes]
+    yield "trunks in view", [(f"{density:g} a m²", None, f"forest: {{density: {density}}}\n", [], 20, 100)
+                             for density in (0.01, 0.03, 0.06, 0.12, 0.2)]
+    yield "frames of the window", [("", n, "", [f"detection.window={n}"], 40, 110) for n in (6, 12, 18, 36)]
+    yield "minutes of flight", [("", to / 600, "flight: {path: loop}\n", [], to - 150, to)
+                                 for to in (200, 400, 800, 1200)]
+
+
+def trunks_in_view(run, first):
+    views = [int(row["frame"]) for row in rows_of(os.path.join(run, "views.csv"))]
+    late = [frame for frame in views if frame >= first]
+    return len(late) / max(1, len(set(late)))
+
+
+def growth(arguments):
+    """What a frame costs against the resolution, the trunks in view, the window and the length of the flight: processor
+    time of all threads, reading the frame included, the final pass not; the least of some runs."""
+    figure, axes = plt.subplots(1, 4, figsize=(13, 3.2))
+    with tempfile.TemporaryDirectory() as folder:
+        for axis, (label, points) in zip(axes, things_that_grow()):
+            places, costs, before = [], [], None
+            for name, place, scene, settings, first, last in points:
+                flight, run, file = (os.path.join(folder, part) for part in ("flight", "run", "scene.yaml"))
+                if scene != before:
+                    with open(file, "w", encoding="utf-8") as text:
+                        text.write(scene)
+                    subprocess.run([arguments.bole, "simulate", *(["--scene", file] if scene else []), "--seed", "301",
+                                    "-o", flight, "--frames", str(max(p[5] for p in points)), "--overwrite", "-q"],
+                                   check=True, stdout=subprocess.DEVNULL)
+                before = scene
+                track = [arguments.bole, "track", flight, "-o", run, "--no-video", "--online", "-q", "--set",
+                         "stages.calibration=false", *(a for s in settings for a in ("--set", s)), "--frames"]
+                costs.append(min(-processor_ms([*track, str(first)]) + processor_ms([*track, str(last)])
+                                 for _ in range(arguments.times)) / (last - first))
+                places.append(trunks_in_view(run, first) if place is None else place)
+                axis.annotate(name, (places[-1], costs[-1]), (3, -10), textcoords="offset points", fontsize=7,
+                              color=GREY)
+                print(f"{label} {places[-1]:.3g} ({name}): {costs[-1]:.1f} ms", flush=True)
+            axis.plot(places, costs, "o-", color=BLUE)
+            axis.set_xlabel(label), axis.set_xlim(0, 1.3 * max(places)), axis.set_ylim(0, 1.1 * max(costs))
+            axis.spines[["top", "right"]].set_visible(False)
+    axes[0].set_ylabel("processor time of a frame [ms]")
+    figure.tight_layout()
+    figure.savefig(arguments.out)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_subparsers(required=True)
@@ -222,6 +286,10 @@ def main():
     part = what.add_parser("frames", help="the coordinate frames")
     part.add_argument("out")
     part.set_defaults(draw=frames)
+    part = what.add_parser("growth", help="what a frame costs against resolution, trunks, window and length")
+    part.add_argument("bole"), part.add_argument("out")
+    part.add_argument("--times", type=int, default=3, help="runs of which the least counts")
+    part.set_defaults(draw=growth)
     arguments = parser.parse_args()
     arguments.draw(arguments)
 
