@@ -150,7 +150,9 @@ Verdict judge(const RunSummary &summary)
     judgeReference(verdict, summary);
   for (const SensorVerdict &sensor : summary.sensors) {
     verdict.is_trusted = false;
-    verdict.doubts.push_back(fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));
+    verdict.doubts.push_back(sensor.sensor == "images"
+                                 ? sensor.text + "."
+                                 : fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));
   }
   constexpr double kFew = 0.8;
   const double good = static_cast<double>(goodFrames(summary));

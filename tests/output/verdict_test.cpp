@@ -51,6 +51,16 @@ TEST(Verdict, TellsWhichFramesWereNotOkAndWhy)
   EXPECT_TRUE(judge(summary).is_trusted);
 }
 
+TEST(Verdict, OffersToLeaveOutASensorButNotTheImages)
+{
+  RunSummary summary = goodRun();
+  summary.sensors = {{"gyro", "bias", 0, "gyro: bias 0.05 rad/s"}, {"images", "rotation", 5, "images: contradict"}};
+  EXPECT_FALSE(judge(summary).is_trusted);
+  EXPECT_THAT(textOf(summary), HasSubstr("gyro: bias 0.05 rad/s: --without gyro would map without it."));
+  EXPECT_THAT(textOf(summary), HasSubstr("images: contradict."));
+  EXPECT_THAT(textOf(summary), testing::Not(HasSubstr("--without images")));
+}
+
 TEST(Verdict, NamesTheOptionThatWouldTellWhatIsGuessed)
 {
   RunSummary summary = goodRun();
