@@ -121,19 +121,21 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
   return partners;
 }
 
-/// One view against its partners. False where nothing could be compared.
-bool compare(const LevelView &view, const Columns &columns, const std::vector<std::size_t> &partners,
-             const std::vector<LevelView> &views, Curves &curves)
+double across(const Vector2d &direction, const Vector2d &a) { return direction.x() * a.y() - direction.y() * a.x(); }
+
+/// One view against its partners. False where nothing could be compared. \p lean: of what is compared, as Trunk::lean.
+bool compare(const LevelView &view, const Columns &columns, const Vector2d &lean,
+             const std::vector<std::size_t> &partners, const std::vector<LevelView> &views, Curves &curves)
 {
   constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008; // [full scale] noise of the camera
   Curves here;
   for (std::size_t i = 0; i < columns.angle.size(); ++i) {
     const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
-    const LevelColumn column = view.image->at(s / c);
+    const Vector2d direction = c * view.forward + s * view.left;
+    const LevelColumn column = view.image->at(s / c, across(direction, lean));
     if (column.bands == 0)
       continue;
-    const Vector2d direction = c * view.forward + s * view.left;
     const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
     for (const std::size_t partner : partners) {
       const LevelView &other = views[partner];
@@ -144,7 +146,8 @@ bool compare(const LevelView &view, const Columns &columns, const std::vector<st
         const double ahead = at.dot(other.forward);
         if (ahead < 0.1)
           continue;
-        const double d = difference(column, other.image->at(at.dot(other.left) / ahead), by_value, 2 * by_value);
+        const LevelColumn there = other.image->at(at.dot(other.left) / ahead, across(at, lean) / at.norm());
+        const double d = difference(column, there, by_value, 2 * by_value);
         if (d >= 0)
           here.add(kind, k, d);
       }
@@ -193,7 +196,7 @@ std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vect
     const Seen &seen = all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0];
     const std::vector<std::size_t> partners = partnersOf(seen, all, views);
     if (!partners.empty() && compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step),
-                                     partners, views, curves))
+                                     trunk.lean, partners, views, curves))
       ++evidence.views;
   }
   if (evidence.views < kLeastViews)

@@ -333,6 +333,9 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         auto detection = verify(plane, columns, pair, at, camera.fx, options);
         if (!detection)
           continue;
+        const Vector2d w = detection->trunk.xy - plane.back().position;
+        detection->trunk.lean = views.back().profile->lean * Vector2d(-w.y(), w.x()).normalized();
+        detection->trunk.xy -= views.back().wMc.t.z() * detection->trunk.lean;
         if (p_background)
           detection->foreground = foregroundBetween(
               *p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk), options.profile.range);

@@ -46,7 +46,7 @@ struct DetectorView
 /// A trunk found.
 struct Detection
 {
-  Trunk trunk;                                              ///< upright
+  Trunk trunk; ///< leans across the line of sight as the lines of the profile do
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< of (x, y, log r), given the poses
   double range = 0;                                         ///< from the current camera [m]
   double agreement = 0;                                     ///< 0 to 1

@@ -79,20 +79,21 @@ double contrastOf(const std::vector<LevelColumn> &columns)
 }
 } // namespace
 
-LevelColumn LevelImage::at(double q) const
+LevelColumn LevelImage::at(double q, double lean) const
 {
   LevelColumn column;
-  const double x = (q - q_first) / step;
-  if (!(x >= 0) || x >= static_cast<double>(columns.size() - 1))
-    return column;
-  const auto i = static_cast<std::size_t>(x);
-  const LevelColumn &l = columns[i], &r = columns[i + 1];
-  const auto a = static_cast<float>(x - static_cast<double>(i));
+  const double by_elevation = lean * (1 + q * q);
   for (std::size_t b = 0; b < kLevelBands; ++b) {
+    const double x = (q + by_elevation * elevation[b] - q_first) / step;
+    if (!(x >= 0) || x >= static_cast<double>(columns.size() - 1))
+      continue;
+    const auto i = static_cast<std::size_t>(x);
+    const LevelColumn &l = columns[i], &r = columns[i + 1];
+    const auto a = static_cast<float>(x - static_cast<double>(i));
     column.value[b] = l.value[b] + a * (r.value[b] - l.value[b]);
     column.slope[b] = l.slope[b] + a * (r.slope[b] - l.slope[b]);
+    column.bands |= l.bands & r.bands & 1U << b;
   }
-  column.bands = l.bands & r.bands;
   return column;
 }
 
@@ -111,6 +112,8 @@ LevelImage computeLevelImage(const vpImage<unsigned char> &image, const PinholeC
   level.q_first = -half * level.step;
   level.columns.resize(static_cast<std::size_t>(2 * half + 1));
   const double band = (range.high - range.low) / kLevelBands;
+  for (int b = 0; b < kLevelBands; ++b)
+    level.elevation[static_cast<std::size_t>(b)] = range.low + (b + 0.5) * band;
   const int samples = std::clamp(static_cast<int>(band * camera.fy / 3), kLeast, kMost);
   for (int i = -half; i <= half; ++i) {
     LevelColumn &column = level.columns[static_cast<std::size_t>(i + half)];

@@ -28,12 +28,15 @@ struct LevelImage
   Eigen::Matrix3d cRl = Eigen::Matrix3d::Identity(); ///< level frame (forward, left, up) to camera
   double q_first = 0; ///< tan of the bearing from the heading of column 0; columns run to the left
   double step = 0.005;
-  double contrast = 0; ///< standard deviation of the brightness over the columns [full scale]
+  double contrast = 0;                         ///< standard deviation of the brightness over the columns [full scale]
+  std::array<double, kLevelBands> elevation{}; ///< tangent of the middle of each band
   std::vector<LevelColumn> columns;
 
   double qLast() const { return q_first + step * static_cast<double>(columns.size() - 1); }
-  /// Linear between two columns; no band where q is outside.
-  LevelColumn at(double q) const;
+  /// What stands at \p q at the height of the camera and leans by \p lean across the line of sight, positive to the
+  /// left [tan]: at any range it shifts each band by its elevation. Linear between two columns; without the bands that
+  /// are outside.
+  LevelColumn at(double q, double lean = 0) const;
 };
 
 /// Brightness of \p image seen by \p camera with the rotation \p wRc, in the elevations \p range. Columns are a pixel

@@ -74,6 +74,7 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
   const Vector3d forward = wRc.col(2);
   const double heading = std::atan2(forward.y(), forward.x());
   profile.cRl = wRc.transpose() * Eigen::AngleAxisd(heading, Vector3d::UnitZ()).toRotationMatrix();
+  profile.lean = options.lean;
   profile.step = 0.5 / camera.fx;
   const double q_max = 1.15 * std::max(camera.cx, camera.width - camera.cx) / camera.fx;
   const int half = static_cast<int>(q_max / profile.step);
@@ -81,9 +82,11 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
   profile.mean.assign(static_cast<std::size_t>(2 * half + 1), 0.f);
 
   for (int i = -half; i <= half; ++i) {
-    const double q = i * profile.step, horizontal = std::hypot(1, q);
-    const Vector3d low = profile.cRl * Vector3d(1, q, options.range.low * horizontal);
-    const Vector3d high = profile.cRl * Vector3d(1, q, options.range.high * horizontal);
+    const double q = i * profile.step, horizontal = std::hypot(1, q), by_elevation = options.lean * (1 + q * q);
+    const auto at = [&](double elevation) -> Vector3d {
+      return profile.cRl * Vector3d(1, q + by_elevation * elevation, elevation * horizontal);
+    };
+    const Vector3d low = at(options.range.low), high = at(options.range.high);
     const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
     const double rows_full =
         std::min(camera.fy * (options.range.high - options.range.low) * horizontal, double(camera.height));

@@ -26,6 +26,7 @@ struct LevelProfile
   Eigen::Matrix3d cRl = Eigen::Matrix3d::Identity(); ///< level frame (forward, left, up) to camera
   double step = 0.0025;                              ///< in q between samples
   double q_first = 0;                                ///< q of sample 0; samples run to the left
+  double lean = 0;                                   ///< of the lines: q is where they cross the camera's height
   std::vector<float> mean;                           ///< signed mean gradient; 0 where the line is not in the image
   std::vector<float> rising;                         ///< largest mean within a pixel: the best dark-bright border, >= 0
   std::vector<float> falling;      ///< smallest mean within a pixel: the best bright-dark border, <= 0
@@ -40,6 +41,7 @@ struct LevelProfile
 struct ProfileOptions
 {
   ElevationRange range;        ///< of the lines, tan of elevation
+  double lean = 0;             ///< of the lines across the line of sight, positive to the left [tan], -0.5 to 0.5
   double contrast_min = 0.008; ///< weaker maxima are no peaks [full scale/px], 0.001 to 0.5
 };
 

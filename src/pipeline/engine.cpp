@@ -210,10 +210,17 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
         adopt(*adoption);
   if (!has_ranges)
     return;
+  adoptFrom(m_window, m_map, view, p_background, m_units);
+}
+
+/// What \p window shows between the trunks of \p known and the map does not hold yet: the best.
+void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
+                       const vpImage<float> *p_background, const StageOptions &options)
+{
   int adopted = 0;
-  for (const Detection &detection : detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units))
-    if (!m_map.recognise(detection.trunk) && adopted < flow.adopt_most) { // the best come first
-      adopt(followThroughWindow(detection, m_window, m_smoother, m_map, view, m_units));
+  for (const Detection &detection : detectInWindow(window, m_smoother, known, view, p_background, options))
+    if (!m_map.recognise(detection.trunk) && adopted < options.flow.adopt_most) { // the best come first
+      adopt(followThroughWindow(detection, window, m_smoother, m_map, view, options));
       ++adopted;
     }
 }

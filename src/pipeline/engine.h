@@ -37,6 +37,7 @@ public:
 private:
   std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
   std::vector<LevelView> levelViews() const;
+  Viewpoint viewpointOf(const KeptFrame &frame) const;
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
 
   /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
@@ -52,6 +53,8 @@ private:
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
   void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
+  void adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
+                 const vpImage<float> *p_background, const StageOptions &options);
   void adopt(Adoption adoption);
   std::vector<TriangulatedRay> points() const;
   void reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
@@ -61,6 +64,7 @@ private:
   double farthestJudged() const;
   std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const;
   std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views) const;
+  void detectLeaning();
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);

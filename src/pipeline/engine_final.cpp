@@ -30,6 +30,11 @@ std::vector<LevelView> Engine::levelViews() const
   return views;
 }
 
+Viewpoint Engine::viewpointOf(const KeptFrame &frame) const
+{
+  return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
+}
+
 std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views) const
 {
   std::vector<Judged> all;
@@ -64,7 +69,7 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
       followers.emplace_back(one.trunk.trunk, one.trunk.covariance);
     for (const KeptFrame &frame : m_album.frames()) {
       const Pose wMb = m_smoother.pose(frame.pose);
-      const Viewpoint at{m_camera, wMb * m_bMc, true, m_motion->groundZ(), frame.time_s};
+      const Viewpoint at = viewpointOf(frame);
       std::optional<Gradient> gradient; // made where somebody asks for it
       for (std::size_t i = 0; i < followers.size(); ++i) {
         const Eigen::Vector3d to = found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t;
@@ -83,8 +88,8 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
   return found;
 }
 
-/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds keeps its views unless
-/// the new ones are better.
+/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds, and has well placed,
+/// keeps its views unless the new ones are better.
 std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely,
                                                const std::vector<LevelView> &views) const
 {
@@ -113,7 +118,8 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   std::vector<Reading> readings = read(hypotheses);
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
-    const bool is_held = !m_map.trunk(likely[i].id).removed && reading.is_seen;
+    const MapTrunk &known = m_map.trunk(likely[i].id);
+    const bool is_held = !known.removed && m_map.isPlaced(known.covariance) && reading.is_seen;
     if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
       reading.judged = likely[i];
       reading.views.reset();
@@ -137,10 +143,33 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   return readings;
 }
 
+/// Trunks that lean are too smeared in upright columns for the detector. In flight there is no time for more, so what
+/// stands between the likely ones is looked for now, along lines that lean to either side.
+void Engine::detectLeaning()
+{
+  constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
+  constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
+  constexpr std::size_t kEvery = 3; // frames: a window holds many more
+  const std::vector<KeptFrame> &frames = m_album.frames();
+  const TrunkMap likely = m_map.withTrunks(idsOf(judgeAll(levelViews()), kHides));
+  for (const double lean : {-kLean, kLean}) {
+    StageOptions options = m_units;
+    options.detection.profile.lean = lean;
+    DetectionWindow window;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const Viewpoint at = viewpointOf(frames[i]);
+      window.push(computeGradient(frames[i].image, m_units.gradient), frames[i].pose, at, m_smoother, options);
+      if (i % kEvery == 0)
+        adoptFrom(window, likely, at, nullptr, options);
+    }
+  }
+}
+
 /// Every hypothesis in the light of all frames.
 void Engine::decideByAllFrames()
 {
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
+  detectLeaning();
   const std::vector<LevelView> views = levelViews();
   const double apart = m_units.map.merge_distance;
   m_judged = judgeAll(views);

@@ -66,6 +66,20 @@ TEST(LevelImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
   }
 }
 
+TEST(LevelImage, ColumnsLeanAsTheTrunkDoes)
+{
+  const DrawnTrunk trunk{4, 0.1, 0.08, 40, 0.12};
+  const Pose wMc = lookingAhead(0, 0);
+  const LevelImage level = computeLevelImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+  const auto at = locate(trunkOf(trunk), LevelView(level, wMc), kFarthest);
+  ASSERT_TRUE(at.has_value());
+  const LevelColumn upright = level.at(std::tan(at->bearing)), leaning = level.at(std::tan(at->bearing), trunk.lean);
+  ASSERT_EQ(leaning.bands, 15u);
+  for (std::size_t b = 0; b < kLevelBands; ++b)
+    EXPECT_NEAR(leaning.value[b], 40 / 255.0, 0.01) << b;
+  EXPECT_GT(upright.value[kLevelBands - 1], 150 / 255.0); // beside it
+}
+
 TEST(LevelImage, ShowsNothingOutsideTheImage)
 {
   const Pose wMc = lookingAhead(0, 0);
@@ -89,6 +103,21 @@ TEST(ColumnEvidence, ATrunkAgreesAtItsOwnRangeOnly)
     EXPECT_GT(evidence->left, -0.2);
     EXPECT_GT(evidence->right, -0.2);
   }
+}
+
+TEST(ColumnEvidence, ALeaningTrunkAgreesWhereItsLeanIsKnown)
+{
+  const DrawnTrunk leaning{3.5, 0.3, 0.1, 40, 0.12};
+  const LevelFlight flight({leaning}, sweep());
+  Trunk upright = trunkOf(leaning); // through the same place at the height of the camera
+  upright.xy += 1.2 * upright.lean;
+  upright.lean.setZero();
+  const auto known = columnEvidence(trunkOf(leaning), flight.views(), kFarthest);
+  const auto unknown = columnEvidence(upright, flight.views(), kFarthest);
+  ASSERT_TRUE(known && unknown);
+  EXPECT_LT(known->own, 0.5);
+  EXPECT_LT(known->own, 0.5 * unknown->own);
+  EXPECT_GT(known->background, unknown->background);
 }
 
 TEST(ColumnEvidence, AHypothesisAtAnotherRangeDisagreesThere)

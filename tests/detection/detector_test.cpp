@@ -44,6 +44,21 @@ TEST(Detector, FindsTrunksWhereTheyStandAndAsThickAsTheyAre)
   }
 }
 
+TEST(Detector, FindsLeaningTrunksByLinesThatLeanAsMuch)
+{
+  const DrawnTrunk left{4, 0.4, 0.15, 40, 0.07}, right{5, -0.8, 0.2, 90, -0.05};
+  for (const DrawnTrunk &trunk : {left, right}) {
+    ProfileOptions options;
+    options.lean = std::copysign(0.06, trunk.lean);
+    const auto found = detect(DrawnFlight({left, right}, sweep(), options));
+    const Detection *detection = nearestTo(found, trunk);
+    ASSERT_NE(detection, nullptr);
+    EXPECT_LT((detection->trunk.axisAt(1.2) - trunkOf(trunk).axisAt(1.2)).norm(), 0.03 * trunk.x);
+    EXPECT_LT((detection->trunk.axisAt(2.5) - trunkOf(trunk).axisAt(2.5)).norm(), 0.03 * trunk.x + 0.02);
+    EXPECT_NEAR(detection->trunk.radius(), trunk.radius, 0.05 * trunk.radius + 0.005);
+  }
+}
+
 TEST(Detector, FindsABrightTrunkAndOneThatIsBrightOnOneSide)
 {
   // the background is 200; something wide and dark far away begins behind the second

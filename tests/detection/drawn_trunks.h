@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Upright trunks drawn as flat areas of grey, near before far, their borders smooth over a pixel.
+/// Trunks drawn as flat areas of grey, near before far, their borders smooth over a pixel.
 
 #include "detection/detector.h"
 #include "geometry/so3.h"
@@ -17,6 +17,7 @@ struct DrawnTrunk
 {
   double x = 0, y = 0, radius = 0.15; ///< [m]
   double grey = 40;
+  double lean = 0; ///< to the left for a camera that looks along x [tan]
 };
 
 inline Trunk trunkOf(const DrawnTrunk &drawn)
@@ -24,6 +25,7 @@ inline Trunk trunkOf(const DrawnTrunk &drawn)
   Trunk trunk;
   trunk.xy = {drawn.x, drawn.y};
   trunk.log_radius = std::log(drawn.radius);
+  trunk.lean.y() = drawn.lean;
   return trunk;
 }
 

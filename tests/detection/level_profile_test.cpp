@@ -52,6 +52,27 @@ TEST(LevelProfile, PeaksStandAtTheBordersWhateverTheAttitude)
   }
 }
 
+TEST(LevelProfile, LinesThatLeanAsTheTrunkDoesSeeItsBordersWhole)
+{
+  const DrawnTrunk trunk{4, 0.5, 0.15, 40, 0.06};
+  const Pose wMc = lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2);
+  const vpImage<float> gradient = computeGradient(draw({trunk}, wMc, kCamera)).signed_x;
+  DrawnTrunk at_camera = trunk;
+  at_camera.y += 1.2 * trunk.lean;
+  at_camera.lean = 0;
+  ProfileOptions leaning;
+  leaning.lean = trunk.lean;
+  const LevelProfile upright_lines = computeLevelProfile(gradient, kCamera, wMc.R, {});
+  const LevelProfile leaning_lines = computeLevelProfile(gradient, kCamera, wMc.R, leaning);
+  for (const bool is_left : {true, false}) {
+    const double q = borderColumn(at_camera, wMc, is_left);
+    double smeared = 0, whole = 0;
+    distance_px(upright_lines, q, &smeared);
+    EXPECT_LT(distance_px(leaning_lines, q, &whole), 0.5);
+    EXPECT_GT(std::abs(whole), 1.5 * std::abs(smeared));
+  }
+}
+
 TEST(LevelProfile, ABrightTrunkHasTheOtherPolarity)
 {
   const DrawnTrunk trunk{4, 0.3, 0.2, 250};
