@@ -35,7 +35,7 @@ public:
   const std::vector<Judged> &judged() const { return m_judged; }
 
 private:
-  std::vector<Judged> judgeAll(const std::vector<LevelView> &views) const;
+  std::vector<Judged> judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before = {}) const;
   std::vector<LevelView> levelViews() const;
   Viewpoint viewpointOf(const KeptFrame &frame) const;
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
@@ -64,7 +64,7 @@ private:
   double farthestJudged() const;
   std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const;
   std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views) const;
-  void detectLeaning();
+  void detectLeaning(const std::vector<Judged> &judged);
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);

@@ -20,6 +20,11 @@ std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
       ids.push_back(one.id);
   return ids;
 }
+
+bool isOf(const Judged &one, const Hypothesis &hypothesis)
+{
+  return one.id == hypothesis.id && one.trunk.minus(hypothesis.trunk).isZero(0) && one.online == hypothesis.online;
+}
 } // namespace
 
 std::vector<LevelView> Engine::levelViews() const
@@ -35,13 +40,19 @@ Viewpoint Engine::viewpointOf(const KeptFrame &frame) const
   return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
 }
 
-std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views) const
+/// Those that are as they were \p before are not asked again.
+std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before) const
 {
   std::vector<Judged> all;
-  for (const MapTrunk &trunk : m_map.trunks())
-    if (trunk.observations >= kLeastViews && trunk.fate != TrunkFate::unranged)
-      if (const auto one = judge({trunk.id, trunk.trunk, m_map.evidence(trunk)}, views, farthestJudged()))
-        all.push_back(*one);
+  for (const MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.observations < kLeastViews || trunk.fate == TrunkFate::unranged)
+      continue;
+    const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
+    const auto known =
+        std::find_if(before.begin(), before.end(), [&](const Judged &one) { return isOf(one, hypothesis); });
+    if (const auto one = known != before.end() ? *known : judge(hypothesis, views, farthestJudged()))
+      all.push_back(*one);
+  }
   return all;
 }
 
@@ -145,13 +156,13 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
 
 /// Trunks that lean are too smeared in upright columns for the detector. In flight there is no time for more, so what
 /// stands between the likely ones is looked for now, along lines that lean to either side.
-void Engine::detectLeaning()
+void Engine::detectLeaning(const std::vector<Judged> &judged)
 {
   constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
   constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
   constexpr std::size_t kEvery = 3; // frames: a window holds many more
   const std::vector<KeptFrame> &frames = m_album.frames();
-  const TrunkMap likely = m_map.withTrunks(idsOf(judgeAll(levelViews()), kHides));
+  const TrunkMap likely = m_map.withTrunks(idsOf(judged, kHides));
   for (const double lean : {-kLean, kLean}) {
     StageOptions options = m_units;
     options.detection.profile.lean = lean;
@@ -169,10 +180,11 @@ void Engine::detectLeaning()
 void Engine::decideByAllFrames()
 {
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
-  detectLeaning();
   const std::vector<LevelView> views = levelViews();
+  const std::vector<Judged> before = judgeAll(views);
+  detectLeaning(before);
   const double apart = m_units.map.merge_distance;
-  m_judged = judgeAll(views);
+  m_judged = judgeAll(views, before);
   std::vector<Reading> readings = readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views);
   std::vector<Judged> again;
   for (const Reading &reading : readings) {
