@@ -65,9 +65,9 @@ TrackOutput::~TrackOutput() { m_is_cancelled = true; }
 
 vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms)
 {
-  ++m_summary.frames[frame.status];
-  if (frame.status != FrameStatus::ok && !frame.message.empty())
-    m_summary.reasons.emplace(frame.status, frame.message);
+  ++m_summary.frames[report.frame_status];
+  if (report.frame_status != FrameStatus::ok && !report.reason.empty())
+    m_summary.reasons.emplace(report.frame_status, report.reason);
   m_summary.sensors = m_sensors_before;
   m_summary.sensors.insert(m_summary.sensors.end(), report.verdicts.begin(), report.verdicts.end());
   m_first_ns = m_is_begun ? m_first_ns : frame.stamp_ns;
@@ -104,8 +104,8 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
   constexpr double kFar = 15; // points beyond are no evidence of a trunk of the map [m]
   const Eigen::Matrix3d wRb = report.wMb.R;
   const Eigen::Matrix3d place_covariance = wRb * report.pose_covariance.topLeftCorner<3, 3>() * wRb.transpose();
-  m_trace.frames.push_back(
-      {frame.index, frame.stamp_ns, frame.status, report.wMb.t, place_covariance.topLeftCorner<2, 2>(), frame.message});
+  m_trace.frames.push_back({frame.index, frame.stamp_ns, report.frame_status, report.wMb.t,
+                            place_covariance.topLeftCorner<2, 2>(), report.reason});
   for (const Eigen::Vector3d &point : placedPoints(report, kFar))
     m_trace.evidence.add(point);
   for (const TrunkInView &view : report.trunks) {
@@ -146,10 +146,10 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
         {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
     candidates += trunk.is_tracked && trunk.status == TrunkStatus::candidate ? 1 : 0;
   }
-  overlay.is_warning = frame.status != FrameStatus::ok;
+  overlay.is_warning = report.frame_status != FrameStatus::ok;
   overlay.text = fmt::format("{:.1f} s  {} trunk{}, {} candidate{}  {}", 1e-9 * static_cast<double>(frame.stamp_ns),
                              m_in_view, m_in_view == 1 ? "" : "s", candidates, candidates == 1 ? "" : "s",
-                             overlay.is_warning ? toString(frame.status) : "");
+                             overlay.is_warning ? toString(report.frame_status) : "");
   if (report.saliency)
     overlay.foreground = foregroundOf(*report.saliency);
   vpImage<vpRGBa> picture;

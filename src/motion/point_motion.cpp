@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_motion.h"
 
+#include "motion/row_shear.h"
+
 #include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
 
 namespace bole
 {
@@ -14,6 +18,7 @@ PointMotion::PointMotion(const PinholeCamera &camera, const Pose &bMc, const Poi
 void PointMotion::track(const Frame &frame)
 {
   const std::size_t number = m_frames++;
+  m_fault.clear();
   if (m_options.use_gyro) {
     m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
   }
@@ -27,7 +32,7 @@ void PointMotion::track(const Frame &frame)
     }
   }
   m_tracker.track(frame.image, expected);
-  m_seen.push_back({frame.stamp_ns, number, m_options.use_odometry ? frame.wMb_odometry : std::nullopt});
+  m_seen.push_back({frame.stamp_ns, number, frame.wMb_odometry});
   if (m_seen.size() > static_cast<std::size_t>(PointTracker::kHistory)) {
     m_seen.pop_front();
   }
@@ -51,6 +56,9 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
       motions.push_back(relativeTo(back));
     }
   }
+  judgeShear(motions);
+  if (!m_fault.empty())
+    motions.clear();
   return motions;
 }
 
@@ -62,10 +70,11 @@ std::optional<GyroRotation> PointMotion::gyroSince(std::int64_t from_ns, std::in
   return integrateGyro(m_gyro, from_ns, to_ns, m_bias, m_options.gyro);
 }
 
-RelativeMotion PointMotion::relativeTo(int frames_back) const
+/// What gyro and pose filter say of the motion from the frame \p frames_back before to the newest; the same into \p
+/// step.
+RelativePosePrior PointMotion::expect(RelativeMotion &step, int frames_back, bool with_odometry) const
 {
   const Seen &a = *(m_seen.rbegin() + frames_back), &b = m_seen.back();
-  RelativeMotion step;
   step.frames_back = frames_back;
   step.a_ns = a.stamp_ns;
   step.b_ns = b.stamp_ns;
@@ -77,7 +86,7 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
     prior.aRb = m_bMc.R.transpose() * step.gyro->R * m_bMc.R;
     prior.rotation_covariance = m_bMc.R.transpose() * step.gyro->covariance() * m_bMc.R;
   }
-  if (a.wMb && b.wMb) {
+  if (with_odometry && a.wMb && b.wMb) {
     const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
     step.odometry = (wMa.inverse() * wMb).t;
     prior.translation = step.odometry;
@@ -88,12 +97,63 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
   }
+  return prior;
+}
+
+RelativeMotion PointMotion::relativeTo(int frames_back) const
+{
+  RelativeMotion step;
+  const RelativePosePrior prior = expect(step, frames_back, m_options.use_odometry);
   const std::vector<PointMatch> matches = m_tracker.matches(frames_back);
   step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
   if (frames_back == *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end()))
     step.points = prior.aRb || prior.translation ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose)
                                                  : step.estimate;
   return step;
+}
+
+/// Whether the rows of the newest image stand askew to those of the last good one, as by a rolling shutter that is
+/// shaken; it is forgotten then. Without gyro and odometry a flight explains as much.
+void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
+{
+  constexpr double kLean = 0.015;  // of upright trunks [rad]: 3 px over 200 rows
+  constexpr double kSigmas = 6;    // images in order: at most 4.3 in 4000 pairs of them
+  constexpr int kMostRefused = 10; // in a row: then the camera has changed for good
+  if (m_seen.size() < 2)
+    return;
+  RelativeMotion step;
+  const RelativePosePrior prior = expect(step, 1, true);
+  if (!prior.aRb && !prior.translation)
+    return;
+  const auto seen = std::find_if(motions.begin(), motions.end(), [](const auto &m) { return m.frames_back == 1; });
+  const std::vector<PointMatch> matches = m_tracker.matches(1);
+  const RelativePoseEstimate rigid =
+      seen != motions.end() ? seen->estimate : estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
+  const Pose seen_start(rigid.aRb, rigid.direction);
+  const std::optional<Eigen::Vector3d> ahead = prior.translation ? prior.translation : m_ahead;
+  const bool has_start = ahead && ahead->norm() > 0;
+  const Pose start = has_start ? Pose(prior.aRb.value_or(rigid.aRb), *ahead) : seen_start;
+  const auto find = [&](const std::vector<Pose> &starts) {
+    return estimateRowShear(matches, m_camera, prior, starts, m_options.relative_pose);
+  };
+  const auto matters = [&](const RowShear &row) { return std::abs(row.shear) > std::max(kLean, kSigmas * row.sigma); };
+  RowShear found = find({start});
+  if (has_start && matters(found)) // a start far off may end in a motion that explains less without a shear
+    found = find({start, seen_start});
+  const bool is_sheared = matters(found);
+  if (!is_sheared || m_refused == kMostRefused) {
+    m_refused = 0;
+    if (rigid.hasDirection())
+      m_ahead = rigid.direction;
+    return;
+  }
+  ++m_refused;
+  m_fault = fmt::format("sheared: its last row stands {:.0f} px farther {} of its first than in the image before "
+                        "(rolling shutter)",
+                        std::abs(found.shear) * m_camera.height * m_camera.fx / m_camera.fy,
+                        found.shear > 0 ? "right" : "left");
+  m_tracker.forgetLast();
+  m_seen.pop_back();
 }
 
 void PointMotion::learn(const std::vector<RelativeMotion> &motions)

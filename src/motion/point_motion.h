@@ -26,6 +26,7 @@
 #include "motion/relative_pose.h"
 
 #include <deque>
+#include <string>
 
 namespace bole
 {
@@ -65,13 +66,16 @@ public:
   PointMotion(const PinholeCamera &camera, const Pose &bMc, const PointMotionOptions &options = {});
 
   /// One RelativeMotion for each entry of frames_back that the video reaches. Frames that are not
-  /// ok are passed over: the next one is tracked from the last good one.
+  /// ok, and those that fault() names, are passed over: the next one is tracked from the last good one.
   std::vector<RelativeMotion> process(const Frame &frame);
   /// Learns the bias of the gyro from the last result of process(), once nothing speaks against it.
   void learn(const std::vector<RelativeMotion> &motions);
 
   /// Follows the points alone, where nobody asks for a motion.
   void track(const Frame &frame);
+
+  /// What is wrong with the image of the frame processed last, by its points; empty where nothing is.
+  const std::string &fault() const { return m_fault; }
 
   const PointTracker &tracker() const { return m_tracker; }
   /// How many good frames back it remembers, and the number of the one \p back good frames before the current one.
@@ -87,16 +91,21 @@ private:
     std::optional<Pose> wMb;
   };
   std::optional<GyroRotation> gyroSince(std::int64_t from_ns, std::int64_t to_ns) const;
+  RelativePosePrior expect(RelativeMotion &step, int frames_back, bool with_odometry) const;
   RelativeMotion relativeTo(int frames_back) const;
+  void judgeShear(const std::vector<RelativeMotion> &motions);
 
   PinholeCamera m_camera;
   Pose m_bMc;
   PointMotionOptions m_options;
   PointTracker m_tracker;
   GyroBias m_bias;
-  std::deque<Seen> m_seen;          ///< oldest first, the current frame last
-  std::vector<GyroSample> m_gyro;   ///< since the oldest frame of m_seen
-  std::size_t m_frames = 0;         ///< that came, good or not
-  std::int64_t m_bias_until_ns = 0; ///< end of the last interval that taught the bias
+  std::deque<Seen> m_seen;                ///< oldest first, the current frame last
+  std::vector<GyroSample> m_gyro;         ///< since the oldest frame of m_seen
+  std::size_t m_frames = 0;               ///< that came, good or not
+  std::int64_t m_bias_until_ns = 0;       ///< end of the last interval that taught the bias
+  std::string m_fault;                    ///< of the newest image
+  int m_refused = 0;                      ///< images in a row
+  std::optional<Eigen::Vector3d> m_ahead; ///< direction of the last translation from frame to frame, camera axes
 };
 } // namespace bole

@@ -236,6 +236,18 @@ std::vector<PointMatch> PointTracker::matches(int frames_back) const
 
 std::size_t PointTracker::frames() const { return m_state->frames; }
 
+void PointTracker::forgetLast()
+{
+  std::vector<PointTrack> &tracks = m_state->tracks;
+  for (PointTrack &track : tracks)
+    track.positions_px.pop_back();
+  tracks.erase(
+      std::remove_if(tracks.begin(), tracks.end(), [](const PointTrack &track) { return track.positions_px.empty(); }),
+      tracks.end());
+  m_state->pyramid.swap(m_state->next);
+  --m_state->frames;
+}
+
 void PointTracker::reset()
 {
   m_state->tracks.clear();

@@ -70,6 +70,9 @@ public:
   std::vector<PointMatch> matches(int frames_back) const;
   /// Frames seen since the start or the last reset().
   std::size_t frames() const;
+  /// Forgets the last image: the next one is tracked from the one before it. Tracks that it ended stay ended. Once
+  /// after each track().
+  void forgetLast();
   /// Forgets all tracks: after a jump of the video.
   void reset();
 

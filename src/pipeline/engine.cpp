@@ -93,7 +93,7 @@ FrameReport Engine::process(const Frame &frame)
   lap("motion");
   const Viewpoint view = extend(frame, motion); // Eq. 2: the next pose, and all that was seen before it
   lap("smoothing");
-  if (frame.status == FrameStatus::ok) {
+  if (frame.status == FrameStatus::ok && motion.image_fault.empty()) {
     Gradient gradient = computeGradient(frame.image, m_units.gradient); // Eq. 3
     lap("gradient");
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
@@ -324,8 +324,8 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   m_online.push_back({frame.stamp_ns, wMb});
   report.index = newest();
   report.stamp_ns = frame.stamp_ns;
-  report.frame_status = frame.status;
-  report.reason = frame.message;
+  report.frame_status = motion.image_fault.empty() ? frame.status : FrameStatus::doubtful;
+  report.reason = motion.image_fault.empty() ? frame.message : motion.image_fault;
   report.wMb = wMb;
   report.wMc = wMb * m_bMc;
   report.pose_covariance = m_smoother.currentPoseCovariance();

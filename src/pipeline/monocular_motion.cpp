@@ -234,7 +234,8 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
     m_points.process(frame); // for the bias that it teaches
   else
     m_points.track(frame);
-  if (frame.status == FrameStatus::ok)
+  motion.image_fault = m_points.fault();
+  if (frame.status == FrameStatus::ok && motion.image_fault.empty())
     see(frame, wMa, motion);
   return motion;
 }

@@ -80,6 +80,7 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   Motion motion;
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
   const std::vector<RelativeMotion> seen = observe(frame);
+  motion.image_fault = m_points.fault();
   Frame room;
   const Frame &trusted = m_monitor.trusted(frame, room);
   motion.step = m_model.step(trusted, wMa, bias, velocity, m_inertial_step);

@@ -119,6 +119,25 @@ TEST(PointTracker, FollowsATurnOfAQuarterOfThePicture)
   EXPECT_GT(right, 0.9 * double(matches.size()));
 }
 
+TEST(PointTracker, AForgottenImageLeavesNoTrace)
+{
+  PointTracker tracker(kCamera), other(kCamera);
+  for (PointTracker *each : {&tracker, &other})
+    each->track(drawWalls(kCamera, poseAt(0)));
+  tracker.track(drawWalls(kCamera, poseAt(9)));
+  tracker.forgetLast();
+  for (PointTracker *each : {&tracker, &other})
+    each->track(drawWalls(kCamera, poseAt(1)));
+  EXPECT_EQ(tracker.frames(), 2u);
+  const auto matches = tracker.matches(1), expected = other.matches(1);
+  ASSERT_GT(matches.size(), 40u);
+  for (const PointMatch &match : matches) {
+    const auto same = std::find_if(expected.begin(), expected.end(), [&](const auto &e) { return e.id == match.id; });
+    ASSERT_NE(same, expected.end());
+    EXPECT_EQ(match.b_px, same->b_px);
+  }
+}
+
 TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
 {
   PointTracker tracker(kCamera);
@@ -188,5 +207,34 @@ TEST(PointMotion, PassesOverFramesThatAreNotOk)
   ASSERT_EQ(steps.size(), 1u);
   EXPECT_EQ(steps[0].a_index, 0u);
   EXPECT_EQ(steps[0].b_index, 2u);
+}
+
+TEST(PointMotion, NamesImagesWhoseRowsAreShearedAndGoesOnFromTheLastGoodOne)
+{
+  constexpr double kShear[] = {0, 0, 0.04, -0.03, 0};
+  const auto ahead = [](int k) { return Pose(Eigen::Matrix3d::Identity(), {0.02 * k, 0.01 * k, 0.15 * k}); };
+  for (const bool has_gyro : {true, false})
+    for (const bool has_odometry : {true, false}) {
+      PointMotion motion(kCamera, {});
+      for (int k = 0; k < 5; ++k) {
+        Frame frame;
+        frame.stamp_ns = k * 100000000LL;
+        frame.image = drawWalls(kCamera, ahead(k), kShear[k]);
+        if (has_odometry)
+          frame.wMb_odometry = ahead(k);
+        for (int i = 1; i <= 20 && k > 0 && has_gyro; ++i)
+          frame.gyro.push_back({frame.stamp_ns - 100000000LL + i * 5000000LL, Eigen::Vector3d::Zero()});
+        const auto steps = motion.process(frame);
+        if (!has_gyro && !has_odometry) {
+          EXPECT_EQ(motion.fault(), "");
+          continue;
+        }
+        EXPECT_EQ(motion.fault().find("sheared") == 0, kShear[k] != 0) << k << ": " << motion.fault();
+        EXPECT_EQ(steps.empty(), k == 0 || kShear[k] != 0);
+        if (k == 4) {
+          EXPECT_EQ(steps.front().a_index, 1u);
+        }
+      }
+    }
 }
 } // namespace

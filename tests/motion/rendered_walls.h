@@ -33,8 +33,9 @@ inline double texture(double x, double y, unsigned seed)
          v * ((1 - u) * hash(i, j + 1) + u * hash(i + 1, j + 1));
 }
 
-/// Walls at z = 5 (left third), 8 (right third) and 14 (behind all), seen from wMc (camera axes).
-inline vpImage<unsigned char> drawWalls(const PinholeCamera &camera, const Pose &wMc)
+/// Walls at z = 5 (left third), 8 (right third) and 14 (behind all), seen from wMc (camera axes); rows moved to the
+/// right by \p shear of their distance below the middle.
+inline vpImage<unsigned char> drawWalls(const PinholeCamera &camera, const Pose &wMc, double shear = 0)
 {
   vpImage<unsigned char> image(static_cast<unsigned>(camera.height), static_cast<unsigned>(camera.width));
   struct Wall
@@ -44,7 +45,7 @@ inline vpImage<unsigned char> drawWalls(const PinholeCamera &camera, const Pose 
   const std::vector<Wall> walls{{5, -9, -0.8, 0.18}, {8, 1.5, 12, 0.3}, {14, -40, 40, 0.5}};
   for (unsigned y = 0; y < image.getHeight(); ++y) {
     for (unsigned x = 0; x < image.getWidth(); ++x) {
-      const Eigen::Vector3d ray = wMc.R * camera.ray({double(x), double(y)});
+      const Eigen::Vector3d ray = wMc.R * camera.ray({x - shear * (y - camera.cy), double(y)});
       for (const Wall &wall : walls) {
         const double along = (wall.z - wMc.t.z()) / ray.z();
         const Eigen::Vector3d at = wMc.t + along * ray;

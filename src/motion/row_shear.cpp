@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/row_shear.h"
+
+#include "motion/epipolar.h"
+
+#include <Eigen/Dense>
+
+#include <cmath>
+#include <limits>
+
+namespace bole
+{
+namespace
+{
+constexpr double kWideShear = 1; // sigma of the shear before anything is seen
+
+struct ShearFit
+{
+  RowShear row;
+  double sigma = std::numeric_limits<double>::infinity(); ///< of the residuals of the bulk [normalised]
+};
+
+/// Residual of a match under a motion and a shear, and its derivative by (phi, tau, shear).
+double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Matrix3d &E, const Eigen::Vector3d &x_a,
+                       Eigen::Vector3d x_b, double shear, Vector6d &J)
+{
+  x_b.x() -= shear * x_b.y();
+  Vector5d by_motion;
+  const double residual = epipolar.residual(x_a, x_b, by_motion);
+  const Eigen::Vector2d line_a = (E * x_b).head<2>(), line_b = (E.transpose() * x_a).head<2>();
+  J << by_motion, -x_b.y() * line_b.x() / std::sqrt(line_a.squaredNorm() + line_b.squaredNorm() + 1e-24);
+  return residual;
+}
+
+/// Gauss-Newton with redescending weights, their scale that of the bulk in each step.
+ShearFit fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior, double min_sigma,
+                  double inflation)
+{
+  constexpr int kIterations = 8;
+  constexpr double kSettled = 1e-5; // of a step: a hundredth of a pixel over 1000 rows
+  ShearFit fit;
+  double shear = 0;
+  std::vector<double> residuals(rays.size());
+  std::vector<Vector6d> derivatives(rays.size());
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const motion::Epipolar epipolar(motion);
+    const Eigen::Matrix3d E = skew(motion.direction) * motion.aRb;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      residuals[i] = shearedResidual(epipolar, E, rays.a[i], rays.b[i], shear, derivatives[i]);
+    const double sigma = std::max(min_sigma, motion::bulkSigma(residuals));
+    Matrix6d H = Matrix6d::Zero();
+    Vector6d g = Vector6d::Zero();
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const double u = residuals[i] / sigma;
+      const double weight = epipolar.trust(rays.a[i]) * motion::weightOf(u, motion::kKernel) / inflation;
+      const Vector6d J = derivatives[i] / sigma;
+      H += weight * J * J.transpose();
+      g += weight * u * J;
+    }
+    const double wide = 1 / (kWideShear * kWideShear);
+    H.topLeftCorner<3, 3>() += prior.rotation_information;
+    H.diagonal().array() += 1e-9;
+    H.diagonal().tail<3>() += Eigen::Vector3d(prior.direction_information, prior.direction_information, wide);
+    g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * motion.aRb);
+    g.segment<2>(3) -= prior.direction_information * directionMinus(prior.direction, motion.direction);
+    g(5) += wide * shear;
+    const auto solver = H.ldlt();
+    const Vector6d step = -solver.solve(g);
+    motion.aRb = orthonormalized(motion.aRb * expSo3(step.head<3>()));
+    motion.direction = directionPlus(motion.direction, step.segment<2>(3));
+    shear += step(5);
+    if (!std::isfinite(shear) || std::abs(shear) > kWideShear)
+      return {};
+    fit = {{shear, std::sqrt(solver.solve(Vector6d::Unit(5))(5))}, sigma};
+    if (step.norm() < kSettled)
+      break;
+  }
+  return fit;
+}
+} // namespace
+
+RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
+                          const RelativePosePrior &given, const std::vector<Pose> &starts,
+                          const RelativePoseOptions &options)
+{
+  if (matches.size() < RelativePoseEstimate::kLeastMatches)
+    return {};
+  const motion::MotionPrior prior(given);
+  const motion::Rays rays(matches, camera);
+  const double min_sigma = options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
+  ShearFit best;
+  for (const Pose &start : starts) {
+    const ShearFit fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma, options.inflation);
+    if (fit.sigma < best.sigma)
+      best = fit;
+  }
+  return best.row;
+}
+} // namespace bole
