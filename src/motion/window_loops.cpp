@@ -4,6 +4,7 @@
 #include "geometry/vector_clones.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace bole
@@ -11,38 +12,65 @@ namespace bole
 namespace
 {
 constexpr int kLanes = kWindowLanes, kSide = kWindow_px;
-constexpr int kWeightBits = 14, kGreyBits = 5; // of the weights of four pixels, and below a grey level
+constexpr int kGreyBits = 7;     // below a grey level while it is interpolated: what 16 bits leave
+constexpr int kGradientBits = 2; // the same of a gradient
+constexpr int kWindowBits = 5;   // of a grey level in a window, as OpenCV has it
 
-/// A place between four pixels: the first of them, and their weights.
+/// A place between four pixels: the first of them, and how far it is on to the next, of 2^15 - 1.
 struct Between
 {
   Between(const GreyPlane &image, float x, float y)
       : left(static_cast<int>(std::floor(x))),
         top(static_cast<int>(std::floor(y))),
-        pixel(image.pixels + top * image.stride + left)
+        pixel(image.pixels + top * image.stride + left),
+        right_share(shareOf(x - static_cast<float>(left))),
+        lower_share(shareOf(y - static_cast<float>(top)))
   {
-    const float a = x - static_cast<float>(left), b = y - static_cast<float>(top), unit = 1 << kWeightBits;
-    w00 = static_cast<int>(std::lrint((1 - a) * (1 - b) * unit));
-    w01 = static_cast<int>(std::lrint(a * (1 - b) * unit));
-    w10 = static_cast<int>(std::lrint((1 - a) * b * unit));
-    w11 = (1 << kWeightBits) - w00 - w01 - w10;
   }
+  static short shareOf(float part) { return static_cast<short>(32767.f * part + 0.5f); }
 
   int left, top;
   const unsigned char *pixel;
-  int w00, w01, w10, w11;
+  short right_share, lower_share;
 };
 
-constexpr int rounded(int value, int bits) { return (value + (1 << (bits - 1))) >> bits; }
+/// a + share (b - a), which has 16 bits. Rounded as the one instruction does that AVX2 has for it.
+inline short mixed(short a, short b, short share)
+{
+  const short apart = static_cast<short>(b - a), part = static_cast<short>((((apart * share) >> 14) + 1) >> 1);
+  return static_cast<short>(a + part);
+}
 
-/// Rows of pixels, a line of lanes each, and zeros after them.
-template <int kRows> inline void copyRows(const unsigned char *pixels, std::ptrdiff_t stride, int *__restrict rows)
+inline short rounded(short value, int bits)
+{
+  const short raised = static_cast<short>(value + (1 << (bits - 1)));
+  return static_cast<short>(raised >> bits);
+}
+
+/// All bits of the lanes that are of a window, none of the others.
+constexpr auto kIsOfWindow = [] {
+  std::array<short, kSide * kLanes> lanes{};
+  for (std::size_t k = 0; k < lanes.size(); ++k)
+    lanes[k] = k % kLanes < kSide ? -1 : 0;
+  return lanes;
+}();
+
+/// Rows of pixels, each mixed with the one to its right, a line of lanes each.
+template <int kRows>
+inline void mixAcross(const unsigned char *pixels, std::ptrdiff_t stride, short share, short *__restrict rows)
 {
   for (int i = 0; i < kRows; ++i, pixels += stride)
-#pragma omp simd
     for (int k = 0; k < kLanes; ++k)
-      rows[i * kLanes + k] = pixels[k];
-  std::fill_n(rows + kRows * kLanes, kLanes, 0);
+      rows[i * kLanes + k] =
+          mixed(static_cast<short>(pixels[k] << kGreyBits), static_cast<short>(pixels[k + 1] << kGreyBits), share);
+}
+/// Beyond the image there is no gradient.
+void clearOutside(const GreyPlane &image, const Between &at, short *dx, short *dy)
+{
+  for (int i = 0; i <= kSide; ++i)
+    for (int k = 0; k < kLanes; ++k)
+      if (at.top + i < 0 || at.top + i >= image.height || at.left + k < 0 || at.left + k >= image.width)
+        dx[i * kLanes + k] = dy[i * kLanes + k] = 0;
 }
 } // namespace
 
@@ -51,77 +79,76 @@ void cutWindow(const GreyPlane &image, float x, float y, Window &window)
 {
   constexpr int kOuter = kSide + 1, kSize = kSide * kLanes, kOuterSize = kOuter * kLanes;
   const Between at(image, x, y);
-  int raw[(kOuter + 3) * kLanes]; // from the pixel before the first on
-  copyRows<kOuter + 2>(at.pixel - image.stride - 1, image.stride, raw);
-  int down[kOuterSize + kLanes], across[kOuterSize + kLanes];
+  const short right_share = at.right_share, lower_share = at.lower_share;
+  short grey[kOuterSize];
+  mixAcross<kOuter>(at.pixel, image.stride, right_share, grey);
+  short raw[(kOuter + 2) * kLanes]; // from the pixel before the first on
+  const unsigned char *pixels = at.pixel - image.stride - 1;
+  for (int i = 0; i < kOuter + 2; ++i, pixels += image.stride)
+    for (int k = 0; k < kLanes; ++k)
+      raw[i * kLanes + k] = pixels[k];
+  short down[kOuterSize + kLanes], along[kOuterSize + kLanes];
   for (int k = 0; k < kOuterSize; ++k) {
-    down[k] = 3 * (raw[k] + raw[k + 2 * kLanes]) + 10 * raw[k + kLanes];
-    across[k] = raw[k + 2 * kLanes] - raw[k];
+    down[k] = static_cast<short>(3 * (raw[k] + raw[k + 2 * kLanes]) + 10 * raw[k + kLanes]);
+    along[k] = static_cast<short>(raw[k + 2 * kLanes] - raw[k]);
   }
-  std::fill_n(down + kOuterSize, kLanes, 0);
-  std::fill_n(across + kOuterSize, kLanes, 0);
-  int is_column[kLanes], is_lane[kLanes];
-  for (int k = 0; k < kLanes; ++k) {
-    is_column[k] = at.left + k >= 0 && at.left + k < image.width ? 1 : 0;
-    is_lane[k] = k < kSide ? 1 : 0;
+  std::fill_n(down + kOuterSize, kLanes, short(0));
+  std::fill_n(along + kOuterSize, kLanes, short(0));
+  short dx[kOuterSize + kLanes], dy[kOuterSize + kLanes]; // Scharr's derivatives
+  for (int k = 0; k < kOuterSize; ++k) {
+    const short across = static_cast<short>(down[k + 2] - down[k]);
+    const short below = static_cast<short>(3 * (along[k] + along[k + 2]) + 10 * along[k + 1]);
+    dx[k] = static_cast<short>(across << kGradientBits);
+    dy[k] = static_cast<short>(below << kGradientBits);
   }
-  int dx[kOuterSize + kLanes], dy[kOuterSize + kLanes]; // Scharr's derivatives
-  for (int i = 0; i < kOuter; ++i) {
-    const int is_row = at.top + i >= 0 && at.top + i < image.height ? 1 : 0;
-#pragma omp simd
-    for (int k = 0; k < kLanes; ++k) {
-      const int j = i * kLanes + k, is_inside = is_row * is_column[k];
-      dx[j] = is_inside * (down[j + 2] - down[j]);
-      dy[j] = is_inside * (3 * (across[j] + across[j + 2]) + 10 * across[j + 1]);
-    }
+  const bool is_whole =
+      at.left >= 0 && at.top >= 0 && at.left + kOuter <= image.width && at.top + kOuter <= image.height;
+  if (!is_whole)
+    clearOutside(image, at, dx, dy);
+  std::fill_n(dx + kOuterSize, kLanes, short(0));
+  std::fill_n(dy + kOuterSize, kLanes, short(0));
+  short mixed_x[kOuterSize], mixed_y[kOuterSize];
+  for (int k = 0; k < kOuterSize; ++k) {
+    mixed_x[k] = mixed(dx[k], dx[k + 1], right_share);
+    mixed_y[k] = mixed(dy[k], dy[k + 1], right_share);
   }
-  std::fill_n(dx + kOuterSize, kLanes, 0);
-  std::fill_n(dy + kOuterSize, kLanes, 0);
-  for (int i = 0; i < kSide; ++i)
-#pragma omp simd
-    for (int k = 0; k < kLanes; ++k) {
-      const int j = i * kLanes + k;
-      const int *p = raw + kLanes + 1;
-      window.grey[j] = rounded(p[j] * at.w00 + p[j + 1] * at.w01 + p[j + kLanes] * at.w10 + p[j + kLanes + 1] * at.w11,
-                               kWeightBits - kGreyBits);
-      window.gradient_x[j] = is_lane[k] * rounded(dx[j] * at.w00 + dx[j + 1] * at.w01 + dx[j + kLanes] * at.w10 +
-                                                      dx[j + kLanes + 1] * at.w11,
-                                                  kWeightBits);
-      window.gradient_y[j] = is_lane[k] * rounded(dy[j] * at.w00 + dy[j + 1] * at.w01 + dy[j + kLanes] * at.w10 +
-                                                      dy[j + kLanes + 1] * at.w11,
-                                                  kWeightBits);
-    }
-  float xx = 0, xy = 0, yy = 0;
-#pragma omp simd reduction(+ : xx, xy, yy)
   for (int k = 0; k < kSize; ++k) {
-    xx += static_cast<float>(window.gradient_x[k] * window.gradient_x[k]);
-    xy += static_cast<float>(window.gradient_x[k] * window.gradient_y[k]);
-    yy += static_cast<float>(window.gradient_y[k] * window.gradient_y[k]);
+    window.grey[k] = rounded(mixed(grey[k], grey[k + kLanes], lower_share), kGreyBits - kWindowBits);
+    const short x_there = mixed(mixed_x[k], mixed_x[k + kLanes], lower_share);
+    const short y_there = mixed(mixed_y[k], mixed_y[k + kLanes], lower_share);
+    window.gradient_x[k] = static_cast<short>(rounded(x_there, kGradientBits) & kIsOfWindow[k]);
+    window.gradient_y[k] = static_cast<short>(rounded(y_there, kGradientBits) & kIsOfWindow[k]);
   }
-  window.xx = xx;
-  window.xy = xy;
-  window.yy = yy;
+  int xx = 0, xy = 0, yy = 0; // 121 x 4080^2 at most: below 2^31
+  for (int k = 0; k < kSize; ++k) {
+    xx += window.gradient_x[k] * window.gradient_x[k];
+    xy += window.gradient_x[k] * window.gradient_y[k];
+    yy += window.gradient_y[k] * window.gradient_y[k];
+  }
+  window.xx = static_cast<float>(xx);
+  window.xy = static_cast<float>(xy);
+  window.yy = static_cast<float>(yy);
 }
 
 BOLE_VECTOR_CLONES
 void mismatch(const GreyPlane &image, float x, float y, const Window &window, float &by_x, float &by_y)
 {
+  constexpr int kSize = kSide * kLanes;
+  constexpr short kMostApart = 135 << kWindowBits; // of more than half of all grey levels no sum may overflow
   const Between at(image, x, y);
-  const int w00 = at.w00, w01 = at.w01, w10 = at.w10, w11 = at.w11;
-  int rows[(kSide + 2) * kLanes];
-  copyRows<kSide + 1>(at.pixel, image.stride, rows);
-  float sum_x = 0, sum_y = 0;
-#pragma omp simd reduction(+ : sum_x, sum_y)
-  for (int k = 0; k < kSide * kLanes; ++k) {
-    const int difference =
-        rounded(rows[k] * w00 + rows[k + 1] * w01 + rows[k + kLanes] * w10 + rows[k + kLanes + 1] * w11,
-                kWeightBits - kGreyBits) -
-        window.grey[k];
-    sum_x += static_cast<float>(difference * window.gradient_x[k]);
-    sum_y += static_cast<float>(difference * window.gradient_y[k]);
+  const short lower_share = at.lower_share;
+  short rows[kSize + kLanes];
+  mixAcross<kSide + 1>(at.pixel, image.stride, at.right_share, rows);
+  int sum_x = 0, sum_y = 0;
+  for (int k = 0; k < kSize; ++k) {
+    const short here = rounded(mixed(rows[k], rows[k + kLanes], lower_share), kGreyBits - kWindowBits);
+    const short apart = static_cast<short>(here - window.grey[k]);
+    const short difference = std::min(kMostApart, std::max(static_cast<short>(-kMostApart), apart));
+    sum_x += difference * window.gradient_x[k];
+    sum_y += difference * window.gradient_y[k];
   }
-  by_x = sum_x;
-  by_y = sum_y;
+  by_x = static_cast<float>(sum_x);
+  by_y = static_cast<float>(sum_y);
 }
 
 namespace

@@ -23,14 +23,15 @@ struct GreyPlane
 /// as OpenCV has them: 32 for a grey level and for a grey level a pixel.
 struct Window
 {
-  int grey[kWindow_px * kWindowLanes], gradient_x[kWindow_px * kWindowLanes], gradient_y[kWindow_px * kWindowLanes];
+  short grey[kWindow_px * kWindowLanes], gradient_x[kWindow_px * kWindowLanes], gradient_y[kWindow_px * kWindowLanes];
   float xx = 0, xy = 0, yy = 0; ///< sums of the products of the gradient
 };
 
 /// The window whose first pixel is (x, y), which may be outside by kWindow_px; beyond the image there is no gradient.
 void cutWindow(const GreyPlane &image, float x, float y, Window &window);
 
-/// Sums of the difference between \p image at (x, y) and \p window, times the gradient of the window.
+/// Sums of the difference between \p image at (x, y) and \p window, times the gradient of the window; 32 for a grey
+/// level and for a grey level a pixel.
 void mismatch(const GreyPlane &image, float x, float y, const Window &window, float &by_x, float &by_y);
 
 /// Memory of cornerResponse().
