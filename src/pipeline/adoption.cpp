@@ -10,11 +10,11 @@
 
 namespace bole
 {
-void DetectionWindow::push(Gradient gradient, std::size_t pose, const Viewpoint &at, const Smoother &smoother,
-                           const StageOptions &options)
+void DetectionWindow::push(std::shared_ptr<const Gradient> gradient, std::size_t pose, const Viewpoint &at,
+                           const Smoother &smoother, const StageOptions &options)
 {
   WindowView view;
-  view.profile = computeLevelProfile(gradient.signed_x, at.camera, at.wMc.R, options.detection.profile);
+  view.profile = computeLevelProfile(gradient->signed_x, at.camera, at.wMc.R, options.detection.profile);
   view.gradient = std::move(gradient);
   view.pose = pose;
   view.time_s = at.time_s;
@@ -53,7 +53,7 @@ std::vector<LineDetection> detectInFrame(const WindowView &frame, const TrunkMap
     lines.threshold = lines.turning_threshold;
     lines.either_polarity = false; // a bright gap between trunks looks like one
   }
-  return detectLines(frame.gradient, p_background, view.camera, view.wMc.R, inhibitedRanges(map, view, true), profile,
+  return detectLines(*frame.gradient, p_background, view.camera, view.wMc.R, inhibitedRanges(map, view, true), profile,
                      lines);
 }
 
@@ -161,7 +161,7 @@ Adoption followThroughWindow(const Detection &detection, const DetectionWindow &
     const Pose wMb = smoother.pose(frame.pose);
     at.wMc = wMb * options.smoothing.bMc;
     at.time_s = frame.time_s;
-    follower.look(frame.gradient, frame.pose, wMb, at, map, -1, options);
+    follower.look(*frame.gradient, frame.pose, wMb, at, map, -1, options);
   }
   Adoption adoption = follower.fitted(view.time_s, view.camera, options);
   if (adoption.views.empty()) {
@@ -179,7 +179,7 @@ std::optional<Adoption> followInFrame(const LineDetection &detection, const Wind
   prediction.relative = detection.relative;
   prediction.range =
       elevationOf(detection.relative, trunkFromRelative(view.wMc, detection.relative, radius), view, options);
-  const TrackingResult result = trackTrunk(frame.gradient, view.camera, prediction, options.tracking);
+  const TrackingResult result = trackTrunk(*frame.gradient, view.camera, prediction, options.tracking);
   if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used)
     return std::nullopt;
   Adoption adoption;

@@ -7,13 +7,14 @@
 #include "summary/square_root.h"
 
 #include <deque>
+#include <memory>
 
 namespace bole
 {
 /// A frame of the detector's window.
 struct WindowView
 {
-  Gradient gradient;
+  std::shared_ptr<const Gradient> gradient;
   LevelProfile profile;
   std::size_t pose = 0;
   double time_s = 0;
@@ -25,7 +26,7 @@ class DetectionWindow
 public:
   /// The view before gives way where the camera had hardly moved to it; the oldest where the window is full or its
   /// pose is marginalised.
-  void push(Gradient gradient, std::size_t pose, const Viewpoint &at, const Smoother &smoother,
+  void push(std::shared_ptr<const Gradient> gradient, std::size_t pose, const Viewpoint &at, const Smoother &smoother,
             const StageOptions &options);
   const std::deque<WindowView> &views() const { return m_views; }
   const WindowView &newest() const { return m_views.back(); }

@@ -94,12 +94,12 @@ FrameReport Engine::process(const Frame &frame)
   const Viewpoint view = extend(frame, motion); // Eq. 2: the next pose, and all that was seen before it
   lap("smoothing");
   if (frame.status == FrameStatus::ok && motion.image_fault.empty()) {
-    Gradient gradient = computeGradient(frame.image, m_units.gradient); // Eq. 3
+    const auto gradient = std::make_shared<const Gradient>(computeGradient(frame.image, m_units.gradient)); // Eq. 3
     lap("gradient");
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
     if (m_units.flow.as_paper) {
-      report.trunks = mapAsPaper(gradient, background(saliency), view, m_smoother, m_map, m_units);
+      report.trunks = mapAsPaper(*gradient, background(saliency), view, m_smoother, m_map, m_units);
       lap("map");
       report.saliency = fieldOf(std::move(saliency));
       report.timing_ms = std::move(lap.times_ms);
@@ -107,10 +107,10 @@ FrameReport Engine::process(const Frame &frame)
     }
     const std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
     const std::vector<TrackedTrunk> tracked =
-        trackTrunks(gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
-    add(tracked, view);                                                               // Eq. 9
+        trackTrunks(*gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
+    add(tracked, view);                                                                // Eq. 9
     lap("tracking");
-    m_window.push(std::move(gradient), newest(), view, m_smoother, m_units);
+    m_window.push(gradient, newest(), view, m_smoother, m_units);
     adoptNew(view, background(saliency)); // Eq. 18-21
     lap("detection");
     if (m_units.flow.final_pass)

@@ -62,9 +62,11 @@ private:
   void refreshWholeMap();
   void apply(const MapUpdate &update);
   double farthestJudged() const;
-  std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const;
-  std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views) const;
-  void detectLeaning(const std::vector<Judged> &judged);
+  std::vector<Adoption> followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
+                                  AlbumGradients &gradients) const;
+  std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
+                                 AlbumGradients &gradients) const;
+  void detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients);
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void reviewScale(double least_correction, bool with_radii);

@@ -64,7 +64,8 @@ double Engine::farthestJudged() const
 
 /// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
 /// \p map: what may hide them.
-std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map) const
+std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
+                                        AlbumGradients &gradients) const
 {
   constexpr int kRounds = 2; // what the first finds tells the second where else to look
   std::vector<Adoption> found;
@@ -78,16 +79,17 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
     std::vector<Follower> followers;
     for (const Adoption &one : found)
       followers.emplace_back(one.trunk.trunk, one.trunk.covariance);
-    for (const KeptFrame &frame : m_album.frames()) {
+    for (std::size_t f = 0; f < m_album.frames().size(); ++f) {
+      const KeptFrame &frame = m_album.frames()[f];
       const Pose wMb = m_smoother.pose(frame.pose);
       const Viewpoint at = viewpointOf(frame);
-      std::optional<Gradient> gradient; // made where somebody asks for it
+      std::shared_ptr<const Gradient> gradient; // made where somebody asks for it
       for (std::size_t i = 0; i < followers.size(); ++i) {
         const Eigen::Vector3d to = found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t;
         if (to.dot(at.wMc.R.col(2)) < 0 || to.head<2>().norm() > m_units.flow.track_range)
           continue;
         if (!gradient)
-          gradient = computeGradient(frame.image, m_units.gradient);
+          gradient = gradients[f];
         followers[i].look(*gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
       }
     }
@@ -101,15 +103,15 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
 
 /// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds, and has well placed,
 /// keeps its views unless the new ones are better.
-std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely,
-                                               const std::vector<LevelView> &views) const
+std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
+                                               AlbumGradients &gradients) const
 {
   constexpr double kBetter = 0.3; // log-odds by which new views must be better than those at hand
   constexpr double kHides = 1.5;  // log-odds at which one may hide what stands behind it
   const TrunkMap map = m_map.withTrunks(idsOf(likely, kHides));
   const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
     std::vector<Reading> readings;
-    std::vector<Adoption> followed = followAll(hypotheses, map);
+    std::vector<Adoption> followed = followAll(hypotheses, map, gradients);
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       const auto refit =
           judge({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestJudged());
@@ -156,7 +158,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
 
 /// Trunks that lean are too smeared in upright columns for the detector. In flight there is no time for more, so what
 /// stands between the likely ones is looked for now, along lines that lean to either side.
-void Engine::detectLeaning(const std::vector<Judged> &judged)
+void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients)
 {
   constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
   constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
@@ -169,7 +171,7 @@ void Engine::detectLeaning(const std::vector<Judged> &judged)
     DetectionWindow window;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const Viewpoint at = viewpointOf(frames[i]);
-      window.push(computeGradient(frames[i].image, m_units.gradient), frames[i].pose, at, m_smoother, options);
+      window.push(gradients[i], frames[i].pose, at, m_smoother, options);
       if (i % kEvery == 0)
         adoptFrom(window, likely, at, nullptr, options);
     }
@@ -182,10 +184,12 @@ void Engine::decideByAllFrames()
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
   const std::vector<LevelView> views = levelViews();
   const std::vector<Judged> before = judgeAll(views);
-  detectLeaning(before);
+  AlbumGradients gradients(m_album.frames(), m_units.gradient);
+  detectLeaning(before, gradients);
   const double apart = m_units.map.merge_distance;
   m_judged = judgeAll(views, before);
-  std::vector<Reading> readings = readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views);
+  std::vector<Reading> readings =
+      readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views, gradients);
   std::vector<Judged> again;
   for (const Reading &reading : readings) {
     if (!reading.judged)

@@ -26,6 +26,25 @@ void Album::add(const vpImage<unsigned char> &image, std::size_t pose, const Vie
   m_frames.resize(kept);
 }
 
+AlbumGradients::AlbumGradients(const std::vector<KeptFrame> &frames, const GradientOptions &options)
+    : m_frames(frames), m_options(options), m_made(frames.size())
+{
+}
+
+std::shared_ptr<const Gradient> AlbumGradients::operator[](std::size_t frame)
+{
+  constexpr std::size_t kMostBytes = std::size_t(128) << 20; // 40 s of 320x240 at 10 Hz
+  if (m_made[frame])
+    return m_made[frame];
+  auto gradient = std::make_shared<const Gradient>(computeGradient(m_frames[frame].image, m_options));
+  const std::size_t bytes = gradient->signed_x.getSize() * sizeof(float);
+  if (m_bytes + bytes <= kMostBytes) {
+    m_bytes += bytes;
+    m_made[frame] = gradient;
+  }
+  return gradient;
+}
+
 OddsTerms oddsTerms(const ColumnEvidence &evidence, double online)
 {
   OddsTerms terms;

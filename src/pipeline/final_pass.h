@@ -40,6 +40,21 @@ private:
   std::optional<Eigen::Vector3d> m_last;
 };
 
+/// Gradients of the frames of an album. Each is made once, and kept as far as the memory goes.
+class AlbumGradients
+{
+public:
+  /// \p frames must outlive it.
+  AlbumGradients(const std::vector<KeptFrame> &frames, const GradientOptions &options);
+  std::shared_ptr<const Gradient> operator[](std::size_t frame);
+
+private:
+  const std::vector<KeptFrame> &m_frames;
+  GradientOptions m_options;
+  std::vector<std::shared_ptr<const Gradient>> m_made;
+  std::size_t m_bytes = 0;
+};
+
 /// A place where a trunk may stand.
 struct Hypothesis
 {

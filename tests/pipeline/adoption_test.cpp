@@ -34,7 +34,7 @@ protected:
       m_view.ground_z = 0;
       m_view.time_s = 0.1 * k;
       const auto image = test::drawTrunks(kCamera, m_view.wMc.inverse(), test::smallWood(), unsigned(k));
-      m_window.push(computeGradient(image), pose, m_view, m_smoother, m_options);
+      m_window.push(std::make_shared<const Gradient>(computeGradient(image)), pose, m_view, m_smoother, m_options);
     }
   }
   /// The first trunk of the wood, as a detector might have it.
@@ -119,7 +119,8 @@ TEST(DetectionWindow, KeepsViewsFromPlacesApartAndAlwaysTheNewest)
     k == 0 ? smoother.addFirstPose(Pose(), covariance) : smoother.addPose(step, covariance);
     smoother.update();
     view.wMc = smoother.pose(k) * kMount;
-    window.push(computeGradient(vpImage<unsigned char>(240, 320, 128)), k, view, smoother, options);
+    window.push(std::make_shared<const Gradient>(computeGradient(vpImage<unsigned char>(240, 320, 128))), k, view,
+                smoother, options);
     EXPECT_EQ(window.newest().pose, k);
   }
   ASSERT_EQ(window.views().size(), 4u);
