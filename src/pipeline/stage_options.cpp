@@ -71,8 +71,12 @@ void scaleToCamera(StageOptions &o, double s)
   o.lines.width_min_px *= s;
   o.lines.width_max_px *= s;
   o.lines.inhibition_px *= s;
-  o.saliency.window_width_px = oddNear(o.saliency.window_width_px * s, 31);
-  o.saliency.window_height_px = oddNear(o.saliency.window_height_px * s, 31);
+  /// Saliency asks for parts of a trunk, an angle: a finer picture is halved once more. The paper's is not.
+  const int halved = o.flow.as_paper ? 0 : static_cast<int>(std::floor(std::log2(std::max(s, 1.0))));
+  o.saliency.finest_level += halved;
+  o.saliency.levels += halved;
+  o.saliency.window_width_px = oddNear(std::ldexp(o.saliency.window_width_px * s, -halved), 31);
+  o.saliency.window_height_px = oddNear(std::ldexp(o.saliency.window_height_px * s, -halved), 31);
 }
 
 /// What is counted in frames, for \p k times 10 frames a second.
