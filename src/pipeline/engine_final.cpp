@@ -163,7 +163,7 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
   constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
   constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
   constexpr std::size_t kEvery = 3; // frames: a window holds many more
-  const std::vector<KeptFrame> &frames = m_album.frames();
+  const std::deque<KeptFrame> &frames = m_album.frames();
   const TrunkMap likely = m_map.withTrunks(idsOf(judged, kHides));
   for (const double lean : {-kLean, kLean}) {
     StageOptions options = m_units;

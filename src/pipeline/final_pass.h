@@ -11,6 +11,7 @@
 #include "detection/column_evidence.h"
 #include "pipeline/adoption.h"
 
+#include <deque>
 #include <vector>
 
 namespace bole
@@ -32,10 +33,10 @@ public:
   /// \p spacing: least move of the camera between two frames [units of the motion].
   void add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
            const ElevationRange &range);
-  const std::vector<KeptFrame> &frames() const { return m_frames; }
+  const std::deque<KeptFrame> &frames() const { return m_frames; }
 
 private:
-  std::vector<KeptFrame> m_frames;
+  std::deque<KeptFrame> m_frames; ///< never moved to another place: pictures would be copied
   std::size_t m_every = 1, m_offered = 0;
   std::optional<Eigen::Vector3d> m_last;
 };
