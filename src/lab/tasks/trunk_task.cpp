@@ -21,10 +21,10 @@ constexpr double kBearingNoise = 0.0015; ///< of a tracked trunk in one image [r
 constexpr double kRatioNoise = 0.025;    ///< of its log r/d: half a pixel on a width of 20
 constexpr double kUnrest = 0.15;         ///< of the velocity sideways that nobody ordered [m/s per root of a second]
 constexpr double kApproachUnrest = 0.05; ///< and of that ahead: learnt no faster than delay and lags let it be mended
-constexpr double kSway = 0.8;            ///< largest speed of swaying, where a distance is asked for [m/s]
-constexpr double kSwayClimb = 0.4;       ///< largest rate of climb meanwhile [m/s]
-constexpr double kSwayPeriod_s = 6;      ///< 0.76 m to either side: 15 degrees of parallax at 3 m
-constexpr double kPause_s = 0.25;        ///< without a command it hovered: what was sent before is over
+constexpr double kSwing = 0.69;    ///< to either side, where a distance is asked for [m]: 13 degrees of parallax at 3 m
+constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
+constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
+constexpr double kPause_s = 0.25;  ///< without a command it hovered: what was sent before is over
 constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;       ///< a trunk that took the target's place stands this near [m]
@@ -35,6 +35,14 @@ constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks
 constexpr int kPatience = 10;            ///< frames that the way round is blocked before it goes round the other way
 constexpr double kWayRange = 3;          ///< of trunks that may stand in the way round [m]
 constexpr double kLargestTurnRate = 0.8; ///< [rad/s]
+
+/// What a drone flies that is sent \p velocity and obeys by \p share: only the horizontal velocity is a balance with
+/// drag.
+Eigen::Vector4d obeying(Eigen::Vector4d velocity, double share)
+{
+  velocity.head<2>() *= share;
+  return velocity;
+}
 } // namespace
 
 void TrunkTaskOptions::validate() const
@@ -198,8 +206,8 @@ TaskCommand TrunkTask::act(const FrameReport &report)
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
-  const double sway = swayNow(time_s);
-  const double wanted = m_turned_back * m_options.speed + kSway * sway;
+  const Eigen::Vector2d sway = swayNow(time_s);
+  const double wanted = m_turned_back * m_options.speed + sway.x();
   const bool is_free = isFree(trunk->id, obstacles(report, kWayRange, 1), report.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
   if (m_blocked > kPatience) {
@@ -207,29 +215,32 @@ TaskCommand TrunkTask::act(const FrameReport &report)
     m_blocked = 0;
   }
   const double round = is_free ? wanted : 0;
+  m_obeyed = response().obeyed();
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
-  command.velocity.z() = kSwayClimb * sway;
-  if (sway != 0)
+  command.velocity.z() = sway.y();
+  if (sway != Eigen::Vector2d::Zero())
     command.reason = "holds, swaying";
   else if (m_options.speed != 0)
     command.reason = round != 0 ? "circles" : "way blocked: waits";
   return command;
 }
 
-/// -1 to 1; 0 where no distance is asked for.
-double TrunkTask::swayNow(double time_s)
+/// Velocity to the left and up [m/s], as much as may be ordered where nothing was seen; 0 where no distance is asked
+/// for.
+Eigen::Vector2d TrunkTask::swayNow(double time_s)
 {
   if (m_options.speed != 0 || m_options.ratio > 0)
-    return 0;
+    return Eigen::Vector2d::Zero();
   if (m_sway_start_s < 0)
     m_sway_start_s = time_s;
-  return std::cos(2 * M_PI * (time_s - m_sway_start_s) / kSwayPeriod_s);
+  const double rate = kSwayShare * m_options.safety.unseen_speed / kSwing; // rad/s
+  return rate * std::cos(rate * (time_s - m_sway_start_s)) * Eigen::Vector2d(kSwing, kSwingUp);
 }
 
 /// Sent anew where it was cut: of two sent at one time the later counts.
 void TrunkTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
 {
-  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), velocity);
+  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), obeying(velocity, m_obeyed));
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
@@ -312,6 +323,6 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0,
                            std::clamp(v[1], -kLargestTurnRate, kLargestTurnRate));
   m_response.send(time_s, velocity);
-  return velocity;
+  return obeying(velocity, 1 / m_obeyed);
 }
 } // namespace bole

@@ -17,8 +17,9 @@
 ///
 /// A frame is old when it arrives and the drone is slow to obey, so each feature is predicted to where it will stand
 /// when the command acts (DroneResponse), and the command is the velocity that a lagging drone needs for an exponential
-/// decrease. Unmodelled motion (drift outwards on a circle, less speed than commanded) appears as a drift of the
-/// features (FeatureFilter) and is fed forward, which leaves no lag on the circle.
+/// decrease. Drag lets it fly a share of what is sent; the share is learnt from where it went (PlaneResponse), and so
+/// much more is sent. Other unmodelled motion (drift outwards on a circle, wind) appears as a drift of the features
+/// (FeatureFilter) and is fed forward, which leaves no lag on the circle.
 ///
 /// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed
 /// for a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
@@ -77,7 +78,7 @@ private:
   int successor(const FrameReport &report) const;
   RelativeTrunk look(const FrameReport &report, const KnownTrunk &trunk);
   void desire(double radius);
-  double swayNow(double time_s);
+  Eigen::Vector2d swayNow(double time_s);
   bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
@@ -98,6 +99,7 @@ private:
   double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;          ///< frames in a row
   double m_sway_start_s = -1; ///< -1: has not begun
+  double m_obeyed = 1;        ///< share of what is sent that is flown: m_response holds what is flown
   bool m_has_feature = false;
 };
 } // namespace bole
