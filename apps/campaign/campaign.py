@@ -56,10 +56,21 @@ class Campaign:
         for path in config.get("logs") or []:
             name = os.path.basename(path.rstrip("/")).replace("%", "")
             self.logs[name] = os.path.abspath(os.path.expanduser(path))
-        self.servo = {name: task for name, task in (config.get("servo") or {}).items()}
-        for name, task in self.servo.items():
+        self.servo, self.swept = {}, {}
+        for name, task in (config.get("servo") or {}).items():
             if "task" not in task or "seeds" not in task:
                 fail(f"servo.{name} must name a task and seeds")
+            sweep = task.get("sweep")
+            if sweep is None:
+                self.servo[name] = task
+                continue
+            for option, values in sweep.items():
+                if not isinstance(values, list):
+                    fail(f"servo.{name}.sweep.{option} must be a list of values")
+                for value in values:
+                    run = f"{name}-{option}-{value}"
+                    self.servo[run] = {**task, "arguments": [*task.get("arguments", []), "--" + option, value]}
+                    self.swept.setdefault(option, {}).setdefault(name, []).append((value, "servo-" + run))
 
     def _lay_out(self, flights):
         """Every combination of the lists comes equally often, in an order drawn once: fewer seeds than combinations are a fair
@@ -256,6 +267,9 @@ def summaries(campaign, flights):
             if some and "success" in some[0]:
                 k = sum(bool(f["success"]) for f in some)
                 add("succeeded", (k / len(some), *wilson(k, len(some))))
+                for name in ("bearing rms [deg]", "distance rms [-]", "least clearance [m]", "mean speed [m/s]"):
+                    if any(f.get(name) is not None for f in some):
+                        add(name, bootstrap_median([f.get(name) for f in some]))
     return rows
 
 
@@ -404,6 +418,36 @@ def errors_by(trunks, flights, runs, key, error, label):
     return picture(draw)
 
 
+def sweeps(campaign, flights):
+    """Share of the runs that succeed against each option that was swept, a curve a task."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, len(campaign.swept), figsize=(3.4 * len(campaign.swept), 3.2), sharey=True, squeeze=False)
+    for axes, (option, tasks) in zip(panels[0], campaign.swept.items()):
+        for colour, (name, runs) in zip(COLOURS, tasks.items()):
+            points = []
+            for value, run in runs:
+                some = [bool(f["success"]) for f in flights if f["run"] == run and f["ok"] and "success" in f]
+                if some:
+                    share = sum(some) / len(some)
+                    low, high = wilson(sum(some), len(some))
+                    points.append((value, share, max(0, share - low), max(0, high - share)))
+            if points:
+                x, y, below, above = zip(*points)
+                axes.errorbar(x, y, [below, above], color=colour, marker="o", markersize=4, capsize=3, label=name)
+        axes.set(xlabel=option, ylim=(0, 1.05))
+    panels[0][0].set_ylabel("share that succeeded (95 %)")
+    panels[0][0].legend()
+    figure.tight_layout()
+    out = io.StringIO()
+    figure.savefig(out, format="svg")
+    plt.close(figure)
+    return out.getvalue()
+
+
 def spread(flights, runs, name, label, honest=None):
     def draw(axes):
         data = [[float(f[name]) for f in flights if f["run"] == run and f.get(name) is not None] for run in runs]
@@ -489,6 +533,8 @@ def write_page(campaign, path):
               spread(flights, runs, "position_median_m", "median position error by flight [m]"),
               spread(flights, runs, "radius_rmse_m", "radius RMSE by flight [m]"),
               spread(flights, runs, "ate_m", "ATE after x, y, yaw [m]")]
+    if campaign.swept:
+        parts += ["<h2>Sweeps</h2>", sweeps(campaign, flights)]
     parts += ["<h2>By stratum</h2>", as_table([r for r in summary if r["stratum"] != "all" and r["measure"] in
                                                ("recall", "precision", "position_median_m", "radius_rmse_m", "nees_half", "succeeded")],
                                               ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])]

@@ -14,6 +14,7 @@ flights: {seeds: 1-4, density: 0.05, light: [sun, overcast], path: forward, fram
 runs: {default: {}, broken: {arguments: [--no-such-option]}}
 compare: [[default, broken]]
 strata: [light]
+servo: {hold: {task: hold, seeds: 1, arguments: [--perception, truth, --duration, 2], sweep: {latency: [0, .1]}}}
 YAML
 fly() {
   BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 \
@@ -26,17 +27,18 @@ while kill -0 $pid 2>/dev/null && ! ls "$folder"/results/default/*.json >/dev/nu
 kill -KILL $pid 2>/dev/null || true
 wait $pid 2>/dev/null || true
 pkill -KILL -f "$folder" 2>/dev/null || true
-first=$(stat -c %Y "$folder"/results/default/*.json | head -n 1)
+first=$(stat -c %Y "$folder"/results/default/*.json | sort -n | head -n 1)
 BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 -d "$folder" \
   --unlock >/dev/null 2>&1
 BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 -d "$folder" \
   so_far >/dev/null 2>&1
-grep -q 'of 8 results' "$folder/page.html" && ! grep -q '8 of 8 results' "$folder/page.html" ||
+grep -q 'of 10 results' "$folder/page.html" && ! grep -q '10 of 10 results' "$folder/page.html" ||
   { echo "no page of what was flown so far"; exit 1; }
 fly || { cat "$folder/log.txt"; exit 1; }
 [ "$(ls "$folder"/results/default | wc -l)" -eq 4 ] || { echo "not four results"; exit 1; }
 [ "$(stat -c %Y "$folder"/results/default/*.json | sort -n | head -n 1)" -eq "$first" ] || { echo "a finished flight was flown twice"; exit 1; }
+tr '\n' ' ' <"$folder/page.html" | grep -q 'Sweeps.*<svg' || { echo "no curve of the sweep"; exit 1; }
 [ "$(tail -n +2 "$folder/failures.csv" | wc -l)" -eq 4 ] || { echo "the four failures are not reported"; exit 1; }
 grep -q '^default,all,,recall,' "$folder/summary.csv" || { echo "no recall in summary.csv"; exit 1; }
-grep -q '8 of 8 results' "$folder/page.html" || { echo "no page"; exit 1; }
+grep -q '10 of 10 results' "$folder/page.html" || { echo "no page"; exit 1; }
 [ -z "$(ls "$folder/flights" 2>/dev/null)" ] || { echo "pictures were not cleared"; exit 1; }
