@@ -26,7 +26,7 @@ void Album::add(const vpImage<unsigned char> &image, std::size_t pose, const Vie
   m_frames.resize(kept);
 }
 
-AlbumGradients::AlbumGradients(const std::vector<KeptFrame> &frames, const GradientOptions &options)
+AlbumGradients::AlbumGradients(const std::deque<KeptFrame> &frames, const GradientOptions &options)
     : m_frames(frames), m_options(options), m_made(frames.size())
 {
 }

@@ -46,11 +46,11 @@ class AlbumGradients
 {
 public:
   /// \p frames must outlive it.
-  AlbumGradients(const std::vector<KeptFrame> &frames, const GradientOptions &options);
+  AlbumGradients(const std::deque<KeptFrame> &frames, const GradientOptions &options);
   std::shared_ptr<const Gradient> operator[](std::size_t frame);
 
 private:
-  const std::vector<KeptFrame> &m_frames;
+  const std::deque<KeptFrame> &m_frames;
   GradientOptions m_options;
   std::vector<std::shared_ptr<const Gradient>> m_made;
   std::size_t m_bytes = 0;
