@@ -62,6 +62,23 @@ double Engine::farthestJudged() const
   return kFarthest_m / m_metres;
 }
 
+/// Of its place as seen from where it was last seen: the drift of the path up to there tells nothing of whether it is
+/// one trunk, and a plain video drifts more than a flight with a pose filter.
+Eigen::Matrix2d Engine::placeCovariance(const MapTrunk &trunk) const
+{
+  const std::deque<KeptFrame> &frames = m_album.frames();
+  const auto last = std::upper_bound(frames.begin(), frames.end(), trunk.last_seen_s,
+                                     [](double time_s, const KeptFrame &frame) { return time_s < frame.time_s; });
+  return m_smoother.placeCovariance(trunk.smoother_id, last == frames.begin() ? 0 : std::prev(last)->pose);
+}
+
+/// Whether a place is known well enough for the map, in metres that are as sure as the scale is.
+bool Engine::isPlaced(const Eigen::Matrix2d &covariance) const
+{
+  const double unsure = std::exp(m_motion->scale().sigma);
+  return m_map.isPlaced(covariance / (unsure * unsure));
+}
+
 /// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
 /// \p map: what may hide them.
 std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
@@ -132,7 +149,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
     const MapTrunk &known = m_map.trunk(likely[i].id);
-    const bool is_held = !known.removed && m_map.isPlaced(known.covariance) && reading.is_seen;
+    const bool is_held = !known.removed && isPlaced(placeCovariance(known)) && reading.is_seen;
     if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
       reading.judged = likely[i];
       reading.views.reset();
@@ -176,6 +193,7 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
         adoptFrom(window, likely, at, nullptr, options);
     }
   }
+  m_smoother.update(); // takes them in: how well each is placed will be asked
 }
 
 /// Every hypothesis in the light of all frames.
@@ -194,9 +212,10 @@ void Engine::decideByAllFrames()
   for (const Reading &reading : readings) {
     if (!reading.judged)
       continue;
-    const Matrix5d &covariance =
-        reading.views ? reading.views->trunk.covariance : m_map.trunk(reading.judged->id).covariance;
-    if (m_map.isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
+    const Eigen::Matrix2d covariance = reading.views
+                                           ? Eigen::Matrix2d(reading.views->trunk.covariance.topLeftCorner<2, 2>())
+                                           : placeCovariance(m_map.trunk(reading.judged->id));
+    if (isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
       again.push_back(*reading.judged);
   }
   const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
@@ -221,6 +240,8 @@ void Engine::decideByAllFrames()
     m_smoother.removeTrunk(gone);
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  m_map.doubtPlaces();
+  for (const MapTrunk &trunk : m_map.trunks())
+    if (trunk.status == TrunkStatus::confirmed && !isPlaced(placeCovariance(trunk)))
+      m_map.doubtPlace(trunk.id);
 }
 } // namespace bole
