@@ -71,8 +71,10 @@ void scaleToCamera(StageOptions &o, double s)
   o.lines.width_min_px *= s;
   o.lines.width_max_px *= s;
   o.lines.inhibition_px *= s;
-  /// Saliency asks for parts of a trunk, an angle: a finer picture is halved once more. The paper's is not.
-  const int halved = o.flow.as_paper ? 0 : static_cast<int>(std::floor(std::log2(std::max(s, 1.0))));
+  /// Saliency asks for parts of a trunk, an angle: a picture as fine as twice the usual, or nearly, is halved once
+  /// more. The paper's is not.
+  constexpr double kNearly = 1.1;
+  const int halved = o.flow.as_paper ? 0 : static_cast<int>(std::floor(std::log2(std::max(kNearly * s, 1.0))));
   o.saliency.finest_level += halved;
   o.saliency.levels += halved;
   o.saliency.window_width_px = oddNear(std::ldexp(o.saliency.window_width_px * s, -halved), 31);

@@ -93,7 +93,8 @@ TEST(StageOptions, ThresholdsOnThePictureFollowTheFocalLength)
                      usual = stageOptions(Options(), cameraWith(200));
   EXPECT_DOUBLE_EQ(narrow.lines.width_min_px, 3 * usual.lines.width_min_px);
   EXPECT_DOUBLE_EQ(narrow.tracking.scan_max_px, 2 * usual.tracking.scan_max_px);
-  EXPECT_EQ(narrow.saliency.window_width_px, 9);
+  EXPECT_EQ(narrow.saliency.finest_level, usual.saliency.finest_level + 1); // which makes half of the three
+  EXPECT_EQ(narrow.saliency.window_width_px, 5);
   EXPECT_EQ(narrow.saliency.window_height_px % 2, 1);
 }
 
