@@ -4,9 +4,9 @@
 set -eu
 cd "$(dirname "$0")"
 
-BUILD_PACKAGES="g++ cmake ninja-build pkg-config git libvisp-dev libopencv-dev libeigen3-dev libyaml-cpp-dev
+BUILD_PACKAGES="g++ cmake ninja-build pkg-config git libvisp-dev libopencv-dev libeigen3-dev libnlopt-dev libyaml-cpp-dev
 libcli11-dev nlohmann-json3-dev libfmt-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev"
-TEST_PACKAGES="libgtest-dev libgmock-dev libnlopt-dev libembree-dev visp-images-data xvfb xauth pybind11-dev python3-dev python3-numpy
+TEST_PACKAGES="libgtest-dev libgmock-dev libembree-dev visp-images-data xvfb xauth pybind11-dev python3-dev python3-numpy
 python3-pandas python3-matplotlib"
 PACKAGE_PACKAGES="dpkg-dev file pybind11-dev python3-dev"
 

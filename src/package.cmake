@@ -38,5 +38,5 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbole-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "${library_package} (= ${PROJECT_VERSION}), libvisp-dev, libopencv-dev, libeigen3-dev")
+  "${library_package} (= ${PROJECT_VERSION}), libvisp-dev, libopencv-dev, libeigen3-dev, libnlopt-dev")
 include(CPack)

@@ -7,7 +7,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cmath>
 
 namespace bole
 {
@@ -90,25 +89,6 @@ TrunkEnergy::Curvature TrunkEnergy::curvature(const RelativeTrunk &relative) con
     curvature.F += J.transpose() * H_psd * J;
   }
   return curvature;
-}
-
-/// A line that is moved by d1 at its top and d2 at its bottom is off by the mean of (d1 + t (d2 - d1))^2.
-Matrix4d TrunkEnergy::stepCurvature(const RelativeTrunk &relative) const
-{
-  Eigen::Matrix2d offset;
-  offset << 1 / 3.0, 1 / 6.0, 1 / 6.0, 1 / 3.0;
-  Matrix4d F = Matrix4d::Zero();
-  for (const Border border : kBorders) {
-    if (!target(border).visible)
-      continue;
-    const BorderLine line = borderLine(m_camera, relative, border, m_range);
-    if (line.rows() == 0)
-      continue;
-    const double contrast = target(border).contrast, k = std::abs(weight(border, line, contrast));
-    const auto J = borderJacobian(m_camera, relative, border, line);
-    F += k * contrast * J.transpose() * offset * J;
-  }
-  return F;
 }
 
 /// The gradient there belongs to the tangent there; what that differs from the tangent here is antisymmetric.

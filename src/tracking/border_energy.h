@@ -64,8 +64,6 @@ public:
   };
   /// Gauss-Newton Hessian J^T H J: H the 2x2 Hessian of each border by the displacement of its ends.
   Curvature curvature(const RelativeTrunk &relative) const;
-  /// What curvature() is if the borders at \p relative are steps of the contrast of their targets, blurred with 1 px.
-  Matrix4d stepCurvature(const RelativeTrunk &relative) const;
   /// The full Hessian by the tangent of theta^r, of any signs (Eq. 9). \p step: of its central differences.
   Matrix4d hessian(const RelativeTrunk &relative, const Vector4d &step) const;
 

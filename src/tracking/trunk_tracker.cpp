@@ -2,11 +2,11 @@
 #include "tracking/trunk_tracker.h"
 
 #include "geometry/require_range.h"
-#include "tracking/minimum.h"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <nlopt.h>
 
 namespace bole
 {
@@ -31,24 +31,43 @@ struct Problem
   {
     const Vector4d step = scale.cwiseProduct(xi);
     Vector4d f;
-    const double e = energy.evaluate(start.plus(step), &f);
+    double e = energy.evaluate(start.plus(step), by_xi ? &f : nullptr);
     const Eigen::Vector2d tilt = tilt_at_start.head<2>() + step.head<2>();
-    f.head<2>() += tilt_information * tilt;
-    *by_xi = f.cwiseProduct(scale);
-    return e + 0.5 * tilt_information * tilt.squaredNorm();
-  }
-
-  /// What the Hessian is if the borders are steps of the contrast that they were found with.
-  Matrix4d expectedHessian() const
-  {
-    constexpr double kHeld = 1e-3; // holds what no border shows
-    Matrix4d H = energy.stepCurvature(start);
-    H.topLeftCorner<2, 2>().diagonal().array() += tilt_information;
-    H = (scale.asDiagonal() * H * scale.asDiagonal()).eval();
-    H.diagonal().array() += kHeld;
-    return H;
+    e += 0.5 * tilt_information * tilt.squaredNorm();
+    if (by_xi) {
+      f.head<2>() += tilt_information * tilt;
+      *by_xi = f.cwiseProduct(scale);
+    }
+    return e;
   }
 };
+
+double evaluateProblem(unsigned, const double *x, double *gradient, void *data)
+{
+  const auto &problem = *static_cast<const Problem *>(data);
+  Vector4d by_xi;
+  const double e = problem(Vector4d(x), gradient ? &by_xi : nullptr);
+  if (gradient)
+    Vector4d::Map(gradient) = by_xi;
+  return e;
+}
+
+/// Minimum of the problem within +-bound pixels; false where NLopt gives up.
+bool minimise(Problem &problem, double bound_px, Vector4d &xi)
+{
+  const Vector4d upper = Vector4d::Constant(bound_px), lower = -upper;
+  nlopt_opt optimiser = nlopt_create(NLOPT_LD_SLSQP, 4);
+  nlopt_set_min_objective(optimiser, evaluateProblem, &problem);
+  nlopt_set_lower_bounds(optimiser, lower.data());
+  nlopt_set_upper_bounds(optimiser, upper.data());
+  nlopt_set_xtol_abs1(optimiser, 2e-3);
+  nlopt_set_maxeval(optimiser, 40);
+  double e = 0;
+  xi.setZero();
+  const nlopt_result result = nlopt_optimize(optimiser, xi.data(), &e);
+  nlopt_destroy(optimiser);
+  return (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && xi.allFinite() && std::isfinite(e);
+}
 
 struct SeenBorder
 {
@@ -189,10 +208,8 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
                   start.minus(prediction.relative), 1 / tilt_variance};
   if (!left.visible || !right.visible)
     problem.scale(3) = 1e-9; // one border says nothing of r/d beside the bearing
-  Vector4d xi = Vector4d::Zero();
-  MinimumOptions bounds;
-  bounds.bound = 2 * options.polish_max_px;
-  if (!findMinimum(problem, problem.expectedHessian(), xi, bounds) || xi.tail<2>().norm() > options.polish_max_px)
+  Vector4d xi;
+  if (!minimise(problem, 2 * options.polish_max_px, xi) || xi.tail<2>().norm() > options.polish_max_px)
     return finish(TrackingStatus::diverged);
 
   result.optimum = start.plus(problem.scale.cwiseProduct(xi));

@@ -3,8 +3,8 @@
 /// \file
 /// Relative tracking: where the energy of one trunk has its optimum in one image, near its prediction.
 ///
-/// Idea: predict, scan each border under the prediction's covariance, start from the best pair of maxima,
-/// polish the four parameters, keep gradient and Hessian for the summary factor (paper, Sections 4.1, 4.2).
+/// Idea: predict, scan each border under the prediction's covariance, start from the best pair of maxima, let
+/// NLopt polish the four parameters, keep gradient and Hessian for the summary factor (paper, Sections 4.1, 4.2).
 ///
 /// Status, not exceptions: what happens to a trunk in a frame is an outcome. NaN never becomes `tracked`.
 
