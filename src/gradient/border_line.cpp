@@ -105,8 +105,7 @@ namespace
 {
 LineSamples samplesOf(const vpImage<float> &g, const BorderLine &line)
 {
-  return {g[line.row_begin], static_cast<int>(g.getCols()), line.rows(), static_cast<float>(line.x_top),
-          static_cast<float>(line.slope)};
+  return {g[line.row_begin], static_cast<int>(g.getCols()), line.rows(), line.x_top, line.slope};
 }
 } // namespace
 
@@ -116,14 +115,13 @@ MeanGradient meanAlong(const vpImage<float> &g, const BorderLine &line)
   if (rows == 0)
     return {};
   const CubicSums sums = cubicSumsAlong(samplesOf(g, line));
-  const double value = sums.value, slope = sums.slope,
-               by_bottom = rows > 1 ? double(sums.slope_by_row) / (rows - 1) : 0;
-  return {value / rows, (slope - by_bottom) / rows, by_bottom / rows};
+  const double by_bottom = rows > 1 ? sums.slope_by_row / (rows - 1) : 0;
+  return {sums.value / rows, (sums.slope - by_bottom) / rows, by_bottom / rows};
 }
 
 double meanAlongOnly(const vpImage<float> &g, const BorderLine &line)
 {
-  return line.rows() > 0 ? double(linearSumAlong(samplesOf(g, line))) / line.rows() : 0;
+  return line.rows() > 0 ? linearSumAlong(samplesOf(g, line)) / line.rows() : 0;
 }
 
 double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sign)

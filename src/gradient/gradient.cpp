@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "gradient/gradient.h"
 
-#include "gradient/gradient_loops.h"
-
 #include <opencv2/imgproc.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
+#include <string>
 
 namespace bole
 {
@@ -21,53 +16,33 @@ cv::Mat view(vpImage<float> &I)
   return cv::Mat(static_cast<int>(I.getRows()), static_cast<int>(I.getCols()), CV_32F, I.bitmap);
 }
 
-/// exp(-i^2 / 2 sigma^2) for i from 0 to three sigmas.
-std::vector<float> bell(double sigma)
+/// Kernel of the derivative of a Gaussian whose response to a ramp of slope 1 is 1.
+cv::Mat derivativeKernel(double sigma, int radius)
 {
-  std::vector<float> weights;
-  for (int i = 0; i <= static_cast<int>(std::ceil(3 * sigma)); ++i)
-    weights.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma))));
-  return weights;
+  cv::Mat kernel(1, 2 * radius + 1, CV_32F);
+  double ramp = 0;
+  for (int i = -radius; i <= radius; ++i) {
+    kernel.at<float>(i + radius) = static_cast<float>(i * std::exp(-0.5 * i * i / (sigma * sigma)));
+    ramp += i * kernel.at<float>(i + radius);
+  }
+  return kernel / ramp;
 }
 
-/// The derivative of \p I along its rows, blurred with \p sigma; a ramp of slope 1 gives \p scale. The edge repeats.
-void differentiate(const vpImage<unsigned char> &I, double sigma, double scale, vpImage<float> &out)
-{
-  const std::vector<float> weights = bell(sigma);
-  const int rows = static_cast<int>(I.getRows()), cols = static_cast<int>(I.getCols());
-  const int radius = static_cast<int>(weights.size()) - 1;
-  double area = weights[0], ramp = 0;
-  for (int i = 1; i <= radius; ++i) {
-    const double weight = weights[static_cast<std::size_t>(i)];
-    area += 2 * weight;
-    ramp += 2 * i * i * weight;
-  }
-  std::vector<float> line(static_cast<std::size_t>(cols + 2 * radius));
-  float *blurred = line.data() + radius;
-  const auto row = [&](int i) { return I[std::clamp(i, 0, rows - 1)]; };
-  for (int i = 0; i < rows; ++i) {
-    addPairOfRows(row(i), row(i), static_cast<float>(0.5 * weights[0] / area), true, cols, blurred);
-    for (int k = 1; k <= radius; ++k)
-      addPairOfRows(row(i - k), row(i + k), static_cast<float>(weights[static_cast<std::size_t>(k)] / area), false,
-                    cols, blurred);
-    std::fill_n(line.data(), radius, blurred[0]);
-    std::fill_n(blurred + cols, radius, blurred[cols - 1]);
-    for (int k = 1; k <= radius; ++k)
-      addDifferenceAcross(blurred, k, static_cast<float>(scale * k * weights[static_cast<std::size_t>(k)] / ramp),
-                          k == 1, cols, out[i]);
-  }
-}
 } // namespace
 
 Gradient computeGradient(const vpImage<unsigned char> &I, const GradientOptions &options)
 {
+  const int rows = static_cast<int>(I.getRows()), cols = static_cast<int>(I.getCols());
+  const cv::Mat image(rows, cols, CV_8U, const_cast<unsigned char *>(I.bitmap));
+
   Gradient gradient;
   gradient.signed_x.resize(I.getRows(), I.getCols());
-  differentiate(I, options.sigma_px, 1 / 255.0, gradient.signed_x);
+  cv::Mat signed_x = view(gradient.signed_x);
+  const int radius = static_cast<int>(std::ceil(3 * options.sigma_px));
+  cv::sepFilter2D(image, signed_x, CV_32F, derivativeKernel(options.sigma_px, radius) / 255.0,
+                  cv::getGaussianKernel(2 * radius + 1, options.sigma_px, CV_32F), {-1, -1}, 0, cv::BORDER_REPLICATE);
 
   if (options.split) { // Eq. 3: split first, then blur each part
-    const cv::Mat image(static_cast<int>(I.getRows()), static_cast<int>(I.getCols()), CV_8U,
-                        const_cast<unsigned char *>(I.bitmap));
     cv::Mat sobel;
     cv::Sobel(image, sobel, CV_32F, 1, 0, 3, 1.0 / (8 * 255.0), 0, cv::BORDER_REPLICATE);
     gradient.negative.resize(I.getRows(), I.getCols());

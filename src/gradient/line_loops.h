@@ -11,17 +11,17 @@ struct LineSamples
 {
   const float *pixels;
   int columns, rows;
-  float x_top, slope;
+  double x_top, slope;
 };
 
 /// Sum of the samples, cubic between columns (Catmull and Rom: with linear interpolation the optimum of an upright line
 /// would snap to whole columns), and of their slopes, plain and times the row.
 struct CubicSums
 {
-  float value = 0, slope = 0, slope_by_row = 0;
+  double value = 0, slope = 0, slope_by_row = 0;
 };
 CubicSums cubicSumsAlong(const LineSamples &line);
 
 /// Sum of the samples, linear between columns.
-float linearSumAlong(const LineSamples &line);
+double linearSumAlong(const LineSamples &line);
 } // namespace bole

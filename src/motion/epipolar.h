@@ -28,8 +28,6 @@ struct Rays
   Rays() = default;
   Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera);
   void add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b);
-  void reserve(std::size_t n);
-  void clear(); ///< keeps the memory
   std::size_t size() const { return a.size(); }
 };
 

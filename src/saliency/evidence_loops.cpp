@@ -173,16 +173,14 @@ void logOddsOfEvidence(const float *evidence, const float *log_prior, const floa
   std::copy_n(is_near, kSteps, share);
   for (std::size_t p = 0; p < pixels; ++p, evidence += kSteps) {
     const float first = evidence[0]; // any will do: what is gathered stays far from where fastExp() is clamped
-    float near = 0, all = 2e-20f;
-#pragma omp simd reduction(+ : near, all)
+    float near = 1e-20f, far = 1e-20f;
+#pragma omp simd reduction(+ : near, far)
     for (int k = 0; k < kSteps; ++k) {
       const float weight = fastExp(evidence[k] - first + prior[k]);
       near += share[k] * weight;
-      all += weight;
+      far += (1 - share[k]) * weight;
     }
-    log_odds[p] = (near + 1e-20f) / std::max(all - near, 1e-20f);
+    log_odds[p] = fastLog(near / far);
   }
-  for (std::size_t p = 0; p < pixels; ++p)
-    log_odds[p] = fastLog(log_odds[p]);
 }
 } // namespace bole

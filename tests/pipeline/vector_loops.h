@@ -3,13 +3,11 @@
 // Everything that the loops over pixels give on made-up images.
 
 #include "detection/window_loops.h"
-#include "gradient/gradient_loops.h"
 #include "gradient/line_loops.h"
 #include "motion/epipolar_loops.h"
 #include "motion/window_loops.h"
 #include "saliency/evidence_loops.h"
 #include "saliency/label_loops.h"
-#include "saliency/pyramid_loops.h"
 #include "saliency/rotation_loops.h"
 #include "smoothing/front_loops.h"
 #include "tracking/profile_loops.h"
@@ -90,12 +88,6 @@ private:
     keep(p);
     keep(confidence);
 
-    std::vector<float> half(kWidth / 2);
-    halvedRow(m_grey.data(), m_grey.data() + kWidth, kWidth / 2, half.data());
-    keep(half);
-    halvedRow(m_image.data(), m_image.data() + kWidth, kWidth / 2, half.data());
-    keep(half);
-
     std::vector<float> ratio(kWidth, 0.f);
     const float *image = m_image.data();
     for (const bool is_paper : {false, true}) {
@@ -175,22 +167,15 @@ private:
 
   void lines()
   {
-    for (const float slope : {0.f, 0.21f, -0.7f}) {
-      const LineSamples line{m_image.data(), kWidth, kHeight, 20.7f, slope};
+    for (const double slope : {0.0, 0.21, -0.7}) {
+      const LineSamples line{m_image.data(), kWidth, kHeight, 20.7, slope};
       const CubicSums sums = cubicSumsAlong(line);
       std::vector<float> whole(16), between(16);
-      addAcrossRow(m_image.data() + 70, 16, 0.3f + slope, whole.data(), between.data());
+      addAcrossRow(m_image.data() + 70, 16, 0.3f + static_cast<float>(slope), whole.data(), between.data());
       keep(whole);
       keep(between);
-      keep(std::vector<float>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line)});
+      keep(std::vector<double>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line)});
     }
-    std::vector<float> blurred(kWidth), across(kWidth - 6);
-    for (const bool is_first : {true, false}) {
-      addPairOfRows(m_grey.data(), m_grey.data() + 3 * kWidth, 0.3f, is_first, kWidth, blurred.data());
-      addDifferenceAcross(blurred.data() + 3, 3, 0.2f, is_first, kWidth - 6, across.data());
-    }
-    keep(blurred);
-    keep(across);
   }
 
   void window()
@@ -225,7 +210,7 @@ private:
     addAgreement(swept, 1.4f, ranges.data(), 80, sum.data(), counts.data());
     keep(sum);
     keep(counts);
-    m_all.push_back(scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data()));
+    scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data());
     keep(scores);
     m_all.push_back(static_cast<double>(sumOfRow(m_image.data() + 5, 203)));
   }

@@ -6,13 +6,11 @@
 #define bole bole_plain
 
 #include "detection/window_loops.cpp"
-#include "gradient/gradient_loops.cpp"
 #include "gradient/line_loops.cpp"
 #include "motion/epipolar_loops.cpp"
 #include "motion/window_loops.cpp"
 #include "saliency/evidence_loops.cpp"
 #include "saliency/label_loops.cpp"
-#include "saliency/pyramid_loops.cpp"
 #include "saliency/rotation_loops.cpp"
 #include "smoothing/front_loops.cpp"
 #include "tracking/profile_loops.cpp"
