@@ -62,10 +62,12 @@ double Engine::farthestJudged() const
   return kFarthest_m / m_metres;
 }
 
-/// Of its place as seen from where it was last seen: the drift of the path up to there tells nothing of whether it is
-/// one trunk, and a plain video drifts more than a flight with a pose filter.
+/// Of its place. A plain video has no frame but its own, so there its place is that as seen from where it was last
+/// seen: the drift of the path up to there, which is more than with a pose filter, does not count.
 Eigen::Matrix2d Engine::placeCovariance(const MapTrunk &trunk) const
 {
+  if (m_motion->scale().source == ScaleSource::odometry)
+    return trunk.covariance.topLeftCorner<2, 2>();
   const std::deque<KeptFrame> &frames = m_album.frames();
   const auto last = std::upper_bound(frames.begin(), frames.end(), trunk.last_seen_s,
                                      [](double time_s, const KeptFrame &frame) { return time_s < frame.time_s; });
@@ -193,7 +195,8 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
         adoptFrom(window, likely, at, nullptr, options);
     }
   }
-  m_smoother.update(); // takes them in: how well each is placed will be asked
+  if (m_motion->scale().source != ScaleSource::odometry)
+    m_smoother.update(); // takes them in: placeCovariance() asks how well each is placed
 }
 
 /// Every hypothesis in the light of all frames.
