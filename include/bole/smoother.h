@@ -210,9 +210,6 @@ public:
   Matrix6d poseCovariance(std::size_t pose) const;
   /// The same of the last pose, cheaper.
   Matrix6d currentPoseCovariance() const;
-  /// That of the place of a trunk in the horizontal plane as seen from the body at \p pose [m^2], in the axes of w:
-  /// what the path since the first pose has drifted is not in it.
-  Eigen::Matrix2d placeCovariance(std::size_t trunk, std::size_t pose) const;
   /// The relative trunk that the newest pose should see.
   RelativeTrunk predictedRelative(std::size_t trunk) const;
   /// Its covariance, from the joint marginal of the newest pose and the trunk.

@@ -26,7 +26,7 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
-         isPlaced(trunk.covariance.topLeftCorner<2, 2>()) && evidence(trunk) >= m_options.confirm_evidence;
+         isPlaced(trunk.covariance) && evidence(trunk) >= m_options.confirm_evidence;
 }
 
 namespace
@@ -310,16 +310,18 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
   return forgotten;
 }
 
-bool TrunkMap::isPlaced(const Eigen::Matrix2d &covariance) const
+bool TrunkMap::isPlaced(const Matrix5d &covariance) const
 {
-  return std::sqrt(covariance.trace()) <= m_options.confirm_position_sigma;
+  return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= m_options.confirm_position_sigma;
 }
 
-void TrunkMap::doubtPlace(int id)
+void TrunkMap::doubtPlaces()
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
-  trunk.status = TrunkStatus::candidate;
-  trunk.fate = TrunkFate::undecided;
+  for (MapTrunk &trunk : m_trunks)
+    if (trunk.status == TrunkStatus::confirmed && !isPlaced(trunk.covariance)) {
+      trunk.status = TrunkStatus::candidate;
+      trunk.fate = TrunkFate::undecided;
+    }
 }
 
 MapUpdate TrunkMap::forgetUnranged()

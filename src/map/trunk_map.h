@@ -230,9 +230,9 @@ public:
   /// forget: nothing else stays in it.
   std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
   /// Whether a place with this covariance is known well enough for a trunk of the map.
-  bool isPlaced(const Eigen::Matrix2d &covariance) const;
-  /// A trunk whose place is not known well enough is a candidate again.
-  void doubtPlace(int id);
+  bool isPlaced(const Matrix5d &covariance) const;
+  /// Trunks whose place is not known well enough are candidates again.
+  void doubtPlaces();
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 

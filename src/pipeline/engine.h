@@ -35,8 +35,6 @@ public:
   const std::vector<Judged> &judged() const { return m_judged; }
 
 private:
-  Eigen::Matrix2d placeCovariance(const MapTrunk &trunk) const;
-  bool isPlaced(const Eigen::Matrix2d &covariance) const;
   std::vector<Judged> judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before = {}) const;
   std::vector<LevelView> levelViews() const;
   Viewpoint viewpointOf(const KeptFrame &frame) const;

@@ -62,25 +62,6 @@ double Engine::farthestJudged() const
   return kFarthest_m / m_metres;
 }
 
-/// Of its place. A plain video has no frame but its own, so there its place is that as seen from where it was last
-/// seen: the drift of the path up to there, which is more than with a pose filter, does not count.
-Eigen::Matrix2d Engine::placeCovariance(const MapTrunk &trunk) const
-{
-  if (m_motion->scale().source == ScaleSource::odometry)
-    return trunk.covariance.topLeftCorner<2, 2>();
-  const std::deque<KeptFrame> &frames = m_album.frames();
-  const auto last = std::upper_bound(frames.begin(), frames.end(), trunk.last_seen_s,
-                                     [](double time_s, const KeptFrame &frame) { return time_s < frame.time_s; });
-  return m_smoother.placeCovariance(trunk.smoother_id, last == frames.begin() ? 0 : std::prev(last)->pose);
-}
-
-/// Whether a place is known well enough for the map, in metres that are as sure as the scale is.
-bool Engine::isPlaced(const Eigen::Matrix2d &covariance) const
-{
-  const double unsure = std::exp(m_motion->scale().sigma);
-  return m_map.isPlaced(covariance / (unsure * unsure));
-}
-
 /// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
 /// \p map: what may hide them.
 std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
@@ -151,7 +132,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
     const MapTrunk &known = m_map.trunk(likely[i].id);
-    const bool is_held = !known.removed && isPlaced(placeCovariance(known)) && reading.is_seen;
+    const bool is_held = !known.removed && m_map.isPlaced(known.covariance) && reading.is_seen;
     if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
       reading.judged = likely[i];
       reading.views.reset();
@@ -195,8 +176,6 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
         adoptFrom(window, likely, at, nullptr, options);
     }
   }
-  if (m_motion->scale().source != ScaleSource::odometry)
-    m_smoother.update(); // takes them in: placeCovariance() asks how well each is placed
 }
 
 /// Every hypothesis in the light of all frames.
@@ -215,10 +194,9 @@ void Engine::decideByAllFrames()
   for (const Reading &reading : readings) {
     if (!reading.judged)
       continue;
-    const Eigen::Matrix2d covariance = reading.views
-                                           ? Eigen::Matrix2d(reading.views->trunk.covariance.topLeftCorner<2, 2>())
-                                           : placeCovariance(m_map.trunk(reading.judged->id));
-    if (isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
+    const Matrix5d &covariance =
+        reading.views ? reading.views->trunk.covariance : m_map.trunk(reading.judged->id).covariance;
+    if (m_map.isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
       again.push_back(*reading.judged);
   }
   const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
@@ -243,8 +221,6 @@ void Engine::decideByAllFrames()
     m_smoother.removeTrunk(gone);
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  for (const MapTrunk &trunk : m_map.trunks())
-    if (trunk.status == TrunkStatus::confirmed && !isPlaced(placeCovariance(trunk)))
-      m_map.doubtPlace(trunk.id);
+  m_map.doubtPlaces();
 }
 } // namespace bole

@@ -79,23 +79,6 @@ Matrix6d Smoother::State::poseCovariance(int pose)
   return inverseForm<6>(&state.variable, &X, 1);
 }
 
-Eigen::Matrix2d Smoother::State::placeCovariance(int trunk, int pose)
-{
-  const TrunkState &seen = trunks[trunk];
-  const PoseState &from = poses[pose];
-  if (!isOpen(seen.variable) || !isOpen(from.variable) || !variables[seen.variable].eliminated ||
-      !variables[from.variable].eliminated)
-    throw vpException(vpException::notInitialized, "trunk = %d, pose = %d, must both be open and taken in by update()",
-                      trunk, pose);
-  const Pose wMb = estimate(from);
-  const Eigen::Vector2d w = estimate(seen).xy - wMb.t.head<2>();
-  const int ids[2] = {from.variable, seen.variable};
-  Eigen::Matrix<double, 2, 6> X[2];
-  X[0] << -wMb.R.topRows<2>(), Eigen::Vector2d(w.y(), -w.x()) * wMb.R.row(2); // a turn carries the place along
-  X[1] << Eigen::Matrix2d::Identity(), Eigen::Matrix<double, 2, 4>::Zero();
-  return inverseForm<2>(ids, X, 2);
-}
-
 /// That of \p which of the coordinates of the relative trunk: \p which takes them from it.
 template <int Columns>
 Eigen::Matrix<double, Columns, Columns>

@@ -247,13 +247,6 @@ RelativeTrunk Smoother::predictedRelative(std::size_t trunk) const
                        m_state->estimate(m_state->trunks[trunk]));
 }
 
-Eigen::Matrix2d Smoother::placeCovariance(std::size_t trunk, std::size_t pose) const
-{
-  m_state->checkTrunk(trunk);
-  m_state->checkPose(pose);
-  return m_state->placeCovariance(static_cast<int>(trunk), static_cast<int>(pose));
-}
-
 Matrix4d Smoother::relativeCovariance(std::size_t trunk) const
 {
   m_state->checkTrunk(trunk);

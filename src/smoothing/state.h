@@ -250,7 +250,6 @@ public:
                                                       int count);
   Matrix5d trunkCovariance(int trunk);
   Matrix6d poseCovariance(int pose);
-  Eigen::Matrix2d placeCovariance(int trunk, int pose);
   template <int Columns>
   Eigen::Matrix<double, Columns, Columns> relativeCovariance(int trunk, const Eigen::Matrix<double, Columns, 4> &which);
   Matrix4d relativeCovariance(int trunk);

@@ -2,9 +2,7 @@
 #include "support/dense_reference.h"
 #include "support/flight.h"
 
-#include "geometry/yaw.h"
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 
 #include <gmock/gmock.h>
 #include <visp3/core/vpException.h>
@@ -46,53 +44,6 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
     EXPECT_TRUE(smoother.relativeCovariance(j).isApprox(expected, 1e-4)) << j;
     EXPECT_NEAR(smoother.bearingVariance(j), expected(2, 2), 1e-4 * expected(2, 2)) << j;
   }
-}
-
-/// Derivatives of a trunk's place as a pose sees it, turned back to the axes of w, by central differences.
-std::pair<Eigen::Matrix<double, 2, 6>, Eigen::Matrix<double, 2, 5>> placeJacobians(const Pose &wMb, const Trunk &trunk)
-{
-  constexpr double kStep = 1e-5;
-  const auto place = [&wMb](const Pose &from, const Trunk &at) {
-    const double turned = yawOf(from) - yawOf(wMb);
-    return Eigen::Vector2d(Eigen::Rotation2Dd(-turned) * (at.xy - from.t.head<2>()));
-  };
-  Eigen::Matrix<double, 2, 6> by_pose;
-  Eigen::Matrix<double, 2, 5> by_trunk;
-  for (int k = 0; k < 6; ++k) {
-    const Vector6d step = kStep * Vector6d::Unit(k);
-    by_pose.col(k) = (place(wMb.plus(step), trunk) - place(wMb.plus(-step), trunk)) / (2 * kStep);
-  }
-  for (int k = 0; k < 5; ++k) {
-    const Vector5d step = kStep * Vector5d::Unit(k);
-    by_trunk.col(k) = (place(wMb, trunk.plus(step)) - place(wMb, trunk.plus(-step))) / (2 * kStep);
-  }
-  return {by_pose, by_trunk};
-}
-
-TEST(Marginals, ThePlaceAsAPoseSeesItHasNotTheDriftOfThePath)
-{
-  FlightOptions o;
-  o.poses = 50;
-  const Flight flight = simulateFlight(o);
-  Replay replay(flight, smootherFor(o));
-  replay.run();
-  Smoother &smoother = replay.smoother;
-  smoother.optimize(1e-12);
-  DenseReference dense(smoother.graph());
-  const Eigen::MatrixXd C = dense.covariance();
-  const int p = dense.poseRow(30);
-  int narrower = 0;
-  for (std::size_t j = 0; j < smoother.trunkCount(); ++j) {
-    const int t = dense.trunkRow(j);
-    const auto [A, B] = placeJacobians(smoother.pose(30), smoother.trunk(j));
-    const Eigen::Matrix2d cross = A * C.block(p, t, 6, 5) * B.transpose();
-    const Eigen::Matrix2d expected =
-        A * C.block(p, p, 6, 6) * A.transpose() + B * C.block(t, t, 5, 5) * B.transpose() + cross + cross.transpose();
-    EXPECT_LT((smoother.placeCovariance(j, 30) - expected).norm(), 0.02 * expected.norm()) << j;
-    narrower += expected.trace() < C.block(t, t, 2, 2).trace();
-  }
-  EXPECT_GT(2 * narrower, static_cast<int>(smoother.trunkCount()));
-  EXPECT_THROW(smoother.placeCovariance(0, 50), vpException);
 }
 
 /// Share of runs whose NEES, summed over trunks (or averaged over poses), lies in its 95 %
