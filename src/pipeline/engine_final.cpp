@@ -182,6 +182,9 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
 void Engine::decideByAllFrames()
 {
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
+  MapOptions unsure = m_units.map; // metres are as sure as the scale is: those of a plain video are a guess
+  unsure.confirm_position_sigma *= std::exp(m_motion->scale().sigma);
+  m_map.setOptions(unsure);
   const std::vector<LevelView> views = levelViews();
   const std::vector<Judged> before = judgeAll(views);
   AlbumGradients gradients(m_album.frames(), m_units.gradient);
