@@ -28,6 +28,8 @@ struct Rays
   Rays() = default;
   Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera);
   void add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b);
+  void reserve(std::size_t n);
+  void clear(); ///< keeps the memory
   std::size_t size() const { return a.size(); }
 };
 
@@ -51,8 +53,9 @@ public:
     const Eigen::Vector3d line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
     return x_a.dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24);
   }
-  /// \p J by (phi, tau).
-  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J) const
+  /// \p J by (phi, tau); \p by_b by \p x_b, where asked for.
+  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J,
+                  Eigen::Vector3d *by_b = nullptr) const
   {
     const Eigen::Vector3d p = m_R * x_b, line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
     const Eigen::Vector3d flat_a(line_a.x(), line_a.y(), 0), flat_b(line_b.x(), line_b.y(), 0);
@@ -60,9 +63,11 @@ public:
     const double inverse_root = 1 / std::sqrt(S), algebraic = x_a.dot(line_a);
     const double share = algebraic / S;
     const Eigen::Vector3d by_direction = p.cross(x_a - share * flat_a) - share * (m_R * flat_b).cross(x_a);
-    J.head<3>() =
-        inverse_root * (x_b.cross(line_b - share * (m_E.transpose() * flat_a)) + share * line_b.cross(flat_b));
+    const Eigen::Vector3d across = line_b - share * (m_E.transpose() * flat_a);
+    J.head<3>() = inverse_root * (x_b.cross(across) + share * line_b.cross(flat_b));
     J.tail<2>() = inverse_root * (m_B.transpose() * by_direction);
+    if (by_b)
+      *by_b = inverse_root * across;
     return algebraic * inverse_root;
   }
 

@@ -26,11 +26,9 @@ void PointMotion::track(const Frame &frame)
     return;
   }
   Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
-  if (!m_seen.empty()) {
-    if (const auto turned = gyroSince(m_seen.back().stamp_ns, frame.stamp_ns)) {
-      expected = m_bMc.R.transpose() * turned->R * m_bMc.R;
-    }
-  }
+  m_turned = m_seen.empty() ? std::nullopt : gyroSince(m_seen.back().stamp_ns, frame.stamp_ns);
+  if (m_turned)
+    expected = m_bMc.R.transpose() * m_turned->R * m_bMc.R;
   m_tracker.track(frame.image, expected);
   m_seen.push_back({frame.stamp_ns, number, frame.wMb_odometry});
   if (m_seen.size() > static_cast<std::size_t>(PointTracker::kHistory)) {
@@ -81,7 +79,7 @@ RelativePosePrior PointMotion::expect(RelativeMotion &step, int frames_back, boo
   step.a_index = a.index;
   step.b_index = b.index;
   RelativePosePrior prior;
-  step.gyro = gyroSince(a.stamp_ns, b.stamp_ns);
+  step.gyro = frames_back == 1 ? m_turned : gyroSince(a.stamp_ns, b.stamp_ns);
   if (step.gyro) {
     prior.aRb = m_bMc.R.transpose() * step.gyro->R * m_bMc.R;
     prior.rotation_covariance = m_bMc.R.transpose() * step.gyro->covariance() * m_bMc.R;

@@ -102,6 +102,7 @@ private:
   GyroBias m_bias;
   std::deque<Seen> m_seen;                ///< oldest first, the current frame last
   std::vector<GyroSample> m_gyro;         ///< since the oldest frame of m_seen
+  std::optional<GyroRotation> m_turned;   ///< from the good frame before to the newest
   std::size_t m_frames = 0;               ///< that came, good or not
   std::int64_t m_bias_until_ns = 0;       ///< end of the last interval that taught the bias
   std::string m_fault;                    ///< of the newest image

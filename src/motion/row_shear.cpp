@@ -21,14 +21,14 @@ struct ShearFit
 };
 
 /// Residual of a match under a motion and a shear, and its derivative by (phi, tau, shear).
-double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Matrix3d &E, const Eigen::Vector3d &x_a,
-                       Eigen::Vector3d x_b, double shear, Vector6d &J)
+double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Vector3d &x_a, Eigen::Vector3d x_b, double shear,
+                       Vector6d &J)
 {
   x_b.x() -= shear * x_b.y();
   Vector5d by_motion;
-  const double residual = epipolar.residual(x_a, x_b, by_motion);
-  const Eigen::Vector2d line_a = (E * x_b).head<2>(), line_b = (E.transpose() * x_a).head<2>();
-  J << by_motion, -x_b.y() * line_b.x() / std::sqrt(line_a.squaredNorm() + line_b.squaredNorm() + 1e-24);
+  Eigen::Vector3d by_b;
+  const double residual = epipolar.residual(x_a, x_b, by_motion, &by_b);
+  J << by_motion, -x_b.y() * by_b.x();
   return residual;
 }
 
@@ -44,9 +44,8 @@ ShearFit fitShear(const motion::Rays &rays, motion::Motion motion, const motion:
   std::vector<Vector6d> derivatives(rays.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const motion::Epipolar epipolar(motion);
-    const Eigen::Matrix3d E = skew(motion.direction) * motion.aRb;
     for (std::size_t i = 0; i < rays.size(); ++i)
-      residuals[i] = shearedResidual(epipolar, E, rays.a[i], rays.b[i], shear, derivatives[i]);
+      residuals[i] = shearedResidual(epipolar, rays.a[i], rays.b[i], shear, derivatives[i]);
     const double sigma = std::max(min_sigma, motion::bulkSigma(residuals));
     Matrix6d H = Matrix6d::Zero();
     Vector6d g = Vector6d::Zero();
