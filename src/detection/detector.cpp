@@ -41,6 +41,11 @@ ViewColumns columnsOf(const std::vector<PlaneView> &views)
     put(columns.q_last, q_last);
     put(columns.by_step, 1 / step);
   };
+  std::size_t samples = 0;
+  for (const PlaneView &view : views)
+    samples += view.profile->mean.size();
+  columns.rising_peak.reserve(samples);
+  columns.falling_peak.reserve(samples);
   for (const PlaneView &view : views) {
     const LevelProfile &profile = *view.profile;
     add(view.position - views.back().position, view, profile.q_first, profile.qLast(), profile.step);
@@ -81,8 +86,8 @@ struct PairHypothesis
 /// of their pair.
 struct RangeCurve
 {
-  std::vector<float> sum;  ///< of agreement over the views that see it, by range
-  std::vector<float> seen; ///< how many those are
+  float *sum;  ///< of agreement over the views that see it, by range
+  float *seen; ///< how many those are
 };
 
 /// Ranges swept, uniform in inverse depth: near enough for no focus to fall between two.
@@ -91,14 +96,16 @@ std::vector<float> sweptRanges(const DetectorOptions &options)
   constexpr int kRanges = 80;
   const double far = 1 / (1.2 * options.range_max), near = 1 / options.range_min;
   std::vector<float> ranges;
+  ranges.reserve(kRanges);
   for (int i = 0; i < kRanges; ++i)
     ranges.push_back(static_cast<float>(1 / (far + (near - far) * i / (kRanges - 1))));
   return ranges;
 }
 
-RangeCurve sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<float> &ranges)
+/// Adds to \p curve, which is zero.
+void sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<float> &ranges,
+           const RangeCurve &curve)
 {
-  RangeCurve curve{std::vector<float>(ranges.size(), 0.f), std::vector<float>(ranges.size(), 0.f)};
   const PlaneView &now = views.back();
   const Vector2d direction = (now.forward + peak.q * now.left).normalized();
   for (std::size_t v = 0; v + 1 < views.size(); ++v) {
@@ -112,10 +119,9 @@ RangeCurve sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, c
                          static_cast<float>(1 / profile.step),
                          (peak.contrast > 0 ? profile.rising : profile.falling).data(),
                          static_cast<int>(profile.mean.size())};
-    addAgreement(view, static_cast<float>(1 / peak.contrast), ranges.data(), static_cast<int>(ranges.size()),
-                 curve.sum.data(), curve.seen.data());
+    addAgreement(view, static_cast<float>(1 / peak.contrast), ranges.data(), static_cast<int>(ranges.size()), curve.sum,
+                 curve.seen);
   }
-  return curve;
 }
 
 struct SweepResult
@@ -136,10 +142,11 @@ std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &lef
   const auto end = std::lower_bound(begin, ranges.end(), options.radius_min, isWider);
   const std::size_t first = static_cast<std::size_t>(begin - ranges.begin());
   scores.resize(static_cast<std::size_t>(end - begin));
-  scoresOfPair({left.sum.data() + first, left.seen.data() + first},
-               {right.sum.data() + first, right.seen.data() + first}, static_cast<int>(scores.size()), kLeastViews,
-               scores.data());
+  const float best = scoresOfPair({left.sum + first, left.seen + first}, {right.sum + first, right.seen + first},
+                                  static_cast<int>(scores.size()), kLeastViews, scores.data());
   std::vector<SweepResult> maxima;
+  if (best < options.agreement_min)
+    return maxima;
   for (std::size_t i = 0; i < scores.size(); ++i)
     if (scores[i] >= options.agreement_min && (i == 0 || scores[i] >= scores[i - 1]) &&
         (i + 1 == scores.size() || scores[i] > scores[i + 1]))
@@ -306,6 +313,7 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
   if (static_cast<int>(views.size()) < kLeastViews)
     return found;
   std::vector<PlaneView> plane;
+  plane.reserve(views.size());
   for (const DetectorView &view : views) {
     const Vector3d axis = view.wMc.R.col(2);
     const Vector2d forward = axis.head<2>().normalized();
@@ -316,10 +324,15 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
   const ViewColumns columns = columnsOf(plane);
   const std::vector<float> ranges = sweptRanges(options);
   std::vector<float> scores;
+  std::vector<float> sums(2 * peaks.size() * ranges.size(), 0.f);
   std::vector<RangeCurve> curves;
   std::vector<HalfBearing> bearings;
+  curves.reserve(peaks.size());
+  bearings.reserve(peaks.size());
   for (const ProfilePeak &peak : peaks) {
-    curves.push_back(sweep(plane, peak, ranges));
+    float *sum = sums.data() + 2 * curves.size() * ranges.size();
+    curves.push_back({sum, sum + ranges.size()});
+    sweep(plane, peak, ranges, curves.back());
     bearings.emplace_back(peak.q);
   }
   for (std::size_t i = 0; i < peaks.size(); ++i)

@@ -78,15 +78,18 @@ void addAgreement(const SweptView &view, float by_contrast, const float *ranges,
 }
 
 BOLE_VECTOR_CLONES
-void scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count, float views_min,
-                  float *__restrict scores)
+float scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count, float views_min,
+                   float *__restrict scores)
 {
   const float *left_sum = left.sum, *left_seen = left.seen, *right_sum = right.sum, *right_seen = right.seen;
-#pragma omp simd
+  float best = -1;
+#pragma omp simd reduction(max : best)
   for (int i = 0; i < count; ++i) {
     const float seen = left_seen[i] + right_seen[i], mean = (left_sum[i] + right_sum[i]) / std::max(seen, 1.f);
     scores[i] = std::min(left_seen[i], right_seen[i]) >= views_min ? mean : -1;
+    best = best > scores[i] ? best : scores[i];
   }
+  return best;
 }
 
 BOLE_VECTOR_CLONES

@@ -44,12 +44,13 @@ struct SweptView
 /// Adds to \p sum how well the profile continues a contrast at each range, and to \p seen where it says anything.
 void addAgreement(const SweptView &view, float by_contrast, const float *ranges, int count, float *sum, float *seen);
 
-/// Mean agreement of two borders at each range that at least \p views_min views see of each; -1 elsewhere.
+/// Mean agreement of two borders at each range that at least \p views_min views see of each; -1 elsewhere. Returns the
+/// best.
 struct BorderCurve
 {
   const float *sum, *seen;
 };
-void scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count, float views_min, float *scores);
+float scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count, float views_min, float *scores);
 
 /// Sum of \p n numbers.
 float sumOfRow(const float *numbers, int n);

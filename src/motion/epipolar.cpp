@@ -30,9 +30,26 @@ namespace bole::motion
 {
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
 {
+  reserve(matches.size());
   for (const PointMatch &match : matches) {
     add(camera.ray(match.a_px), camera.ray(match.b_px));
   }
+}
+
+void Rays::reserve(std::size_t n)
+{
+  a.reserve(n);
+  b.reserve(n);
+  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
+    column->reserve(n);
+}
+
+void Rays::clear()
+{
+  a.clear();
+  b.clear();
+  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
+    column->clear();
 }
 
 void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
@@ -308,21 +325,21 @@ std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i
   return d.normalized();
 }
 
-Rays drawn(const Rays &rays, std::mt19937 &random, std::size_t n)
+void drawFrom(const Rays &rays, std::mt19937 &random, std::size_t n, Rays &sample)
 {
-  Rays sample;
+  sample.clear();
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = draw(random);
     sample.add(rays.a[k], rays.b[k]);
   }
-  return sample;
 }
 } // namespace
 
 std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
                                  const RelativePoseOptions &options)
 {
+  constexpr std::size_t kSample = 6; // matches that a hypothesis is fitted to: five would do, one for the noise
   std::mt19937 random(kSeed);
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   const bool rotation_known = prior.has_rotation;
@@ -331,6 +348,9 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
+  scored.reserve(kHypotheses + 1);
+  Rays sample;
+  sample.reserve(kSample);
   for (int hypothesis = 0; hypothesis < (rotation_known ? (kHypotheses + 1) / 2 : kHypotheses); ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
@@ -340,7 +360,8 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
       JointFit fit;
       fit.motion = motion;
       fit.sigma = 3 * sigma;
-      descend(drawn(rays, random, 6), fit, free, few);
+      drawFrom(rays, random, kSample, sample);
+      descend(sample, fit, free, few);
       motion = fit.motion;
     }
     scored.emplace_back(costAt(rays, motion, free, sigma, options), motion);

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fmt/format.h>
 #include <optional>
 #include <visp3/core/vpException.h>
@@ -27,6 +28,12 @@ constexpr int kLevels = 3;               ///< pyramid levels above the image: 3 
 constexpr double kMostBackward_px = 0.3; ///< forward-backward error above which a track ends
 constexpr double kEnough = 0.5;          ///< of the tracks: fewer, and the picture may have turned out of their reach
 constexpr double kMargin_px = 4;         ///< from the border of the image
+
+struct Corner
+{
+  float response;
+  cv::Point at;
+};
 } // namespace
 
 struct PointTracker::State
@@ -38,7 +45,8 @@ struct PointTracker::State
   std::size_t frames = 0;
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
-  std::vector<unsigned char> peaks; ///< of a row
+  std::vector<unsigned char> peaks;         ///< of a row
+  std::vector<std::vector<Corner>> corners; ///< of each cell
 
   template <typename Start>
   std::pair<std::vector<std::optional<Eigen::Vector2d>>, std::size_t> search(const Start &start) const;
@@ -63,12 +71,6 @@ public:
 private:
   cv::Mat m_mask;
   double m_distance;
-};
-
-struct Corner
-{
-  float response;
-  cv::Point at;
 };
 
 /// The corner to a fraction of a pixel: the vertex of the parabola through the responses, per axis.
@@ -178,15 +180,20 @@ void PointTracker::State::replenish(const cv::Mat &image)
     occupied.add(toCv(track.current()));
     ++held[cellOf(track.current().x(), track.current().y())];
   }
-  std::vector<std::vector<Corner>> corners(static_cast<std::size_t>(cells));
+  corners.resize(static_cast<std::size_t>(cells));
+  for (auto &cell : corners)
+    cell.clear();
   const int margin = std::max(2, cvCeil(kMargin_px) + 1);
   peaks.resize(static_cast<std::size_t>(image.cols));
   for (int y = margin; y < image.rows - margin; ++y) {
     const float *r = response.ptr<float>(y);
     peaksOfRow(r, image.cols, threshold, peaks.data());
-    const auto end = peaks.end() - margin;
-    for (auto peak = std::find(peaks.begin() + margin, end, 1); peak != end; peak = std::find(peak + 1, end, 1)) {
-      const int x = static_cast<int>(peak - peaks.begin());
+    for (int x = margin - 1;;) {
+      const void *peak = std::memchr(&peaks[static_cast<std::size_t>(x + 1)], 1,
+                                     static_cast<std::size_t>(image.cols - margin - x - 1));
+      if (!peak)
+        break;
+      x = static_cast<int>(static_cast<const unsigned char *>(peak) - peaks.data());
       corners[cellOf(x, y)].push_back({r[x], {x, y}});
     }
   }

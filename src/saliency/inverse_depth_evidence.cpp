@@ -167,6 +167,7 @@ vpImage<float> InverseDepthEvidence::logOddsNear() const
 double medianParallax(const PinholeCamera &camera, const Pose &oMc, double range)
 {
   std::vector<double> flows;
+  flows.reserve(64);
   const Eigen::Vector3d ct = oMc.R.transpose() * oMc.t;
   for (int i = 0; i < 8; ++i)
     for (int j = 0; j < 8; ++j) {

@@ -126,6 +126,7 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   addMotion(gyro, translation);
   if (isStale(image)) {
     Saliency result = m_last;
+    fill(m_labels, result);
     result.status = SaliencyStatus::stale;
     result.pRc.setIdentity();
     result.covariance.setZero();
@@ -135,19 +136,18 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   result.unknown_below = kUnknownBelow;
   View view{ImagePyramid(image, m_camera, m_options.levels, m_options.finest_level), {}};
   if (m_views.empty()) {
-    vpImage<float> none(static_cast<unsigned>(m_camera.height), static_cast<unsigned>(m_camera.width));
-    none = m_evidence.priorLogOdds();
-    fill(none, 0, 1, m_evidence.priorLogOdds(), result);
+    const float prior = m_evidence.priorLogOdds();
+    m_labels = {vpImage<float>(image.getHeight(), image.getWidth(), prior), 0, 1, prior};
   }
   else {
     const RotationEm rotation = refineRotation(view.pyramid, result);
     if (asksForRange()) {
       view.vMc = m_views.front().vMc * Pose(result.pRc, m_translation->pt);
       m_views.push_front(std::move(view));
-      labelByRange(m_views.front().pyramid, result);
+      m_labels = labelByRange(m_views.front().pyramid, result);
     }
     else {
-      labelByMotion(rotation, result);
+      m_labels = labelByMotion(rotation);
       m_views.clear();
       m_evidence.clear();
     }
@@ -160,6 +160,8 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   m_last_image = image;
   m_last = result;
   m_has_pending_motion = false;
+  fill(m_labels, result);
+  m_last.unknown_share = result.unknown_share;
   return result;
 }
 
@@ -218,7 +220,7 @@ RotationEm SaliencyEstimator::refineRotation(const ImagePyramid &current, Salien
   return rotation;
 }
 
-void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &result)
+SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &result)
 {
   const int level = workingLevel(m_camera, m_options);
   const PyramidLevel &now = current[level];
@@ -235,33 +237,33 @@ void SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &resu
     break;
   }
   result.asks_for_range = true;
-  fill(m_evidence.logOddsNear(), level, InverseDepthEvidence::kRowStep, m_evidence.priorLogOdds(), result);
+  return {m_evidence.logOddsNear(), level, InverseDepthEvidence::kRowStep, m_evidence.priorLogOdds()};
 }
 
-void SaliencyEstimator::labelByMotion(const RotationEm &rotation, Saliency &result) const
+SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByMotion(const RotationEm &rotation) const
 {
   const double prior = m_options.background_prior;
   const float prior_log_odds = static_cast<float>(std::log((1 - prior) / prior));
   vpImage<float> log_odds = windowMean(rotation.log_ratio, m_options.label_window_px);
   for (unsigned p = 0; p < log_odds.getSize(); ++p)
     log_odds.bitmap[p] = prior_log_odds - log_odds.bitmap[p];
-  fill(log_odds, workingLevel(m_camera, m_options), 1, prior_log_odds, result);
+  return {std::move(log_odds), workingLevel(m_camera, m_options), 1, prior_log_odds};
 }
 
-/// \p log_odds_near: of each \p row_step-th row of \p level.
-void SaliencyEstimator::fill(const vpImage<float> &log_odds_near, int level, int row_step, float prior_log_odds,
-                             Saliency &result) const
+/// The labels at full size.
+void SaliencyEstimator::fill(const CoarseLabels &labels, Saliency &result) const
 {
+  const vpImage<float> &log_odds = labels.log_odds;
   const unsigned height = static_cast<unsigned>(m_camera.height), width = static_cast<unsigned>(m_camera.width);
   result.p_background.resize(height, width);
   result.confidence.resize(height, width);
-  const float scale = std::ldexp(1.f, -level);
-  const ColumnsBetween columns = between(m_camera.width, static_cast<int>(log_odds_near.getWidth()), scale, 1);
-  const ColumnsBetween rows = between(m_camera.height, static_cast<int>(log_odds_near.getHeight()), scale, row_step);
+  const float scale = std::ldexp(1.f, -labels.level);
+  const ColumnsBetween columns = between(m_camera.width, static_cast<int>(log_odds.getWidth()), scale, 1);
+  const ColumnsBetween rows = between(m_camera.height, static_cast<int>(log_odds.getHeight()), scale, labels.row_step);
   int unknown = 0;
   for (unsigned i = 0; i < height; ++i) {
     const int above = rows.left[i];
-    unknown += labelsOfRow(log_odds_near[above], log_odds_near[above + 1], rows.share[i], columns, prior_log_odds,
+    unknown += labelsOfRow(log_odds[above], log_odds[above + 1], rows.share[i], columns, labels.prior,
                            result.unknown_below, result.p_background[i], result.confidence[i]);
   }
   result.unknown_share = static_cast<double>(unknown) / std::max(1u, height * width);

@@ -82,20 +82,28 @@ private:
     ImagePyramid pyramid;
     Pose vMc; ///< camera in the frame of the first view kept
   };
+  /// Log odds of being near, of each \p row_step-th row of \p level.
+  struct CoarseLabels
+  {
+    vpImage<float> log_odds;
+    int level = 0, row_step = 1;
+    float prior = 0; ///< log odds before looking
+  };
   bool isStale(const vpImage<unsigned char> &image) const;
   bool asksForRange() const { return m_options.use_translation && m_translation; }
   void addMotion(const std::optional<RotationPrior> &gyro, const std::optional<TranslationPrior> &translation);
   RotationEm refineRotation(const ImagePyramid &current, Saliency &result) const;
-  void labelByRange(const ImagePyramid &current, Saliency &result);
-  void labelByMotion(const RotationEm &rotation, Saliency &result) const;
-  void fill(const vpImage<float> &log_odds_near, int level, int row_step, float prior_log_odds, Saliency &result) const;
+  CoarseLabels labelByRange(const ImagePyramid &current, Saliency &result);
+  CoarseLabels labelByMotion(const RotationEm &rotation) const;
+  void fill(const CoarseLabels &labels, Saliency &result) const;
 
   PinholeCamera m_camera;
   SaliencyOptions m_options;
   InverseDepthEvidence m_evidence;
   std::deque<View> m_views; ///< newest first
   vpImage<unsigned char> m_last_image;
-  Saliency m_last;
+  Saliency m_last; ///< without its images, which m_labels gives again
+  CoarseLabels m_labels;
   Eigen::Matrix3d m_last_turn = Eigen::Matrix3d::Identity();
   std::optional<RotationPrior> m_gyro; ///< since the last image used
   std::optional<TranslationPrior> m_translation;

@@ -91,13 +91,25 @@ void Smoother::State::assembleChild(const Variable &child)
   }
   const int m = child.separator_dim, ld = front_rows;
   const int *map = child_map.data();
+  child_run.resize(static_cast<std::size_t>(m));
+  for (int r = m - 1, end = m; r >= 0; --r) {
+    child_run[static_cast<std::size_t>(r)] = end;
+    if (r > 0 && map[r] != map[r - 1] + 1)
+      end = r;
+  }
   const double *from = child.contribution.data();
   double *F = front.data();
   for (int c = 0; c < m; ++c) {
     if (rising) {
       double *column = F + map[c] * ld;
-      for (int r = c; r < m; ++r)
-        column[map[r]] += *from++;
+      for (int r = c; r < m;) { // a variable's rows stand together, and often those of the next
+        const int end = child_run[static_cast<std::size_t>(r)];
+        double *to = column + map[r];
+        for (int k = 0; k < end - r; ++k)
+          to[k] += from[k];
+        from += end - r;
+        r = end;
+      }
     }
     else {
       for (int r = c; r < m; ++r) {

@@ -274,6 +274,7 @@ public:
   std::vector<Descent> stack;
   std::vector<double> front;
   std::vector<int> position, child_map; ///< of a variable in the front
+  std::vector<int> child_run;           ///< where the rows end that stand together in the front
   std::vector<std::array<double, 36>> path_rows;
   std::vector<int> path;
   std::vector<int> open_trunks; ///< variables, for the lag

@@ -100,7 +100,10 @@ std::vector<float> meanAcross(const vpImage<float> &g, const BorderLine &line, d
   constexpr int kTogether = 8; // offsets that are worked on at once
   const int steps = int(std::ceil(half_px / kStep_px)), half = (steps + 1) / 2, n = 2 * half + 1;
   const int padded = (n + kTogether - 1) / kTogether * kTogether, columns = int(g.getCols());
-  std::vector<float> whole(std::size_t(padded), 0.f), between(std::size_t(padded), 0.f), mean;
+  thread_local std::vector<float> whole, between;
+  whole.assign(std::size_t(padded), 0.f);
+  between.assign(std::size_t(padded), 0.f);
+  std::vector<float> mean;
   for (int i = 0; i < line.rows(); ++i) {
     const float *row = g[line.row_begin + i];
     const double x = line.x_top + line.slope * i, left = std::floor(x);
@@ -132,6 +135,7 @@ std::vector<BorderPeak> peaksOf(const std::vector<float> &contrast, double step_
 {
   std::vector<BorderPeak> peaks;
   const int n = int(contrast.size()), middle = n / 2;
+  peaks.reserve(contrast.size() / 2); // no two stand side by side
   for (int k = 1; k + 1 < n; ++k) {
     const float *at = contrast.data() + k;
     const double a = std::abs(at[-1]), b = std::abs(at[0]), c = std::abs(at[1]);

@@ -23,6 +23,7 @@ std::vector<PeakPair> pairPeaks(const std::vector<BorderPeak> &left, const std::
                                 const PairPrior &prior, std::size_t most)
 {
   std::vector<PeakPair> pairs;
+  pairs.reserve(std::max<std::size_t>(left.size(), 1) * std::max<std::size_t>(right.size(), 1));
   if (!left.empty() && !right.empty()) {
     const Eigen::Matrix2d information = prior.covariance_px.inverse();
     for (const BorderPeak &l : left)

@@ -210,7 +210,7 @@ private:
     addAgreement(swept, 1.4f, ranges.data(), 80, sum.data(), counts.data());
     keep(sum);
     keep(counts);
-    scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data());
+    m_all.push_back(scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data()));
     keep(scores);
     m_all.push_back(static_cast<double>(sumOfRow(m_image.data() + 5, 203)));
   }
