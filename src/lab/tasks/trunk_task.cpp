@@ -215,7 +215,6 @@ TaskCommand TrunkTask::act(const FrameReport &report)
     m_blocked = 0;
   }
   const double round = is_free ? wanted : 0;
-  m_obeyed = response().obeyed();
   TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
   command.velocity.z() = sway.y();
   if (sway != Eigen::Vector2d::Zero())
@@ -240,7 +239,7 @@ Eigen::Vector2d TrunkTask::swayNow(double time_s)
 /// Sent anew where it was cut: of two sent at one time the later counts.
 void TrunkTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
 {
-  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), obeying(velocity, m_obeyed));
+  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), obeying(velocity, response().obeyed()));
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
@@ -323,6 +322,6 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0,
                            std::clamp(v[1], -kLargestTurnRate, kLargestTurnRate));
   m_response.send(time_s, velocity);
-  return obeying(velocity, 1 / m_obeyed);
+  return obeying(velocity, 1 / response().obeyed());
 }
 } // namespace bole

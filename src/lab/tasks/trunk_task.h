@@ -89,7 +89,7 @@ private:
   Sidestep m_sidestep;
   vpServo m_servo;
   vpFeatureTrunk m_current, m_desired; ///< as it will stand when the command acts; as it should
-  DroneResponse m_response;
+  DroneResponse m_response; ///< with what is flown of what is sent
   FeatureFilter m_bearing, m_log_ratio; ///< at the frame
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
@@ -99,7 +99,6 @@ private:
   double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;          ///< frames in a row
   double m_sway_start_s = -1; ///< -1: has not begun
-  double m_obeyed = 1;        ///< share of what is sent that is flown: m_response holds what is flown
   bool m_has_feature = false;
 };
 } // namespace bole
