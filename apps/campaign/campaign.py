@@ -340,19 +340,24 @@ def picture(draw, width=6.4, height=3.6):
     return '<img alt="" src="data:image/svg+xml;base64,' + base64.b64encode(out.getvalue()).decode() + '">'
 
 
+def plot_shares(axes, colour, label, shares, marks_only=False):
+    """Shares k of n at x with their 95 % intervals; \p shares: (x, k, n), of which those with n = 0 say nothing."""
+    shares = [(x, k / n, *wilson(k, n)) for x, k, n in shares if n]
+    if shares:
+        x, y, low, high = zip(*shares)
+        reach = [[max(0, v - l) for v, l in zip(y, low)], [max(0, h - v) for v, h in zip(y, high)]]
+        axes.errorbar(x, y, reach, color=colour, marker="o", capsize=3, label=label, linestyle="none" if marks_only else "-")
+
+
 def recall_by(trunks, runs, key, edges, label):
     def draw(axes):
         for colour, run in zip(COLOURS, runs):
             mine = [t for t in trunks if t["run"] == run and t.get(key) not in (None, "") and (t["kind"] == "missed" or t.get("expected") in (True, "True"))]
-            xs, ys, lows, highs = [], [], [], []
+            shares = []
             for low, high in zip(edges, edges[1:]):
                 some = [t for t in mine if low <= float(t[key]) < high]
-                if some:
-                    k = sum(t["kind"] == "matched" for t in some)
-                    a, b = wilson(k, len(some))
-                    xs.append(0.5 * (low + high)), ys.append(k / len(some)), lows.append(max(0, k / len(some) - a)), highs.append(max(0, b - k / len(some)))
-            if xs:
-                axes.errorbar(xs, ys, [lows, highs], color=colour, marker="o", capsize=3, label=run)
+                shares.append((0.5 * (low + high), sum(t["kind"] == "matched" for t in some), len(some)))
+            plot_shares(axes, colour, run, shares)
         if not axes.has_data():
             return False
         axes.set(xlabel=label, ylabel="recall (95 % interval)", ylim=(0, 1.05))
@@ -368,14 +373,12 @@ def reliability(trunks, runs):
         for colour, run in zip(COLOURS, runs):
             mine = [t for t in trunks if t["run"] == run and t["kind"] != "missed" and t.get("probability") not in (None, "")]
             edges = [0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.001]
+            shares = []
             for low, high in zip(edges, edges[1:]):
                 some = [t for t in mine if low <= float(t["probability"]) < high]
-                if some:
-                    k = sum(t["kind"] == "matched" for t in some)
-                    a, b = wilson(k, len(some))
-                    x = sum(float(t["probability"]) for t in some) / len(some)
-                    axes.errorbar([x], [k / len(some)], [[max(0, k / len(some) - a)], [max(0, b - k / len(some))]], color=colour, marker="o", capsize=3,
-                                  label=run if f"{run}" not in axes.get_legend_handles_labels()[1] else None)
+                mean = sum(float(t["probability"]) for t in some) / max(1, len(some))
+                shares.append((mean, sum(t["kind"] == "matched" for t in some), len(some)))
+            plot_shares(axes, colour, run, shares, marks_only=True)
         if not axes.has_data():
             return False
         axes.plot([0.4, 1], [0.4, 1], color="0.6", linestyle="--")
@@ -418,34 +421,22 @@ def errors_by(trunks, flights, runs, key, error, label):
     return picture(draw)
 
 
-def sweeps(campaign, flights):
-    """Share of the runs that succeed against each option that was swept, a curve a task."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, len(campaign.swept), figsize=(3.4 * len(campaign.swept), 3.2), sharey=True, squeeze=False)
-    for axes, (option, tasks) in zip(panels[0], campaign.swept.items()):
-        for colour, (name, runs) in zip(COLOURS, tasks.items()):
-            points = []
+def sweep(campaign, flights, option):
+    """Share of the runs that succeed against an option that was swept, a curve a task."""
+    def draw(axes):
+        for colour, (name, runs) in zip(COLOURS, campaign.swept[option].items()):
+            shares = []
             for value, run in runs:
                 some = [bool(f["success"]) for f in flights if f["run"] == run and f["ok"] and "success" in f]
-                if some:
-                    share = sum(some) / len(some)
-                    low, high = wilson(sum(some), len(some))
-                    points.append((value, share, max(0, share - low), max(0, high - share)))
-            if points:
-                x, y, below, above = zip(*points)
-                axes.errorbar(x, y, [below, above], color=colour, marker="o", markersize=4, capsize=3, label=name)
-        axes.set(xlabel=option, ylim=(0, 1.05))
-    panels[0][0].set_ylabel("share that succeeded (95 %)")
-    panels[0][0].legend()
-    figure.tight_layout()
-    out = io.StringIO()
-    figure.savefig(out, format="svg")
-    plt.close(figure)
-    return out.getvalue()
+                shares.append((value, sum(some), len(some)))
+            plot_shares(axes, colour, name, shares)
+        if not axes.has_data():
+            return False
+        axes.set(xlabel=option, ylabel="share that succeeded (95 %)", ylim=(0, 1.05))
+        axes.legend()
+        return True
+
+    return picture(draw, 4.2, 3.2)
 
 
 def spread(flights, runs, name, label, honest=None):
@@ -534,7 +525,7 @@ def write_page(campaign, path):
               spread(flights, runs, "radius_rmse_m", "radius RMSE by flight [m]"),
               spread(flights, runs, "ate_m", "ATE after x, y, yaw [m]")]
     if campaign.swept:
-        parts += ["<h2>Sweeps</h2>", sweeps(campaign, flights)]
+        parts += ["<h2>Sweeps</h2>", *(sweep(campaign, flights, option) for option in campaign.swept)]
     parts += ["<h2>By stratum</h2>", as_table([r for r in summary if r["stratum"] != "all" and r["measure"] in
                                                ("recall", "precision", "position_median_m", "radius_rmse_m", "nees_half", "succeeded")],
                                               ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])]

@@ -37,7 +37,7 @@ grep -q 'of 10 results' "$folder/page.html" && ! grep -q '10 of 10 results' "$fo
 fly || { cat "$folder/log.txt"; exit 1; }
 [ "$(ls "$folder"/results/default | wc -l)" -eq 4 ] || { echo "not four results"; exit 1; }
 [ "$(stat -c %Y "$folder"/results/default/*.json | sort -n | head -n 1)" -eq "$first" ] || { echo "a finished flight was flown twice"; exit 1; }
-tr '\n' ' ' <"$folder/page.html" | grep -q 'Sweeps.*<svg' || { echo "no curve of the sweep"; exit 1; }
+tr '\n' ' ' <"$folder/page.html" | grep -q 'Sweeps.*<img' || { echo "no curve of the sweep"; exit 1; }
 [ "$(tail -n +2 "$folder/failures.csv" | wc -l)" -eq 4 ] || { echo "the four failures are not reported"; exit 1; }
 grep -q '^default,all,,recall,' "$folder/summary.csv" || { echo "no recall in summary.csv"; exit 1; }
 grep -q '10 of 10 results' "$folder/page.html" || { echo "no page"; exit 1; }
