@@ -190,13 +190,17 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
   return 0.5 * phi.dot(prior.rotation_information * phi) + 0.5 * prior.direction_information * tau.squaredNorm();
 }
 
-double costAt(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
+} // namespace
+
+double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
               const RelativePoseOptions &options)
 {
   const double cost = costOfMatches(rays.columns, Epipolar(motion).terms(sigma, kKernel));
   return cost / options.inflation + priorCost(motion, prior);
 }
 
+namespace
+{
 /// Information and gradient of the matches at \p motion, inflation not applied.
 void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H, Vector5d &g)
 {
@@ -214,7 +218,7 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, double kern
 void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const RelativePoseOptions &options)
 {
   double damping = 1e-4;
-  fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     Vector5d g;
     linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
@@ -235,7 +239,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
         step *= 0.5 / step.tail<2>().norm();
       }
       const Motion tried = moved(fit.motion, step);
-      const double cost = costAt(rays, tried, prior, fit.sigma, options);
+      const double cost = costOf(rays, tried, prior, fit.sigma, options);
       better = cost <= fit.cost;
       damping = better ? std::max(1e-7, damping * 0.2) : std::max(1e-3, damping * 10);
       if (better) {
@@ -270,7 +274,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
       break;
     }
   }
-  fit.cost = costAt(rays, fit.motion, prior, fit.sigma, options);
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
   Vector5d g;
   linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
   return fit;
@@ -364,10 +368,10 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
       descend(sample, fit, free, few);
       motion = fit.motion;
     }
-    scored.emplace_back(costAt(rays, motion, free, sigma, options), motion);
+    scored.emplace_back(costOf(rays, motion, free, sigma, options), motion);
   }
   if (prior.has_direction) {
-    scored.emplace_back(costAt(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
+    scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
   }
   std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
   std::vector<Motion> starts;

@@ -130,6 +130,10 @@ struct JointFit
   Matrix5d information = Matrix5d::Zero(); ///< of the matches alone, inflation not applied
   double sigma = 0, cost = 0;
 };
+/// Robust cost of the matches at the noise \p sigma, that of the prior with it: half the chi-squared of small
+/// residuals.
+double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
+              const RelativePoseOptions &options);
 JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
                    const RelativePoseOptions &options);
 

@@ -116,6 +116,7 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
 {
   constexpr double kLean = 0.015;  // of upright trunks [rad]: 3 px over 200 rows
   constexpr double kSigmas = 6;    // images in order: at most 4.3 in 4000 pairs of them
+  constexpr double kGain = 9;      // three sigmas more; bounded for all matches together, since outliers cost as much
   constexpr int kMostRefused = 10; // in a row: then the camera has changed for good
   if (m_seen.size() < 2)
     return;
@@ -138,7 +139,8 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   RowShear found = find({start});
   if (has_start && matters(found)) // a start far off may end in a motion that explains less without a shear
     found = find({start, seen_start});
-  const bool is_sheared = matters(found);
+  const bool is_sheared = matters(found) && gainOfShear(found, matches, m_camera, prior, {start, seen_start},
+                                                        m_options.relative_pose) > kGain;
   if (!is_sheared || m_refused == kMostRefused) {
     m_refused = 0;
     if (rigid.hasDirection())

@@ -5,20 +5,15 @@
 
 #include <Eigen/Dense>
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 
 namespace bole
 {
 namespace
 {
 constexpr double kWideShear = 1; // sigma of the shear before anything is seen
-
-struct ShearFit
-{
-  RowShear row;
-  double sigma = std::numeric_limits<double>::infinity(); ///< of the residuals of the bulk [normalised]
-};
 
 /// Residual of a match under a motion and a shear, and its derivative by (phi, tau, shear).
 double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Vector3d &x_a, Eigen::Vector3d x_b, double shear,
@@ -33,12 +28,12 @@ double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Vector3d &
 }
 
 /// Gauss-Newton with redescending weights, their scale that of the bulk in each step.
-ShearFit fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior, double min_sigma,
-                  double inflation)
+std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior,
+                                 double min_sigma, double inflation)
 {
   constexpr int kIterations = 8;
   constexpr double kSettled = 1e-5; // of a step: a hundredth of a pixel over 1000 rows
-  ShearFit fit;
+  RowShear fit;
   double shear = 0;
   std::vector<double> residuals(rays.size());
   std::vector<Vector6d> derivatives(rays.size());
@@ -69,8 +64,8 @@ ShearFit fitShear(const motion::Rays &rays, motion::Motion motion, const motion:
     motion.direction = directionPlus(motion.direction, step.segment<2>(3));
     shear += step(5);
     if (!std::isfinite(shear) || std::abs(shear) > kWideShear)
-      return {};
-    fit = {{shear, std::sqrt(solver.solve(Vector6d::Unit(5))(5))}, sigma};
+      return std::nullopt;
+    fit = {shear, std::sqrt(solver.solve(Vector6d::Unit(5))(5)), {motion.aRb, motion.direction}, sigma};
     if (step.norm() < kSettled)
       break;
   }
@@ -87,12 +82,32 @@ RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeC
   const motion::MotionPrior prior(given);
   const motion::Rays rays(matches, camera);
   const double min_sigma = options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
-  ShearFit best;
+  std::optional<RowShear> best;
   for (const Pose &start : starts) {
-    const ShearFit fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma, options.inflation);
-    if (fit.sigma < best.sigma)
+    const auto fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma, options.inflation);
+    if (fit && (!best || fit->noise < best->noise))
       best = fit;
   }
-  return best.row;
+  return best.value_or(RowShear());
+}
+
+double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, const PinholeCamera &camera,
+                   const RelativePosePrior &given, const std::vector<Pose> &starts, const RelativePoseOptions &options)
+{
+  const motion::MotionPrior prior(given);
+  std::vector<PointMatch> upright = matches;
+  for (PointMatch &match : upright)
+    match.b_px.x() -= row.shear * camera.fx * camera.ray(match.b_px).y();
+  const double min_sigma = options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
+  const auto costFrom = [&](const motion::Rays &rays, const Pose &start) {
+    const motion::JointFit fit =
+        motion::fitMotion(rays, {start.R, start.t.normalized()}, prior, row.noise, min_sigma, options);
+    return motion::costOf(rays, fit.motion, prior, row.noise, options);
+  };
+  const motion::Rays rays(matches, camera);
+  double without = costFrom(rays, row.aMb);
+  for (const Pose &start : starts)
+    without = std::min(without, costFrom(rays, start));
+  return 2 * (without - costFrom(motion::Rays(upright, camera), row.aMb));
 }
 } // namespace bole

@@ -26,6 +26,8 @@ struct RowShear
 {
   double shear = 0; ///< of b against a: sideways over upwards, tangent of the lean that it gives an upright trunk
   double sigma = 1; ///< 1 where nothing is known
+  Pose aMb;         ///< motion beside it; the translation is a unit vector
+  double noise = 0; ///< of the residuals of the bulk [normalised]
 };
 
 /// \p prior: rotation and translation as gyro and pose filter say, where they do; \p starts: motions (aRb, direction)
@@ -33,4 +35,11 @@ struct RowShear
 RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
                           const RelativePosePrior &prior, const std::vector<Pose> &starts,
                           const RelativePoseOptions &options = {});
+
+/// Chi-squared (one degree of freedom where nothing is sheared) by which \p row explains the matches better than the
+/// best motion without a shear that is found from \p starts and its own: the ratio of likelihoods holds where the sigma
+/// of a linear fit does not, as in a flight sideways above the ground, of which another direction explains as much.
+double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, const PinholeCamera &camera,
+                   const RelativePosePrior &prior, const std::vector<Pose> &starts,
+                   const RelativePoseOptions &options = {});
 } // namespace bole

@@ -76,6 +76,23 @@ TEST(RowShear, OfAFlightSidewaysItIsUnknown)
   EXPECT_GT(found.sigma, 0.02);
 }
 
+TEST(RowShear, ItIsBelievedOnlyWhereNoMotionExplainsAsMuch)
+{
+  const Pose ahead = typicalMotion(), sideways{expSo3({0, 0.01, 0}), {0.03, 0, 0.001}};
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    for (const double shear : {-0.04, 0.02, 0.05}) {
+      const auto matches = shearedMatches(ahead, shear, noisy(seed));
+      const RowShear found = estimateRowShear(matches, kCamera, gyroOf(ahead), {ahead});
+      EXPECT_GT(gainOfShear(found, matches, kCamera, gyroOf(ahead), {ahead}), 20) << shear << " seed " << seed;
+    }
+    const auto matches = shearedMatches(sideways, 0, noisy(seed));
+    RowShear sure = estimateRowShear(matches, kCamera, gyroOf(sideways), {sideways});
+    EXPECT_LT(gainOfShear(sure, matches, kCamera, gyroOf(sideways), {sideways}), 4) << "seed " << seed;
+    sure.shear += 0.03; // as a fit that went astray says
+    EXPECT_LT(gainOfShear(sure, matches, kCamera, gyroOf(sideways), {sideways}), 4) << "seed " << seed;
+  }
+}
+
 TEST(RowShear, FewMatchesKnowNothing)
 {
   CloudOptions few;
