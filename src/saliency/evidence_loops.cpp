@@ -180,7 +180,9 @@ void logOddsOfEvidence(const float *evidence, const float *log_prior, const floa
       near += share[k] * weight;
       far += (1 - share[k]) * weight;
     }
-    log_odds[p] = fastLog(near / far);
+    log_odds[p] = near / far;
   }
+  for (std::size_t p = 0; p < pixels; ++p)
+    log_odds[p] = fastLog(log_odds[p]);
 }
 } // namespace bole

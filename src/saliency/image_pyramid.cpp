@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/image_pyramid.h"
 
+#include "saliency/pyramid_loops.h"
+
 #include <algorithm>
 
 namespace bole
@@ -18,16 +20,12 @@ vpImage<float> toFloat(const vpImage<unsigned char> &image)
   return result;
 }
 
-vpImage<float> halved(const vpImage<float> &image)
+template <class Pixel> vpImage<float> halved(const vpImage<Pixel> &image)
 {
   vpImage<float> result;
   result.resize(image.getHeight() / 2, image.getWidth() / 2);
-  for (unsigned i = 0; i < result.getHeight(); ++i) {
-    const float *upper = image[2 * i], *lower = image[2 * i + 1];
-    float *out = result[i];
-    for (unsigned j = 0; j < result.getWidth(); ++j)
-      out[j] = 0.25f * (upper[2 * j] + upper[2 * j + 1] + lower[2 * j] + lower[2 * j + 1]);
-  }
+  for (unsigned i = 0; i < result.getHeight(); ++i)
+    halvedRow(image[2 * i], image[2 * i + 1], static_cast<int>(result.getWidth()), result[i]);
   return result;
 }
 
@@ -39,13 +37,8 @@ void addGradients(PyramidLevel &level)
   level.gradient_y.resize(height, width);
   for (unsigned i = 0; i < height; ++i) {
     const float *above = image[i > 0 ? i - 1 : i], *row = image[i], *below = image[i + 1 < height ? i + 1 : i];
-    float *gx = level.gradient_x[i], *gy = level.gradient_y[i];
-    for (unsigned j = 1; j + 1 < width; ++j)
-      gx[j] = 0.5f * (row[j + 1] - row[j - 1]);
-    gx[0] = gx[width - 1] = 0;
-    const float scale = i > 0 && i + 1 < height ? 0.5f : 0.f;
-    for (unsigned j = 0; j < width; ++j)
-      gy[j] = scale * (below[j] - above[j]);
+    gradientsOfRow(above, row, below, static_cast<int>(width), i > 0 && i + 1 < height ? 0.5f : 0.f,
+                   level.gradient_x[i], level.gradient_y[i]);
   }
 }
 } // namespace
@@ -54,16 +47,19 @@ ImagePyramid::ImagePyramid(const vpImage<unsigned char> &image, const PinholeCam
                            int finest_level)
 {
   m_levels.reserve(static_cast<std::size_t>(levels));
-  m_levels.push_back({camera, toFloat(image), {}, {}});
-  while (this->levels() < levels) {
+  m_levels.push_back({camera, {}, {}, {}});
+  unsigned height = image.getHeight(), width = image.getWidth();
+  while (this->levels() < levels && height >= 2 * kMinSize && width >= 2 * kMinSize) {
     const PyramidLevel &last = m_levels.back();
-    if (last.image.getHeight() < 2 * kMinSize || last.image.getWidth() < 2 * kMinSize)
-      break;
-    PyramidLevel next{last.camera.scaled(0.5), halved(last.image), {}, {}};
+    PyramidLevel next{last.camera.scaled(0.5), this->levels() == 1 ? halved(image) : halved(last.image), {}, {}};
+    height /= 2;
+    width /= 2;
     next.camera.width = static_cast<int>(next.image.getWidth());
     next.camera.height = static_cast<int>(next.image.getHeight());
     m_levels.push_back(std::move(next));
   }
+  if (finest_level == 0 || this->levels() == 1)
+    m_levels[0].image = toFloat(image);
   for (int level = std::min(finest_level, this->levels() - 1); level < this->levels(); ++level)
     addGradients(m_levels[static_cast<std::size_t>(level)]);
 }

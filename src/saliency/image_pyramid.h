@@ -18,7 +18,8 @@ struct PyramidLevel
 };
 
 /// Level k is 2^k times smaller; each pixel is the mean of four of the level below. A level is never smaller than
-/// 16 pixels, so that there may be fewer levels than asked for. Gradients are made from \p finest_level on.
+/// 16 pixels, so that there may be fewer levels than asked for. Gradients are made from \p finest_level on; the image
+/// of level 0 is empty where \p finest_level is above.
 class ImagePyramid
 {
 public:

@@ -29,22 +29,31 @@ BOLE_VECTOR_CLONES
 void placesOfRow(const RotationRow &row, float *__restrict x, float *__restrict y, float *__restrict inside)
 {
   constexpr float kNone = -1e9f;
-  const float v = static_cast<float>(row.row), f = row.fx;
+  const int width = row.width;
+  const float v = static_cast<float>(row.row), f = row.fx, fy = row.fy, cx = row.cx, ry = row.y;
+  const float bx = row.base[0], by = row.base[1], bz = row.base[2];
+  const float step_x = row.by_column[0], step_y = row.by_column[1], step_z = row.by_column[2];
+  const float wx = row.omega[0], wy = row.omega[1], wz = row.omega[2];
   if (row.is_linear)
-    for (int j = 0; j < row.width; ++j) {
-      const float u = static_cast<float>(j), rx = (u - row.cx) / f, ry = row.y;
-      x[j] = u - f * (rx * ry * row.omega[0] - (1 + rx * rx) * row.omega[1] + ry * row.omega[2]);
-      y[j] = v - row.fy * ((1 + ry * ry) * row.omega[0] - rx * ry * row.omega[1] - rx * row.omega[2]);
+#pragma omp simd
+    for (int j = 0; j < width; ++j) {
+      const float u = static_cast<float>(j), rx = (u - cx) / f;
+      x[j] = u - f * (rx * ry * wx - (1 + rx * rx) * wy + ry * wz);
+      y[j] = v - fy * ((1 + ry * ry) * wx - rx * ry * wy - rx * wz);
     }
   else
-    for (int j = 0; j < row.width; ++j) {
-      const float u = static_cast<float>(j), z = row.base[2] + u * row.by_column[2];
-      const float inverse_z = 1 / (z > 0 ? z : 1);
-      x[j] = z > 0 ? (row.base[0] + u * row.by_column[0]) * inverse_z : kNone;
-      y[j] = z > 0 ? (row.base[1] + u * row.by_column[1]) * inverse_z : kNone;
+#pragma omp simd
+    for (int j = 0; j < width; ++j) {
+      const float u = static_cast<float>(j), z = bz + u * step_z;
+      const bool is_ahead = z > 0;
+      const float inverse_z = 1 / (is_ahead ? z : 1), px = (bx + u * step_x) * inverse_z,
+                  py = (by + u * step_y) * inverse_z;
+      x[j] = is_ahead ? px : kNone;
+      y[j] = is_ahead ? py : kNone;
     }
-  const float right = static_cast<float>(row.width - 1), bottom = static_cast<float>(row.height - 1);
-  for (int j = 0; j < row.width; ++j)
+  const float right = static_cast<float>(width - 1), bottom = static_cast<float>(row.height - 1);
+#pragma omp simd
+  for (int j = 0; j < width; ++j)
     inside[j] = (x[j] >= 0) & (y[j] >= 0) & (x[j] < right) & (y[j] < bottom) ? 1.f : 0.f; // 0 for NaN
 }
 

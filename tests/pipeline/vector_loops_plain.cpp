@@ -11,6 +11,7 @@
 #include "motion/window_loops.cpp"
 #include "saliency/evidence_loops.cpp"
 #include "saliency/label_loops.cpp"
+#include "saliency/pyramid_loops.cpp"
 #include "saliency/rotation_loops.cpp"
 #include "smoothing/front_loops.cpp"
 #include "tracking/profile_loops.cpp"
