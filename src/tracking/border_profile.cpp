@@ -104,14 +104,13 @@ std::vector<float> meanAcross(const vpImage<float> &g, const BorderLine &line, d
   whole.assign(std::size_t(padded), 0.f);
   between.assign(std::size_t(padded), 0.f);
   std::vector<float> mean;
+  const AcrossLine across{line.rows() > 0 ? g[line.row_begin] : nullptr, columns, line.rows(), line.x_top, line.slope};
   for (int i = 0; i < line.rows(); ++i) {
-    const float *row = g[line.row_begin + i];
-    const double x = line.x_top + line.slope * i, left = std::floor(x);
-    const int first = int(left) - half;
-    if (first >= 0 && first + padded + 2 < columns) {
-      addAcrossRow(row + first, padded, float(x - left), whole.data(), between.data());
-      continue;
-    }
+    i = addAcrossRows(across, i, padded, half, whole.data(), between.data());
+    if (i == line.rows())
+      break;
+    const float *row = g[line.row_begin + i]; // reaches beyond the image
+    const double x = line.x_top + line.slope * i;
     addPixels(row, columns, x, half, whole.data());
     addPixels(row, columns, x + kStep_px, half, between.data());
   }

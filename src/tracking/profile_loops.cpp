@@ -5,8 +5,10 @@
 
 namespace bole
 {
-BOLE_VECTOR_CLONES
-void addAcrossRow(const float *pixels, int n, float share, float *__restrict whole, float *__restrict between)
+namespace
+{
+/// Adds the \p n pixels from \p share behind the first on, and those from half a pixel farther on.
+inline void addRow(const float *pixels, int n, float share, float *__restrict whole, float *__restrict between)
 {
   const bool is_past = share >= 0.5f; // half a pixel on is beyond the next column
   const float *half_on = is_past ? pixels + 1 : pixels, later = is_past ? share - 0.5f : share + 0.5f;
@@ -16,5 +18,21 @@ void addAcrossRow(const float *pixels, int n, float share, float *__restrict who
     whole[k] += before * pixels[k] + share * pixels[k + 1];
     between[k] += earlier * half_on[k] + later * half_on[k + 1];
   }
+}
+} // namespace
+
+BOLE_VECTOR_CLONES
+int addAcrossRows(const AcrossLine &line, int row, int n, int half, float *__restrict whole, float *__restrict between)
+{
+  const double x_top = line.x_top, slope = line.slope;
+  const int columns = line.columns, rows = line.rows;
+  for (; row < rows; ++row) {
+    const double x = x_top + slope * row;
+    const int left = static_cast<int>(x), first = left - half;
+    if (!(x >= 0) || first < 0 || first + n + 2 >= columns)
+      break;
+    addRow(line.pixels + row * columns + first, n, static_cast<float>(x - left), whole, between);
+  }
+  return row;
 }
 } // namespace bole

@@ -4,7 +4,16 @@
 
 namespace bole
 {
-/// Adds the \p n pixels from x on, and those from half a pixel farther on, linear between pixels, to \p whole and
-/// \p between. \p pixels: n + 3 of them, the first at the last whole column before x; \p share: how far x is from it.
-void addAcrossRow(const float *pixels, int n, float share, float *whole, float *between);
+/// A line x = x_top + slope * row in an image of which \p pixels is the first of the line's first row.
+struct AcrossLine
+{
+  const float *pixels;
+  int columns, rows;
+  double x_top, slope;
+};
+
+/// Adds, for each row from \p row on, the \p n pixels from x - \p half on, and those from half a pixel farther on,
+/// linear between pixels, to \p whole and \p between. Returns the first row in which they reach beyond the image, or
+/// the number of rows.
+int addAcrossRows(const AcrossLine &line, int row, int n, int half, float *whole, float *between);
 } // namespace bole

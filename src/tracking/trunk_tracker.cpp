@@ -19,55 +19,94 @@ Vector4d pixelScale(const PinholeCamera &camera, const RelativeTrunk &relative, 
 }
 
 /// The image energy plus the prior on the tilt, in pixel-scaled coordinates round the start.
-struct Problem
+class Problem
 {
-  const TrunkEnergy &energy;
-  RelativeTrunk start;
-  Vector4d scale;
-  Vector4d tilt_at_start; ///< start (-) prediction; only the first two are held
-  double tilt_information;
-
-  double operator()(const Vector4d &xi, Vector4d *by_xi) const
+public:
+  struct Value
   {
-    const Vector4d step = scale.cwiseProduct(xi);
-    Vector4d f;
-    double e = energy.evaluate(start.plus(step), by_xi ? &f : nullptr);
-    const Eigen::Vector2d tilt = tilt_at_start.head<2>() + step.head<2>();
-    e += 0.5 * tilt_information * tilt.squaredNorm();
-    if (by_xi) {
-      f.head<2>() += tilt_information * tilt;
-      *by_xi = f.cwiseProduct(scale);
-    }
-    return e;
+    Vector4d xi;
+    double e = 0; ///< of the image
+    Vector4d f;   ///< its derivative by the tangent of theta^r
+  };
+
+  Problem(const TrunkEnergy &energy, const RelativeTrunk &start, const Vector4d &scale, const Vector4d &tilt_at_start,
+          double tilt_information)
+      : m_energy(energy),
+        m_start(start),
+        m_scale(scale),
+        m_tilt_at_start(tilt_at_start.head<2>()),
+        m_tilt_information(tilt_information)
+  {
   }
+
+  RelativeTrunk at(const Vector4d &xi) const { return m_start.plus(m_scale.cwiseProduct(xi)); }
+
+  /// Of the image at \p xi: NLopt, and who reads its result, ask for one place more than once.
+  const Value &image(const Vector4d &xi)
+  {
+    if (!m_is_known || m_value.xi != xi) {
+      m_value.xi = xi;
+      m_value.e = m_energy.evaluate(at(xi), &m_value.f);
+      m_is_known = true;
+    }
+    return m_value;
+  }
+
+  double operator()(const Vector4d &xi, double *by_xi)
+  {
+    const Value &value = image(xi);
+    const Eigen::Vector2d tilt = m_tilt_at_start + m_scale.cwiseProduct(xi).head<2>();
+    if (by_xi) {
+      Vector4d f = value.f;
+      f.head<2>() += m_tilt_information * tilt;
+      Vector4d::Map(by_xi) = f.cwiseProduct(m_scale);
+    }
+    return value.e + 0.5 * m_tilt_information * tilt.squaredNorm();
+  }
+
+private:
+  const TrunkEnergy &m_energy;
+  RelativeTrunk m_start;
+  Vector4d m_scale;
+  Eigen::Vector2d m_tilt_at_start; ///< start (-) prediction
+  double m_tilt_information;
+  Value m_value; ///< the last
+  bool m_is_known = false;
 };
 
 double evaluateProblem(unsigned, const double *x, double *gradient, void *data)
 {
-  const auto &problem = *static_cast<const Problem *>(data);
-  Vector4d by_xi;
-  const double e = problem(Vector4d(x), gradient ? &by_xi : nullptr);
-  if (gradient)
-    Vector4d::Map(gradient) = by_xi;
-  return e;
+  return (*static_cast<Problem *>(data))(Vector4d(x), gradient);
 }
 
-/// Minimum of the problem within +-bound pixels; false where NLopt gives up.
-bool minimise(Problem &problem, double bound_px, Vector4d &xi)
+/// SLSQP for four parameters, set up once a thread.
+class Optimiser
 {
-  const Vector4d upper = Vector4d::Constant(bound_px), lower = -upper;
-  nlopt_opt optimiser = nlopt_create(NLOPT_LD_SLSQP, 4);
-  nlopt_set_min_objective(optimiser, evaluateProblem, &problem);
-  nlopt_set_lower_bounds(optimiser, lower.data());
-  nlopt_set_upper_bounds(optimiser, upper.data());
-  nlopt_set_xtol_abs1(optimiser, 2e-3);
-  nlopt_set_maxeval(optimiser, 40);
-  double e = 0;
-  xi.setZero();
-  const nlopt_result result = nlopt_optimize(optimiser, xi.data(), &e);
-  nlopt_destroy(optimiser);
-  return (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && xi.allFinite() && std::isfinite(e);
-}
+public:
+  Optimiser() : m_optimiser(nlopt_create(NLOPT_LD_SLSQP, 4))
+  {
+    nlopt_set_xtol_abs1(m_optimiser, 2e-3);
+    nlopt_set_maxeval(m_optimiser, 40);
+  }
+  Optimiser(const Optimiser &) = delete;
+  Optimiser &operator=(const Optimiser &) = delete;
+  ~Optimiser() { nlopt_destroy(m_optimiser); }
+
+  /// Minimum within +-bound pixels; false where NLopt gives up.
+  bool operator()(Problem &problem, double bound_px, Vector4d &xi)
+  {
+    nlopt_set_min_objective(m_optimiser, evaluateProblem, &problem);
+    nlopt_set_lower_bounds1(m_optimiser, -bound_px);
+    nlopt_set_upper_bounds1(m_optimiser, bound_px);
+    double e = 0;
+    xi.setZero();
+    const nlopt_result result = nlopt_optimize(m_optimiser, xi.data(), &e);
+    return (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && xi.allFinite() && std::isfinite(e);
+  }
+
+private:
+  nlopt_opt m_optimiser;
+};
 
 struct SeenBorder
 {
@@ -204,20 +243,23 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   const TrunkEnergy energy(gradient, camera, prediction.range, {left.visible, std::abs(pair.left.contrast)},
                            {right.visible, std::abs(pair.right.contrast)}, options.energy);
   const double tilt_variance = options.tilt_sigma * options.tilt_sigma + prediction.covariance.diagonal()(0);
-  Problem problem{energy, start, pixelScale(camera, start, std::max(left.line.rows(), right.line.rows())),
-                  start.minus(prediction.relative), 1 / tilt_variance};
+  Vector4d scale = pixelScale(camera, start, std::max(left.line.rows(), right.line.rows()));
   if (!left.visible || !right.visible)
-    problem.scale(3) = 1e-9; // one border says nothing of r/d beside the bearing
+    scale(3) = 1e-9; // one border says nothing of r/d beside the bearing
+  Problem problem(energy, start, scale, start.minus(prediction.relative), 1 / tilt_variance);
   Vector4d xi;
+  thread_local Optimiser minimise;
   if (!minimise(problem, 2 * options.polish_max_px, xi) || xi.tail<2>().norm() > options.polish_max_px)
     return finish(TrackingStatus::diverged);
 
-  result.optimum = start.plus(problem.scale.cwiseProduct(xi));
+  result.optimum = problem.at(xi);
   result.left_used = left.visible;
   result.right_used = right.visible;
   result.left_contrast = left.visible ? energy.contrastAt(result.optimum, Border::left) : 0;
   result.right_contrast = right.visible ? energy.contrastAt(result.optimum, Border::right) : 0;
-  result.energy = energy.evaluate(result.optimum, &result.f);
+  const Problem::Value &value = problem.image(xi);
+  result.energy = value.e;
+  result.f = value.f;
   const auto curvature = energy.curvature(result.optimum);
   result.F = curvature.F;
   if (curvature.negative || !result.F.allFinite() || !result.optimum.isFinite())

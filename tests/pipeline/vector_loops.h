@@ -8,6 +8,7 @@
 #include "motion/window_loops.h"
 #include "saliency/evidence_loops.h"
 #include "saliency/label_loops.h"
+#include "saliency/pyramid_loops.h"
 #include "saliency/rotation_loops.h"
 #include "smoothing/front_loops.h"
 #include "tracking/profile_loops.h"
@@ -87,6 +88,18 @@ private:
     m_all.push_back(labelsOfRow(odds.data(), m_image.data(), 0.3f, columns, -0.8f, 0.7f, p.data(), confidence.data()));
     keep(p);
     keep(confidence);
+
+    std::vector<float> half(kWidth / 2);
+    halvedRow(m_grey.data(), m_grey.data() + kWidth, kWidth / 2, half.data());
+    keep(half);
+    halvedRow(m_image.data(), m_image.data() + kWidth, kWidth / 2, half.data());
+    keep(half);
+
+    std::vector<float> across(kWidth), down(kWidth);
+    gradientsOfRow(m_image.data(), m_image.data() + kWidth, m_image.data() + 2 * kWidth, kWidth, 0.5f, across.data(),
+                   down.data());
+    keep(across);
+    keep(down);
 
     std::vector<float> ratio(kWidth, 0.f);
     const float *image = m_image.data();
@@ -171,7 +184,8 @@ private:
       const LineSamples line{m_image.data(), kWidth, kHeight, 20.7, slope};
       const CubicSums sums = cubicSumsAlong(line);
       std::vector<float> whole(16), between(16);
-      addAcrossRow(m_image.data() + 70, 16, 0.3f + static_cast<float>(slope), whole.data(), between.data());
+      m_all.push_back(
+          addAcrossRows({m_image.data(), kWidth, kHeight, 20.7, slope}, 0, 16, 7, whole.data(), between.data()));
       keep(whole);
       keep(between);
       keep(std::vector<double>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line)});
