@@ -23,7 +23,9 @@ Matrix3d expSo3(const Vector3d &phi)
   if (angle2 < 1e-12)
     return Matrix3d::Identity() + S + 0.5 * S * S;
   const double angle = std::sqrt(angle2);
-  return Matrix3d::Identity() + std::sin(angle) / angle * S + (1 - std::cos(angle)) / angle2 * S * S;
+  Matrix3d squared = phi * phi.transpose(); // S S
+  squared.diagonal().array() -= angle2;
+  return Matrix3d::Identity() + std::sin(angle) / angle * S + (1 - std::cos(angle)) / angle2 * squared;
 }
 
 Vector3d logSo3(const Matrix3d &R)

@@ -3,6 +3,7 @@
 
 #include "geometry/median.h"
 #include "geometry/so3.h"
+#include "geometry/solve_definite.h"
 
 #include <Eigen/Dense>
 
@@ -159,7 +160,8 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < rays.size(); ++i) {
       Eigen::Matrix<double, 2, 3> J;
-      const Eigen::Vector2d e = transferResidual(rays.a[i], rays.b[i], fit.aRb, &J);
+      transferResidual(rays.a[i], rays.b[i], fit.aRb, &J);
+      const Eigen::Vector2d e(residuals[2 * i], residuals[2 * i + 1]);
       const double w = weightOf(e.norm() / std::sqrt(variance), kKernel);
       fit.weights[i] = w;
       H += (w / variance / options.inflation) * J.transpose() * J;
@@ -185,9 +187,14 @@ Motion moved(const Motion &motion, const Vector5d &xi)
 
 double priorCost(const Motion &motion, const MotionPrior &prior)
 {
-  const Eigen::Vector3d phi = logSo3(prior.aRb.transpose() * motion.aRb);
-  const Eigen::Vector2d tau = directionMinus(prior.direction, motion.direction);
-  return 0.5 * phi.dot(prior.rotation_information * phi) + 0.5 * prior.direction_information * tau.squaredNorm();
+  double cost = 0;
+  if (prior.has_rotation) {
+    const Eigen::Vector3d phi = logSo3(prior.aRb.transpose() * motion.aRb);
+    cost += 0.5 * phi.dot(prior.rotation_information * phi);
+  }
+  if (prior.direction_information > 0)
+    cost += 0.5 * prior.direction_information * directionMinus(prior.direction, motion.direction).squaredNorm();
+  return cost;
 }
 
 } // namespace
@@ -224,17 +231,20 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
     linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
     Matrix5d H = fit.information / options.inflation;
     g /= options.inflation;
-    H.topLeftCorner<3, 3>() += prior.rotation_information;
-    H(3, 3) += prior.direction_information;
-    H(4, 4) += prior.direction_information;
-    g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
-    g.tail<2>() -= prior.direction_information * directionMinus(prior.direction, fit.motion.direction);
+    if (prior.has_rotation) {
+      H.topLeftCorner<3, 3>() += prior.rotation_information;
+      g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
+    }
+    if (prior.direction_information > 0) {
+      H.diagonal().tail<2>().array() += prior.direction_information;
+      g.tail<2>() -= prior.direction_information * directionMinus(prior.direction, fit.motion.direction);
+    }
     bool better = false;
     Vector5d step = Vector5d::Zero();
     for (int attempt = 0; attempt < 4 && !better; ++attempt) {
       Matrix5d damped = H;
       damped.diagonal() += damping * H.diagonal() + Vector5d::Constant(1e-9);
-      step = -damped.ldlt().solve(g);
+      step = -solveDefinite(damped, g);
       if (step.tail<2>().norm() > 0.5) {
         step *= 0.5 / step.tail<2>().norm();
       }
@@ -264,10 +274,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
     descend(rays, fit, prior, options);
-    const Epipolar epipolar(fit.motion);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      residuals[i] = epipolar.residual(rays.a[i], rays.b[i]);
-    }
+    residualsOfMatches(rays.columns, Epipolar(fit.motion).terms(fit.sigma, kKernel), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
     if (std::abs(fit.sigma - before) < 0.02 * before) {
@@ -282,37 +289,25 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
 
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel)
 {
-  double along = 0, across = 0, sum = 0, agreement = 0, squares = 0;
-  const Epipolar epipolar(motion);
+  const FlowSums flow = flowSumsOfMatches(rays.columns, Epipolar(motion).terms(sigma, kernel), motion.direction.data());
+  Parallax parallax;
+  if (flow.sum <= 0)
+    return parallax;
+  parallax.ratio = flow.along / std::max(flow.across, 1e-3 * flow.sum);
+  parallax.score = flow.agreement / std::sqrt(std::max(flow.squares, 1e-12));
+  return parallax;
+}
+
+double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb)
+{
   std::vector<double> lengths;
   lengths.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Eigen::Vector3d p = motion.aRb * rays.b[i];
-    if (p.z() < 0.05) {
-      continue;
-    }
-    const Eigen::Vector2d at = p.head<2>() / p.z();
-    const Eigen::Vector2d flow = rays.a[i].head<2>() - at;
-    lengths.push_back(flow.norm());
-    // A point of positive depth is seen from a further along the direction than from b.
-    const Eigen::Vector2d line = (motion.direction.head<2>() - at * motion.direction.z()).normalized();
-    const double w = weightOf(epipolar.residual(rays.a[i], rays.b[i]) / sigma, kernel);
-    const double u = flow.dot(line) / sigma, v = (flow.x() * line.y() - flow.y() * line.x()) / sigma;
-    along += w * std::min(u * u, 400.0);
-    across += w * v * v;
-    sum += w;
-    const double vote = std::clamp(0.5 * u, -1.0, 1.0);
-    agreement += w * vote;
-    squares += w * w * vote * vote;
+    const Eigen::Vector3d p = aRb * rays.b[i];
+    if (p.z() >= 0.05)
+      lengths.push_back((rays.a[i].head<2>() - p.head<2>() / p.z()).norm());
   }
-  Parallax parallax;
-  if (lengths.empty() || sum <= 0) {
-    return parallax;
-  }
-  parallax.ratio = along / std::max(across, 1e-3 * sum);
-  parallax.score = agreement / std::sqrt(std::max(squares, 1e-12));
-  parallax.median = medianOf(std::move(lengths));
-  return parallax;
+  return lengths.empty() ? 0 : medianOf(std::move(lengths));
 }
 
 namespace

@@ -53,9 +53,8 @@ public:
     const Eigen::Vector3d line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
     return x_a.dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24);
   }
-  /// \p J by (phi, tau); \p by_b by \p x_b, where asked for.
-  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J,
-                  Eigen::Vector3d *by_b = nullptr) const
+  /// \p J by (phi, tau).
+  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J) const
   {
     const Eigen::Vector3d p = m_R * x_b, line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
     const Eigen::Vector3d flat_a(line_a.x(), line_a.y(), 0), flat_b(line_b.x(), line_b.y(), 0);
@@ -66,8 +65,6 @@ public:
     const Eigen::Vector3d across = line_b - share * (m_E.transpose() * flat_a);
     J.head<3>() = inverse_root * (x_b.cross(across) + share * line_b.cross(flat_b));
     J.tail<2>() = inverse_root * (m_B.transpose() * by_direction);
-    if (by_b)
-      *by_b = inverse_root * across;
     return algebraic * inverse_root;
   }
 
@@ -141,11 +138,12 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
 /// [normalised].
 struct Parallax
 {
-  double ratio = 0;  ///< mean square along / across
-  double score = 0;  ///< sigmas by which the flow agrees on the sign of the direction
-  double median = 0; ///< length
+  double ratio = 0; ///< mean square along / across
+  double score = 0; ///< sigmas by which the flow agrees on the sign of the direction
 };
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel);
+/// Median length of that flow.
+double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb);
 
 /// Starts for fitMotion(): the prior's direction and the best of two-point directions.
 std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,

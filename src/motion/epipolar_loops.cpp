@@ -3,7 +3,9 @@
 
 #include "geometry/vector_clones.h"
 
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 namespace bole::motion
 {
@@ -31,8 +33,11 @@ double costOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
   return cost;
 }
 
-BOLE_VECTOR_CLONES
-EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
+namespace
+{
+/// Upper triangle of H by rows and g, of five unknowns or of six.
+template <bool kIsSheared>
+[[gnu::always_inline]] inline void sumMatches(const RayColumns &rays, const EpipolarTerms &terms, double *H, double *g)
 {
   const int n = static_cast<int>(rays.ax.size());
   const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
@@ -46,10 +51,12 @@ EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
   const double epipole2 = terms.epipole * terms.epipole;
   double h00 = 0, h01 = 0, h02 = 0, h03 = 0, h04 = 0, h11 = 0, h12 = 0, h13 = 0, h14 = 0, h22 = 0, h23 = 0, h24 = 0,
          h33 = 0, h34 = 0, h44 = 0, g0 = 0, g1 = 0, g2 = 0, g3 = 0, g4 = 0;
-#pragma omp simd reduction(+ : h00, h01, h02, h03, h04, h11, h12, h13, h14, h22, h23, h24, h33, h34, h44, g0, g1, g2,  \
-                               g3, g4)
+  double h05 = 0, h15 = 0, h25 = 0, h35 = 0, h45 = 0, h55 = 0, g5 = 0; // by the shear
+  const double shear = kIsSheared ? terms.shear : 0;
+#pragma omp simd reduction(+ : h00, h01, h02, h03, h04, h05, h11, h12, h13, h14, h15, h22, h23, h24, h25, h33, h34,    \
+                               h35, h44, h45, h55, g0, g1, g2, g3, g4, g5)
   for (int i = 0; i < n; ++i) {
-    const double xa = ax[i], ya = ay[i], xb = bx[i], yb = by[i];
+    const double xa = ax[i], ya = ay[i], yb = by[i], xb = kIsSheared ? bx[i] - shear * yb : bx[i];
     const double l0 = e00 * xb + e01 * yb + e02, l1 = e10 * xb + e11 * yb + e12, l2 = e20 * xb + e21 * yb + e22;
     const double m0 = e00 * xa + e10 * ya + e20, m1 = e01 * xa + e11 * ya + e21, m2 = e02 * xa + e12 * ya + e22;
     const double S = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24, inverse = 1 / S;
@@ -75,7 +82,91 @@ EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
     h11 += w1 * j1, h12 += w1 * j2, h13 += w1 * j3, h14 += w1 * j4;
     h22 += w2 * j2, h23 += w2 * j3, h24 += w2 * j4, h33 += w3 * j3, h34 += w3 * j4, h44 += w4 * j4;
     g0 += w0 * u, g1 += w1 * u, g2 += w2 * u, g3 += w3 * u, g4 += w4 * u;
+    if constexpr (kIsSheared) {
+      const double j5 = -yb * scale * f0, w5 = w * j5;
+      h05 += w5 * j0, h15 += w5 * j1, h25 += w5 * j2, h35 += w5 * j3, h45 += w5 * j4, h55 += w5 * j5, g5 += w5 * u;
+    }
   }
-  return {{h00, h01, h02, h03, h04, h11, h12, h13, h14, h22, h23, h24, h33, h34, h44}, {g0, g1, g2, g3, g4}};
+  const auto put = [&H](std::initializer_list<double> row) { H = std::copy(row.begin(), row.end(), H); };
+  if constexpr (kIsSheared) {
+    put({h00, h01, h02, h03, h04, h05, h11, h12, h13, h14, h15, h22, h23, h24, h25, h33, h34, h35, h44, h45, h55});
+    g[5] = g5;
+  }
+  else
+    put({h00, h01, h02, h03, h04, h11, h12, h13, h14, h22, h23, h24, h33, h34, h44});
+  g[0] = g0, g[1] = g1, g[2] = g2, g[3] = g3, g[4] = g4;
+}
+} // namespace
+
+BOLE_VECTOR_CLONES
+EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
+{
+  EpipolarSums sums;
+  sumMatches<false>(rays, terms, sums.H, sums.g);
+  return sums;
+}
+
+BOLE_VECTOR_CLONES
+ShearSums shearSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
+{
+  ShearSums sums;
+  sumMatches<true>(rays, terms, sums.H, sums.g);
+  return sums;
+}
+
+BOLE_VECTOR_CLONES
+void residualsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, double *__restrict residuals)
+{
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
+  const double *E = terms.E, e00 = E[0], e01 = E[1], e02 = E[2], e10 = E[3], e11 = E[4], e12 = E[5], e20 = E[6],
+               e21 = E[7], e22 = E[8], shear = terms.shear;
+#pragma omp simd
+  for (int i = 0; i < n; ++i) {
+    const double yb = by[i], xb = bx[i] - shear * yb;
+    const double l0 = e00 * xb + e01 * yb + e02, l1 = e10 * xb + e11 * yb + e12, l2 = e20 * xb + e21 * yb + e22;
+    const double m0 = e00 * ax[i] + e10 * ay[i] + e20, m1 = e01 * ax[i] + e11 * ay[i] + e21;
+    residuals[i] = (ax[i] * l0 + ay[i] * l1 + l2) / std::sqrt(l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24);
+  }
+}
+
+BOLE_VECTOR_CLONES
+FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, const double *t)
+{
+  constexpr double kLeastAhead = 0.05, kMost = 400; // of the depth in b; [sigma^2]
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
+  const double *E = terms.E, *R = terms.R;
+  const double e00 = E[0], e01 = E[1], e02 = E[2], e10 = E[3], e11 = E[4], e12 = E[5], e20 = E[6], e21 = E[7],
+               e22 = E[8];
+  const double r00 = R[0], r01 = R[1], r02 = R[2], r10 = R[3], r11 = R[4], r12 = R[5], r20 = R[6], r21 = R[7],
+               r22 = R[8];
+  const double t0 = t[0], t1 = t[1], t2 = t[2];
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
+  double along = 0, across = 0, sum = 0, agreement = 0, squares = 0;
+#pragma omp simd reduction(+ : along, across, sum, agreement, squares)
+  for (int i = 0; i < n; ++i) {
+    const double xa = ax[i], ya = ay[i], xb = bx[i], yb = by[i];
+    const double l0 = e00 * xb + e01 * yb + e02, l1 = e10 * xb + e11 * yb + e12, l2 = e20 * xb + e21 * yb + e22;
+    const double m0 = e00 * xa + e10 * ya + e20, m1 = e01 * xa + e11 * ya + e21;
+    const double algebraic = (xa * l0 + ya * l1 + l2) * by_sigma;
+    const double u2 = algebraic * algebraic / (l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24);
+    const double p0 = r00 * xb + r01 * yb + r02, p1 = r10 * xb + r11 * yb + r12, p2 = r20 * xb + r21 * yb + r22;
+    const bool is_ahead = p2 >= kLeastAhead;
+    const double inverse = 1 / (is_ahead ? p2 : 1), x = p0 * inverse, y = p1 * inverse; // where it is seen from a
+    // A point of positive depth is seen from a further along the direction than from b.
+    const double line_x = t0 - x * t2, line_y = t1 - y * t2, length2 = line_x * line_x + line_y * line_y;
+    const double scale = length2 > 0 ? by_sigma / std::sqrt(length2 > 0 ? length2 : 1) : 0;
+    const double u = ((xa - x) * line_x + (ya - y) * line_y) * scale,
+                 v = ((xa - x) * line_y - (ya - y) * line_x) * scale;
+    const double root = 1 / (1 + u2 * by_kernel2), w = is_ahead ? root * root : 0;
+    const double vote = std::min(std::max(0.5 * u, -1.0), 1.0);
+    along += w * std::min(u * u, kMost);
+    across += w * v * v;
+    sum += w;
+    agreement += w * vote;
+    squares += w * w * vote * vote;
+  }
+  return {along, across, sum, agreement, squares};
 }
 } // namespace bole::motion

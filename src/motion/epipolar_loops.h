@@ -18,7 +18,8 @@ struct EpipolarTerms
 {
   double E[9], R[9], B[6];
   double sigma, kernel;
-  double epipole; ///< tan of the angle from the epipole within which a match has little say
+  double epipole;   ///< tan of the angle from the epipole within which a match has little say
+  double shear = 0; ///< of the rows of b: x is less by so much of y
 };
 
 /// Sum of the robust costs.
@@ -31,4 +32,22 @@ struct EpipolarSums
   double H[15], g[5];
 };
 EpipolarSums sumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms);
+
+/// The same by (phi, tau, shear).
+struct ShearSums
+{
+  double H[21], g[6];
+};
+ShearSums shearSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms);
+
+/// Sampson's residual of each match.
+void residualsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, double *residuals);
+
+/// Sums over the matches before the camera of what their flow, the rotation taken out, is along the epipolar lines and
+/// across, in sigmas: weighted squares, weights, and votes for the sign of the direction \p t.
+struct FlowSums
+{
+  double along, across, sum, agreement, squares;
+};
+FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, const double *t);
 } // namespace bole::motion

@@ -128,7 +128,8 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
     parallax.score = -parallax.score;
   }
   estimate.sigma_px = fit.sigma * focal;
-  estimate.parallax_px = parallax.median * focal;
+  const double flow = motion::medianFlow(rays, fit.motion.aRb);
+  estimate.parallax_px = flow * focal;
   estimate.parallax_ratio = parallax.ratio;
   if (estimate.sigma_px > kMostSigma_px) {
     estimate.status = RelativePoseStatus::inconsistent;
@@ -145,12 +146,12 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.covariance = covarianceOf(fit, prior, parallax.ratio, options.inflation);
   // However many the points: errors that they share do not average below a tenth of noise over
   // parallax.
-  const double shared = kSharedError * fit.sigma / std::max(parallax.median, fit.sigma);
+  const double shared = kSharedError * fit.sigma / std::max(flow, fit.sigma);
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
-  const motion::Epipolar epipolar(fit.motion);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    estimate.weights[i] = motion::weightOf(epipolar.residual(rays.a[i], rays.b[i]) / fit.sigma, motion::kKernel);
-  }
+  residualsOfMatches(rays.columns, motion::Epipolar(fit.motion).terms(fit.sigma, motion::kKernel),
+                     estimate.weights.data());
+  for (double &weight : estimate.weights)
+    weight = motion::weightOf(weight / fit.sigma, motion::kKernel);
   return estimate;
 }
 } // namespace bole

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/row_shear.h"
 
+#include "geometry/solve_definite.h"
 #include "motion/epipolar.h"
 
 #include <Eigen/Dense>
@@ -15,18 +16,6 @@ namespace
 {
 constexpr double kWideShear = 1; // sigma of the shear before anything is seen
 
-/// Residual of a match under a motion and a shear, and its derivative by (phi, tau, shear).
-double shearedResidual(const motion::Epipolar &epipolar, const Eigen::Vector3d &x_a, Eigen::Vector3d x_b, double shear,
-                       Vector6d &J)
-{
-  x_b.x() -= shear * x_b.y();
-  Vector5d by_motion;
-  Eigen::Vector3d by_b;
-  const double residual = epipolar.residual(x_a, x_b, by_motion, &by_b);
-  J << by_motion, -x_b.y() * by_b.x();
-  return residual;
-}
-
 /// Gauss-Newton with redescending weights, their scale that of the bulk in each step.
 std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior,
                                  double min_sigma, double inflation)
@@ -36,21 +25,18 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
   RowShear fit;
   double shear = 0;
   std::vector<double> residuals(rays.size());
-  std::vector<Vector6d> derivatives(rays.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const motion::Epipolar epipolar(motion);
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      residuals[i] = shearedResidual(epipolar, rays.a[i], rays.b[i], shear, derivatives[i]);
-    const double sigma = std::max(min_sigma, motion::bulkSigma(residuals));
-    Matrix6d H = Matrix6d::Zero();
-    Vector6d g = Vector6d::Zero();
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      const double u = residuals[i] / sigma;
-      const double weight = epipolar.trust(rays.a[i]) * motion::weightOf(u, motion::kKernel) / inflation;
-      const Vector6d J = derivatives[i] / sigma;
-      H += weight * J * J.transpose();
-      g += weight * u * J;
-    }
+    motion::EpipolarTerms terms = motion::Epipolar(motion).terms(1, motion::kKernel);
+    terms.shear = shear;
+    residualsOfMatches(rays.columns, terms, residuals.data());
+    const double sigma = terms.sigma = std::max(min_sigma, motion::bulkSigma(residuals));
+    const motion::ShearSums sums = shearSumsOfMatches(rays.columns, terms);
+    Matrix6d H;
+    const double *entry = sums.H;
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j)
+        H(i, j) = H(j, i) = *entry++ / inflation;
+    Vector6d g = Vector6d::Map(sums.g) / inflation;
     const double wide = 1 / (kWideShear * kWideShear);
     H.topLeftCorner<3, 3>() += prior.rotation_information;
     H.diagonal().array() += 1e-9;
@@ -58,14 +44,13 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
     g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * motion.aRb);
     g.segment<2>(3) -= prior.direction_information * directionMinus(prior.direction, motion.direction);
     g(5) += wide * shear;
-    const auto solver = H.ldlt();
-    const Vector6d step = -solver.solve(g);
+    const Vector6d step = -solveDefinite(H, g);
     motion.aRb = orthonormalized(motion.aRb * expSo3(step.head<3>()));
     motion.direction = directionPlus(motion.direction, step.segment<2>(3));
     shear += step(5);
     if (!std::isfinite(shear) || std::abs(shear) > kWideShear)
       return std::nullopt;
-    fit = {shear, std::sqrt(solver.solve(Vector6d::Unit(5))(5)), {motion.aRb, motion.direction}, sigma};
+    fit = {shear, std::sqrt(solveDefinite<6>(H, Vector6d::Unit(5))(5)), {motion.aRb, motion.direction}, sigma};
     if (step.norm() < kSettled)
       break;
   }

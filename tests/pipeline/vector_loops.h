@@ -95,11 +95,11 @@ private:
     halvedRow(m_image.data(), m_image.data() + kWidth, kWidth / 2, half.data());
     keep(half);
 
-    std::vector<float> across(kWidth), down(kWidth);
-    gradientsOfRow(m_image.data(), m_image.data() + kWidth, m_image.data() + 2 * kWidth, kWidth, 0.5f, across.data(),
-                   down.data());
-    keep(across);
-    keep(down);
+    std::vector<float> gradient_x(kWidth), gradient_y(kWidth);
+    gradientsOfRow(m_image.data(), m_image.data() + kWidth, m_image.data() + 2 * kWidth, kWidth, 0.5f,
+                   gradient_x.data(), gradient_y.data());
+    keep(gradient_x);
+    keep(gradient_y);
 
     std::vector<float> ratio(kWidth, 0.f);
     const float *image = m_image.data();
@@ -173,6 +173,17 @@ private:
                                       3,
                                       0.04};
     m_all.push_back(costOfMatches(rays, terms));
+    motion::EpipolarTerms sheared = terms;
+    sheared.shear = 0.03;
+    const motion::ShearSums by_shear = shearSumsOfMatches(rays, sheared);
+    m_all.insert(m_all.end(), by_shear.H, by_shear.H + 21);
+    m_all.insert(m_all.end(), by_shear.g, by_shear.g + 6);
+    std::vector<double> residuals(rays.ax.size());
+    residualsOfMatches(rays, sheared, residuals.data());
+    keep(residuals);
+    const double direction[] = {0.1, -0.2, 0.97};
+    const motion::FlowSums flow = flowSumsOfMatches(rays, terms, direction);
+    keep(std::vector<double>{flow.along, flow.across, flow.sum, flow.agreement, flow.squares});
     const motion::EpipolarSums sums = sumsOfMatches(rays, terms);
     keep(sums.H);
     keep(sums.g);
