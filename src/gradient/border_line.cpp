@@ -132,10 +132,11 @@ double evennessAlong(const vpImage<float> &g, const BorderLine &line, double sig
     BorderLine piece = line;
     piece.row_begin = line.row_begin + part * line.rows() / kParts;
     piece.row_end = line.row_begin + (part + 1) * line.rows() / kParts;
-    double strongest = -1;
-    for (const double shift : {-1.0, 0.0, 1.0}) { // bow and taper
-      piece.x_top = line.xAt(piece.row_begin) + shift;
-      strongest = std::max(strongest, sign * meanAlongOnly(g, piece));
+    piece.x_top = line.xAt(piece.row_begin);
+    double strongest = 0;
+    if (piece.rows() > 0) {
+      const LinearSums sums = linearSumsBeside(samplesOf(g, piece)); // bow and taper
+      strongest = std::max({sign * sums.left, sign * sums.middle, sign * sums.right}) / piece.rows();
     }
     sum += strongest;
     squares += strongest * strongest;

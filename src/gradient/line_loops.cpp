@@ -48,4 +48,27 @@ double linearSumAlong(const LineSamples &line)
   }
   return sum;
 }
+
+BOLE_VECTOR_CLONES
+LinearSums linearSumsBeside(const LineSamples &line)
+{
+  const float *pixels = line.pixels;
+  const int columns = line.columns, rows = line.rows;
+  const double x_top = line.x_top, along = line.slope, last = columns - 1 - 1e-9;
+  double left = 0, middle = 0, right = 0;
+  const auto sample = [=](int i, double x) {
+    const double held = std::max(0.0, std::min(x, last)), share = held == x ? 1 : 0; // 0 for NaN
+    const int column = static_cast<int>(held), at = i * columns + column;
+    const double p0 = pixels[at], p1 = pixels[at + 1];
+    return share * (p0 + (held - column) * (p1 - p0));
+  };
+#pragma omp simd reduction(+ : left, middle, right)
+  for (int i = 0; i < rows; ++i) {
+    const double x = x_top + along * i;
+    left += sample(i, x - 1);
+    middle += sample(i, x);
+    right += sample(i, x + 1);
+  }
+  return {left, middle, right};
+}
 } // namespace bole

@@ -24,4 +24,11 @@ CubicSums cubicSumsAlong(const LineSamples &line);
 
 /// Sum of the samples, linear between columns.
 double linearSumAlong(const LineSamples &line);
+
+/// The same of the line and of its neighbours a column to the left and to the right.
+struct LinearSums
+{
+  double left, middle, right;
+};
+LinearSums linearSumsBeside(const LineSamples &line);
 } // namespace bole

@@ -123,24 +123,6 @@ double bulkSigma(std::vector<double> residuals)
   return sigma;
 }
 
-namespace
-{
-/// Flow of one match that a rotation leaves, in the image of a, and its derivative by the rotation.
-Eigen::Vector2d transferResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
-                                 Eigen::Matrix<double, 2, 3> *J)
-{
-  const Eigen::Vector3d p = aRb * x_b;
-  const double z = std::max(p.z(), 1e-3);
-  const Eigen::Vector2d at = p.head<2>() / z;
-  if (J != nullptr) {
-    Eigen::Matrix<double, 2, 3> projection;
-    projection << 1 / z, 0, -at.x() / z, 0, 1 / z, -at.y() / z;
-    *J = projection * aRb * skew(x_b);
-  }
-  return x_a.head<2>() - at;
-}
-} // namespace
-
 RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
                         const RelativePoseOptions &options)
 {
@@ -149,27 +131,18 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
   fit.weights.assign(rays.size(), 0);
   std::vector<double> residuals(2 * rays.size());
   for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      const Eigen::Vector2d e = transferResidual(rays.a[i], rays.b[i], fit.aRb, nullptr);
-      residuals[2 * i] = e.x();
-      residuals[2 * i + 1] = e.y();
-    }
+    const TransferTerms terms = {fit.aRb.data(), kKernel};
+    transferResiduals(rays.columns, terms, residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d g = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      Eigen::Matrix<double, 2, 3> J;
-      transferResidual(rays.a[i], rays.b[i], fit.aRb, &J);
-      const Eigen::Vector2d e(residuals[2 * i], residuals[2 * i + 1]);
-      const double w = weightOf(e.norm() / std::sqrt(variance), kKernel);
-      fit.weights[i] = w;
-      H += (w / variance / options.inflation) * J.transpose() * J;
-      g += (w / variance / options.inflation) * J.transpose() * e;
-    }
+    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, fit.weights.data());
+    Eigen::Matrix3d H;
+    H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
+    H /= variance * options.inflation;
+    Eigen::Vector3d g = Eigen::Vector3d::Map(sums.g) / (variance * options.inflation);
     fit.information = H + prior.rotation_information;
     g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
-    const Eigen::Vector3d step = -(fit.information + 1e-9 * Eigen::Matrix3d::Identity()).ldlt().solve(g);
+    const Eigen::Vector3d step = -solveDefinite<3>(fit.information + 1e-9 * Eigen::Matrix3d::Identity(), g);
     fit.aRb = orthonormalized(fit.aRb * expSo3(step));
     if (step.norm() < 1e-7) {
       break;

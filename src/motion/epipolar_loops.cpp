@@ -169,4 +169,52 @@ FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, c
   }
   return {along, across, sum, agreement, squares};
 }
+
+namespace
+{
+constexpr double kLeastDepth = 1e-3; // of a ray of b in a
+} // namespace
+
+BOLE_VECTOR_CLONES
+void transferResiduals(const RayColumns &rays, const TransferTerms &terms, double *__restrict residuals)
+{
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data(), *R = terms.R;
+  const double r00 = R[0], r10 = R[1], r20 = R[2], r01 = R[3], r11 = R[4], r21 = R[5], r02 = R[6], r12 = R[7],
+               r22 = R[8];
+#pragma omp simd
+  for (int i = 0; i < n; ++i) {
+    const double z = std::max(r20 * bx[i] + r21 * by[i] + r22, kLeastDepth);
+    residuals[i] = ax[i] - (r00 * bx[i] + r01 * by[i] + r02) / z;
+    residuals[n + i] = ay[i] - (r10 * bx[i] + r11 * by[i] + r12) / z;
+  }
+}
+
+BOLE_VECTOR_CLONES
+TransferSums sumsOfTransfers(const RayColumns &rays, const TransferTerms &terms, const double *residuals,
+                             double variance, double *__restrict weights)
+{
+  const int n = static_cast<int>(rays.ax.size());
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data(), *R = terms.R;
+  const double r00 = R[0], r10 = R[1], r20 = R[2], r01 = R[3], r11 = R[4], r21 = R[5], r02 = R[6], r12 = R[7],
+               r22 = R[8];
+  const double by_variance = 1 / (variance * terms.kernel * terms.kernel);
+  double h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0;
+#pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2)
+  for (int i = 0; i < n; ++i) {
+    const double xb = bx[i], yb = by[i], ex = residuals[i], ey = residuals[n + i], x = ax[i] - ex, y = ay[i] - ey;
+    const double inverse = 1 / std::max(r20 * xb + r21 * yb + r22, kLeastDepth);
+    const double root = 1 / (1 + (ex * ex + ey * ey) * by_variance), w = root * root;
+    weights[i] = w;
+    // rows of the projection, turned into b: times the skew of the ray their cross product with it
+    const double u0 = inverse * (r00 - x * r20), u1 = inverse * (r01 - x * r21), u2 = inverse * (r02 - x * r22);
+    const double v0 = inverse * (r10 - y * r20), v1 = inverse * (r11 - y * r21), v2 = inverse * (r12 - y * r22);
+    const double j0 = u1 - u2 * yb, j1 = u2 * xb - u0, j2 = u0 * yb - u1 * xb;
+    const double k0 = v1 - v2 * yb, k1 = v2 * xb - v0, k2 = v0 * yb - v1 * xb;
+    h00 += w * (j0 * j0 + k0 * k0), h01 += w * (j0 * j1 + k0 * k1), h02 += w * (j0 * j2 + k0 * k2);
+    h11 += w * (j1 * j1 + k1 * k1), h12 += w * (j1 * j2 + k1 * k2), h22 += w * (j2 * j2 + k2 * k2);
+    g0 += w * (j0 * ex + k0 * ey), g1 += w * (j1 * ex + k1 * ey), g2 += w * (j2 * ex + k2 * ey);
+  }
+  return {{h00, h01, h02, h11, h12, h22}, {g0, g1, g2}};
+}
 } // namespace bole::motion

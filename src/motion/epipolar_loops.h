@@ -50,4 +50,23 @@ struct FlowSums
   double along, across, sum, agreement, squares;
 };
 FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, const double *t);
+
+/// A rotation that takes b to a, column by column.
+struct TransferTerms
+{
+  const double *R;
+  double kernel;
+};
+
+/// Flow of each match that the rotation leaves, in the image of a: all x, then all y.
+void transferResiduals(const RayColumns &rays, const TransferTerms &terms, double *residuals);
+
+/// Sums of the weighted products of the derivatives of those residuals by the rotation, upper triangle by rows, and of
+/// derivative and residual. \p variance: of the length of a residual. \p weights: of each match.
+struct TransferSums
+{
+  double H[6], g[3];
+};
+TransferSums sumsOfTransfers(const RayColumns &rays, const TransferTerms &terms, const double *residuals,
+                             double variance, double *weights);
 } // namespace bole::motion

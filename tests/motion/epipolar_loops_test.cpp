@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+#include <vector>
+
 namespace
 {
 using namespace bole;
@@ -87,5 +91,45 @@ TEST(EpipolarLoops, DerivativesByTheShearAgreeWithCentralDifferences)
   EXPECT_NEAR(sums.H[20], H, 1e-6 * H);
   EXPECT_NEAR(sums.H[5], H_turn, 1e-6 * H);
   EXPECT_NEAR(sums.g[5], g, 1e-6 * H);
+}
+
+TEST(EpipolarLoops, DerivativesByTheRotationAgreeWithCentralDifferences)
+{
+  const Rays rays = matches();
+  const std::size_t n = rays.size();
+  const double h = 1e-5, variance = 1e-4;
+  const auto residualsAt = [&](const Eigen::Vector3d &phi) {
+    const Eigen::Matrix3d aRb = kMotion.aRb * expSo3(phi);
+    std::vector<double> residuals(2 * n);
+    transferResiduals(rays.columns, {aRb.data(), kKernel}, residuals.data());
+    return residuals;
+  };
+  const std::vector<double> here = residualsAt(Eigen::Vector3d::Zero());
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  std::array<std::vector<double>, 3> plus, minus;
+  for (int k = 0; k < 3; ++k) {
+    plus[std::size_t(k)] = residualsAt(h * Eigen::Vector3d::Unit(k));
+    minus[std::size_t(k)] = residualsAt(-h * Eigen::Vector3d::Unit(k));
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double w = weightOf(std::hypot(here[i], here[n + i]) / std::sqrt(variance), kKernel);
+    for (const std::size_t at : {i, n + i}) {
+      Eigen::Vector3d J;
+      for (std::size_t k = 0; k < 3; ++k)
+        J(Eigen::Index(k)) = (plus[k][at] - minus[k][at]) / (2 * h);
+      H += w * J * J.transpose();
+      g += w * J * here[at];
+    }
+  }
+  std::vector<double> weights(n);
+  const TransferSums sums =
+      sumsOfTransfers(rays.columns, {kMotion.aRb.data(), kKernel}, here.data(), variance, weights.data());
+  const double *entry = sums.H;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(sums.g[i], g(i), 1e-6 * H.norm()) << i;
+    for (int j = i; j < 3; ++j)
+      EXPECT_NEAR(*entry++, H(i, j), 1e-6 * H.norm()) << i << " " << j;
+  }
 }
 } // namespace

@@ -184,6 +184,14 @@ private:
     const double direction[] = {0.1, -0.2, 0.97};
     const motion::FlowSums flow = flowSumsOfMatches(rays, terms, direction);
     keep(std::vector<double>{flow.along, flow.across, flow.sum, flow.agreement, flow.squares});
+    const double rotation[] = {1, -0.01, 0.02, 0.01, 1, -0.03, -0.02, 0.03, 1};
+    std::vector<double> transfers(2 * rays.ax.size()), weights(rays.ax.size());
+    transferResiduals(rays, {rotation, 3}, transfers.data());
+    const motion::TransferSums by_turn = sumsOfTransfers(rays, {rotation, 3}, transfers.data(), 1e-3, weights.data());
+    keep(transfers);
+    keep(weights);
+    keep(by_turn.H);
+    keep(by_turn.g);
     const motion::EpipolarSums sums = sumsOfMatches(rays, terms);
     keep(sums.H);
     keep(sums.g);
@@ -199,7 +207,9 @@ private:
           addAcrossRows({m_image.data(), kWidth, kHeight, 20.7, slope}, 0, 16, 7, whole.data(), between.data()));
       keep(whole);
       keep(between);
-      keep(std::vector<double>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line)});
+      const LinearSums beside = linearSumsBeside(line);
+      keep(std::vector<double>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line), beside.left,
+                               beside.middle, beside.right});
     }
   }
 
