@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 namespace bole
@@ -99,9 +100,12 @@ ImageNumbers measureImage(const cv::Mat &I)
 
 cv::Mat thumbOf(const cv::Mat &I)
 {
+  constexpr int kEnough = 4; // times the thumb: what is larger is halved first, which OpenCV does by registers
   const int width = std::min(kThumbWidth, I.cols);
-  cv::Mat small, thumb;
-  cv::resize(I, small, {width, std::max(1, I.rows * width / I.cols)}, 0, 0, cv::INTER_AREA);
+  cv::Mat image = I, small, thumb;
+  for (; image.cols >= 2 * kEnough * width; image = std::exchange(small, {}))
+    cv::resize(image, small, image.size() / 2, 0, 0, cv::INTER_AREA);
+  cv::resize(image, small, {width, std::max(1, I.rows * width / I.cols)}, 0, 0, cv::INTER_AREA);
   small.convertTo(thumb, CV_32F);
   return thumb;
 }
