@@ -2,9 +2,11 @@
 #include "detection/detector.h"
 
 #include "detection/window_loops.h"
+#include "geometry/solve_definite.h"
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -90,20 +92,36 @@ struct RangeCurve
   float *seen; ///< how many those are
 };
 
-/// Ranges swept, uniform in inverse depth: near enough for no focus to fall between two.
-std::vector<float> sweptRanges(const DetectorOptions &options)
+/// Ranges swept, uniform in inverse depth: near enough for no focus to fall between two. They fall.
+struct SweptRanges
 {
-  constexpr int kRanges = 80;
-  const double far = 1 / (1.2 * options.range_max), near = 1 / options.range_min;
-  std::vector<float> ranges;
-  ranges.reserve(kRanges);
-  for (int i = 0; i < kRanges; ++i)
-    ranges.push_back(static_cast<float>(1 / (far + (near - far) * i / (kRanges - 1))));
-  return ranges;
-}
+  explicit SweptRanges(const DetectorOptions &options)
+      : far(1 / (1.2 * options.range_max)), step((1 / options.range_min - far) / (kCount - 1))
+  {
+    for (std::size_t i = 0; i < kCount; ++i)
+      range[i] = static_cast<float>(1 / (far + step * static_cast<double>(i)));
+  }
+  /// The first at which \p s = r / d makes no more than \p radius.
+  std::size_t firstWithin(double s, double radius) const
+  {
+    const double guess = std::clamp((s / radius - far) / step, 0.0, double(kCount));
+    auto i = static_cast<std::size_t>(guess);
+    while (i > 0 && !(s * range[i - 1] > radius))
+      --i;
+    while (i < kCount && s * range[i] > radius)
+      ++i;
+    return i;
+  }
+
+  static constexpr std::size_t kCount = 80;
+  std::array<float, kCount> range;
+
+private:
+  double far, step; // of the inverse depth
+};
 
 /// Adds to \p curve, which is zero.
-void sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const std::vector<float> &ranges,
+void sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const SweptRanges &ranges,
            const RangeCurve &curve)
 {
   const PlaneView &now = views.back();
@@ -119,8 +137,8 @@ void sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const s
                          static_cast<float>(1 / profile.step),
                          (peak.contrast > 0 ? profile.rising : profile.falling).data(),
                          static_cast<int>(profile.mean.size())};
-    addAgreement(view, static_cast<float>(1 / peak.contrast), ranges.data(), static_cast<int>(ranges.size()), curve.sum,
-                 curve.seen);
+    addAgreement(view, static_cast<float>(1 / peak.contrast), ranges.range.data(), static_cast<int>(ranges.kCount),
+                 curve.sum, curve.seen);
   }
 }
 
@@ -132,16 +150,12 @@ struct SweepResult
 /// The ranges at which the window agrees with the pair and with neither neighbour more, best first. \p scores keeps its
 /// memory.
 std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &left, const RangeCurve &right,
-                               const std::vector<float> &ranges, const DetectorOptions &options,
-                               std::vector<float> &scores)
+                               const SweptRanges &ranges, const DetectorOptions &options, std::vector<float> &scores)
 {
   constexpr std::size_t kMost = 2;
-  // Ranges fall: those that give a radius within the limits stand together.
-  const auto isWider = [&pair](float range, double radius) { return pair.s * range > radius; };
-  const auto begin = std::lower_bound(ranges.begin(), ranges.end(), options.radius_max, isWider);
-  const auto end = std::lower_bound(begin, ranges.end(), options.radius_min, isWider);
-  const std::size_t first = static_cast<std::size_t>(begin - ranges.begin());
-  scores.resize(static_cast<std::size_t>(end - begin));
+  const std::size_t first = ranges.firstWithin(pair.s, options.radius_max);
+  const std::size_t end = std::max(first, ranges.firstWithin(pair.s, options.radius_min));
+  scores.resize(end - first);
   const float best = scoresOfPair({left.sum + first, left.seen + first}, {right.sum + first, right.seen + first},
                                   static_cast<int>(scores.size()), kLeastViews, scores.data());
   std::vector<SweepResult> maxima;
@@ -150,7 +164,7 @@ std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &lef
   for (std::size_t i = 0; i < scores.size(); ++i)
     if (scores[i] >= options.agreement_min && (i == 0 || scores[i] >= scores[i - 1]) &&
         (i + 1 == scores.size() || scores[i] > scores[i + 1]))
-      maxima.push_back({ranges[first + i], scores[i]});
+      maxima.push_back({ranges.range[first + i], scores[i]});
   std::sort(maxima.begin(), maxima.end(),
             [](const SweepResult &a, const SweepResult &b) { return a.agreement > b.agreement; });
   if (maxima.size() > kMost)
@@ -190,7 +204,7 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
     if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
-    const Vector3d step = -(H.inverse() * Eigen::Vector3f::Map(sums.g).cast<double>());
+    const Vector3d step = -solveDefinite<3>(H, Eigen::Vector3f::Map(sums.g).cast<double>());
     if (!step.allFinite())
       break;
     fit.p += step.cwiseMax(-0.5).cwiseMin(0.5);
@@ -206,10 +220,11 @@ double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy, doubl
   double low[2] = {0, 0}, high[2] = {0, 0};
   const Vector2d reference = xy - views.back().position;
   const auto halfAngle = [radius](const Vector2d &w) { return std::asin(std::min(radius / w.norm(), 1.0)); };
+  const double here = halfAngle(reference);
   for (const PlaneView &view : views) {
     const Vector2d w = xy - view.position;
     const double angle = std::atan2(reference.x() * w.y() - reference.y() * w.x(), reference.dot(w));
-    const double widened = halfAngle(w) - halfAngle(reference);
+    const double widened = halfAngle(w) - here;
     for (const int side : {0, 1}) {
       const double moved = angle + (side == 0 ? widened : -widened);
       low[side] = std::min(low[side], moved);
@@ -254,15 +269,16 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewC
   const Vector2d w = detection.trunk.xy - views.back().position;
   detection.range = w.norm();
   const double r = detection.trunk.radius();
-  detection.parallax = parallaxOf(views, detection.trunk.xy, r);
   Matrix3d information = fit.information;
   information.diagonal() += Vector3d(1e-2, 1e-2, 1.0);
   detection.covariance = information.inverse();
   const Vector2d along = w / detection.range;
   const double sigma = std::sqrt(along.dot(detection.covariance.topLeftCorner<2, 2>() * along));
   if (detection.range < options.range_min || detection.range > options.range_max || r < options.radius_min ||
-      r > options.radius_max || detection.parallax < options.parallax_min ||
-      sigma > options.range_sigma_max * detection.range)
+      r > options.radius_max || sigma > options.range_sigma_max * detection.range)
+    return std::nullopt;
+  detection.parallax = parallaxOf(views, detection.trunk.xy, r);
+  if (detection.parallax < options.parallax_min)
     return std::nullopt;
   detection.agreement = sweep.agreement;
   detection.rms_px = fit.rms_px;
@@ -322,16 +338,16 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
 
   const auto &peaks = views.back().profile->peaks; // by rising q: from right to left
   const ViewColumns columns = columnsOf(plane);
-  const std::vector<float> ranges = sweptRanges(options);
+  const SweptRanges ranges(options);
   std::vector<float> scores;
-  std::vector<float> sums(2 * peaks.size() * ranges.size(), 0.f);
+  std::vector<float> sums(2 * peaks.size() * ranges.kCount, 0.f);
   std::vector<RangeCurve> curves;
   std::vector<HalfBearing> bearings;
   curves.reserve(peaks.size());
   bearings.reserve(peaks.size());
   for (const ProfilePeak &peak : peaks) {
-    float *sum = sums.data() + 2 * curves.size() * ranges.size();
-    curves.push_back({sum, sum + ranges.size()});
+    float *sum = sums.data() + 2 * curves.size() * ranges.kCount;
+    curves.push_back({sum, sum + ranges.kCount});
     sweep(plane, peak, ranges, curves.back());
     bearings.emplace_back(peak.q);
   }
