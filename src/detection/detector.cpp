@@ -214,8 +214,8 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
   return fit;
 }
 
-/// By how much the bearing of a border changes over the views.
-double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy, double radius)
+/// Whether the bearing of a border changes by \p least over the views: the first that do end the question.
+bool hasParallax(const std::vector<PlaneView> &views, const Vector2d &xy, double radius, double least)
 {
   double low[2] = {0, 0}, high[2] = {0, 0};
   const Vector2d reference = xy - views.back().position;
@@ -229,9 +229,11 @@ double parallaxOf(const std::vector<PlaneView> &views, const Vector2d &xy, doubl
       const double moved = angle + (side == 0 ? widened : -widened);
       low[side] = std::min(low[side], moved);
       high[side] = std::max(high[side], moved);
+      if (high[side] - low[side] >= least)
+        return true;
     }
   }
-  return std::max(high[0] - low[0], high[1] - low[1]);
+  return false;
 }
 
 bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
@@ -275,10 +277,8 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewC
   const Vector2d along = w / detection.range;
   const double sigma = std::sqrt(along.dot(detection.covariance.topLeftCorner<2, 2>() * along));
   if (detection.range < options.range_min || detection.range > options.range_max || r < options.radius_min ||
-      r > options.radius_max || sigma > options.range_sigma_max * detection.range)
-    return std::nullopt;
-  detection.parallax = parallaxOf(views, detection.trunk.xy, r);
-  if (detection.parallax < options.parallax_min)
+      r > options.radius_max || sigma > options.range_sigma_max * detection.range ||
+      !hasParallax(views, detection.trunk.xy, r, options.parallax_min))
     return std::nullopt;
   detection.agreement = sweep.agreement;
   detection.rms_px = fit.rms_px;

@@ -51,7 +51,6 @@ struct Detection
   double range = 0;                                         ///< from the current camera [m]
   double agreement = 0;                                     ///< 0 to 1
   double rms_px = 0;
-  double parallax = 0;   ///< [rad]
   double foreground = 0; ///< mean of 1 - p(background) between the borders, where known
   int views = 0, inliers = 0;
   double q_left = 0, q_right = 0;               ///< in the current profile
