@@ -36,17 +36,19 @@ double linearSumAlong(const LineSamples &line)
 {
   const float *pixels = line.pixels;
   const int columns = line.columns, rows = line.rows;
-  const double x_top = line.x_top, along = line.slope, last = columns - 1 - 1e-9;
-  double sum = 0;
+  const float x_top = static_cast<float>(line.x_top), along = static_cast<float>(line.slope),
+              end = static_cast<float>(columns - 1);
+  float sum = 0;
 #pragma omp simd reduction(+ : sum)
   for (int i = 0; i < rows; ++i) {
-    const double x = x_top + along * i;
-    const double held = std::max(0.0, std::min(x, last)), share = held == x ? 1 : 0; // 0 for NaN
+    const float x = x_top + along * static_cast<float>(i);
+    const bool is_inside = (x >= 0) & (x < end); // false for NaN
+    const float held = is_inside ? x : 0, share = is_inside ? 1.f : 0.f;
     const int column = static_cast<int>(held), at = i * columns + column;
-    const double p0 = pixels[at], p1 = pixels[at + 1];
-    sum += share * (p0 + (held - column) * (p1 - p0));
+    const float p0 = pixels[at], p1 = pixels[at + 1];
+    sum += share * (p0 + (held - static_cast<float>(column)) * (p1 - p0));
   }
-  return sum;
+  return static_cast<double>(sum);
 }
 
 BOLE_VECTOR_CLONES
