@@ -150,7 +150,7 @@ void setSensors(StageOptions &o, const Options &options)
 void setServoing(StageOptions &o)
 {
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
-  o.flow.view_correlation = 0.05; // m: what it sees from one place counts but once
+  o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
 }
 

@@ -88,8 +88,8 @@ private:
   TrunkTaskOptions m_options;
   Sidestep m_sidestep;
   vpServo m_servo;
-  vpFeatureTrunk m_current, m_desired; ///< as it will stand when the command acts; as it should
-  DroneResponse m_response; ///< with what is flown of what is sent
+  vpFeatureTrunk m_current, m_desired;  ///< as it will stand when the command acts; as it should
+  DroneResponse m_response;             ///< with what is flown of what is sent
   FeatureFilter m_bearing, m_log_ratio; ///< at the frame
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
