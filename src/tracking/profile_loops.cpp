@@ -28,8 +28,10 @@ int addAcrossRows(const AcrossLine &line, int row, int n, int half, float *__res
   const int columns = line.columns, rows = line.rows;
   for (; row < rows; ++row) {
     const double x = x_top + slope * row;
+    if (!(x >= half && x < columns))
+      break;
     const int left = static_cast<int>(x), first = left - half;
-    if (!(x >= 0) || first < 0 || first + n + 2 >= columns)
+    if (first + n + 2 >= columns)
       break;
     addRow(line.pixels + row * columns + first, n, static_cast<float>(x - left), whole, between);
   }
