@@ -233,7 +233,7 @@ def things_that_grow():
     yield "trunks in view", [(f"{density:g} a m²", None, f"forest: {{density: {density}}}\n", [], 20, 100)
                              for density in (0.01, 0.03, 0.06, 0.12, 0.2)]
     yield "frames of the window", [("", n, "", [f"detection.window={n}"], 40, 110) for n in (6, 12, 18, 36)]
-    yield "minutes of flight", [("", to / 600, "flight: {path: loop}\n", [], to - 150, to)
+    yield "minutes of flight", [("", to / 600, "flight: {path: loop}\n", [], 20, to)
                                  for to in (200, 400, 800, 1200)]
 
 
