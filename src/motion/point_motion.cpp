@@ -115,8 +115,8 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
 void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
 {
   constexpr double kLean = 0.015;  // of upright trunks [rad]: 3 px over 200 rows
-  constexpr double kSigmas = 6;    // images in order: at most 4.3 in 4000 pairs of them
-  constexpr double kGain = 9;      // three sigmas more; bounded for all matches together, since outliers cost as much
+  constexpr double kSigmas = 6;    // of the fit; recorded images in order: at most 4.3 in 4000 pairs of them
+  constexpr double kGain = 9;      // chi-squared, three sigmas; images in order from a drone that sways: at most 3.6
   constexpr int kMostRefused = 10; // in a row: then the camera has changed for good
   if (m_seen.size() < 2)
     return;
