@@ -325,17 +325,20 @@ COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 
 def picture(draw, width=6.4, height=3.6):
+    """What \p draw puts onto axes, with a legend of what it named; nothing where it drew nothing."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(width, height), layout="constrained")
-    drawn = draw(axes)
+    draw(axes)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend()
     out = io.BytesIO()
     figure.savefig(out, format="svg")
     plt.close(figure)
-    if drawn is False:
+    if not axes.has_data():
         return ""
     return '<img alt="" src="data:image/svg+xml;base64,' + base64.b64encode(out.getvalue()).decode() + '">'
 
@@ -358,11 +361,7 @@ def recall_by(trunks, runs, key, edges, label):
                 some = [t for t in mine if low <= float(t[key]) < high]
                 shares.append((0.5 * (low + high), sum(t["kind"] == "matched" for t in some), len(some)))
             plot_shares(axes, colour, run, shares)
-        if not axes.has_data():
-            return False
         axes.set(xlabel=label, ylabel="recall (95 % interval)", ylim=(0, 1.05))
-        axes.legend()
-        return True
 
     return picture(draw)
 
@@ -379,12 +378,9 @@ def reliability(trunks, runs):
                 mean = sum(float(t["probability"]) for t in some) / max(1, len(some))
                 shares.append((mean, sum(t["kind"] == "matched" for t in some), len(some)))
             plot_shares(axes, colour, run, shares, marks_only=True)
-        if not axes.has_data():
-            return False
-        axes.plot([0.4, 1], [0.4, 1], color="0.6", linestyle="--")
+        if axes.has_data():
+            axes.plot([0.4, 1], [0.4, 1], color="0.6", linestyle="--")
         axes.set(xlabel="probability that was written", ylabel="share that is right (95 %)", xlim=(0.4, 1.02), ylim=(0, 1.05))
-        axes.legend()
-        return True
 
     return picture(draw)
 
@@ -394,14 +390,13 @@ def errors_by(trunks, flights, runs, key, error, label):
     settings = {f["flight"]: f for f in flights}
 
     def draw(axes):
-        has_any, ticks = False, []
+        ticks = []
         for index, (colour, run) in enumerate(zip(COLOURS, runs)):
             mine = [(t.get(key, settings.get(t["flight"], {}).get(key)), abs(float(t[error]))) for t in trunks
                     if t["run"] == run and t["kind"] == "matched" and t.get(error) not in (None, "")]
             mine = [(k, e) for k, e in mine if k not in (None, "")]
             if not mine:
                 continue
-            has_any = True
             if isinstance(mine[0][0], str):
                 ticks = sorted({k for k, _ in mine})
                 for i, name in enumerate(ticks):
@@ -409,14 +404,9 @@ def errors_by(trunks, flights, runs, key, error, label):
                                  boxprops={"color": colour}, medianprops={"color": colour})
             else:
                 axes.plot([float(k) for k, _ in mine], [e for _, e in mine], ".", color=colour, label=run)
-        if not has_any:
-            return False
         if ticks:
             axes.set_xticks(range(len(ticks)), ticks)
-        else:
-            axes.legend()
         axes.set(xlabel=label, ylabel=error.replace("_m", " [m]").replace("_", " "))
-        return True
 
     return picture(draw)
 
@@ -430,11 +420,7 @@ def sweep(campaign, flights, option):
                 some = [bool(f["success"]) for f in flights if f["run"] == run and f["ok"] and "success" in f]
                 shares.append((value, sum(some), len(some)))
             plot_shares(axes, colour, name, shares)
-        if not axes.has_data():
-            return False
         axes.set(xlabel=option, ylabel="share that succeeded (95 %)", ylim=(0, 1.05))
-        axes.legend()
-        return True
 
     return picture(draw, 4.2, 3.2)
 
@@ -443,13 +429,12 @@ def spread(flights, runs, name, label, honest=None):
     def draw(axes):
         data = [[float(f[name]) for f in flights if f["run"] == run and f.get(name) is not None] for run in runs]
         if not any(data):
-            return False
+            return
         axes.boxplot([d or [float("nan")] for d in data], vert=False)
         axes.set_yticks(range(1, len(runs) + 1), runs)
         axes.set_xlabel(label)
         if honest is not None:
             axes.axvline(honest, color=COLOURS[2], linestyle="--")
-        return True
 
     return picture(draw, 6.4, 1.2 + 0.5 * len(runs))
 
