@@ -16,6 +16,12 @@ namespace
 {
 constexpr double kWideShear = 1; // sigma of the shear before anything is seen
 
+/// Noise of a match that is believed at the least [normalised].
+double leastNoise(const PinholeCamera &camera, const RelativePoseOptions &options)
+{
+  return options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
+}
+
 /// Gauss-Newton with redescending weights, their scale that of the bulk in each step.
 std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior,
                                  double min_sigma, double inflation)
@@ -66,7 +72,7 @@ RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeC
     return {};
   const motion::MotionPrior prior(given);
   const motion::Rays rays(matches, camera);
-  const double min_sigma = options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
+  const double min_sigma = leastNoise(camera, options);
   std::optional<RowShear> best;
   for (const Pose &start : starts) {
     const auto fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma, options.inflation);
@@ -80,19 +86,19 @@ double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, 
                    const RelativePosePrior &given, const std::vector<Pose> &starts, const RelativePoseOptions &options)
 {
   const motion::MotionPrior prior(given);
-  std::vector<PointMatch> upright = matches;
-  for (PointMatch &match : upright)
-    match.b_px.x() -= row.shear * camera.fx * camera.ray(match.b_px).y();
-  const double min_sigma = options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
+  const motion::Rays rays(matches, camera);
+  motion::Rays upright;
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    upright.add(rays.a[i], rays.b[i] - row.shear * rays.b[i].y() * Eigen::Vector3d::UnitX());
+  const double min_sigma = leastNoise(camera, options);
   const auto costFrom = [&](const motion::Rays &rays, const Pose &start) {
     const motion::JointFit fit =
         motion::fitMotion(rays, {start.R, start.t.normalized()}, prior, row.noise, min_sigma, options);
     return motion::costOf(rays, fit.motion, prior, row.noise, options);
   };
-  const motion::Rays rays(matches, camera);
   double without = costFrom(rays, row.aMb);
   for (const Pose &start : starts)
     without = std::min(without, costFrom(rays, start));
-  return 2 * (without - costFrom(motion::Rays(upright, camera), row.aMb));
+  return 2 * (without - costFrom(upright, row.aMb));
 }
 } // namespace bole
