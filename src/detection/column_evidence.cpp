@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 namespace
 {
 /// Ranges that are tried, over that of the trunk.
-constexpr std::array<double, 11> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
+constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
 constexpr int kViews = 24;   // looked at, spread over the flight
 constexpr int kPartners = 3; // each is compared with
@@ -73,29 +73,6 @@ double difference(const LevelColumn &a, const LevelColumn &b, float by_value, fl
   return 0.5 * static_cast<double>(sum) / n;
 }
 
-/// Running means by range, for the three kinds of columns.
-struct Curves
-{
-  std::array<std::array<double, kScales.size()>, 3> sum{}, count{};
-
-  void add(std::size_t kind, std::size_t scale, double value)
-  {
-    sum[kind][scale] += value;
-    ++count[kind][scale];
-  }
-  double mean(std::size_t kind, std::size_t scale) const
-  {
-    return count[kind][scale] > 0 ? sum[kind][scale] / count[kind][scale] : std::numeric_limits<double>::infinity();
-  }
-  double least(std::size_t kind, std::size_t first, std::size_t end) const
-  {
-    double best = std::numeric_limits<double>::infinity();
-    for (std::size_t s = first; s < end; ++s)
-      best = std::min(best, mean(kind, s));
-    return best;
-  }
-};
-
 /// The views that stand apart by the right parallax, the best first.
 std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views)
 {
@@ -123,13 +100,26 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
 
 double across(const Vector2d &direction, const Vector2d &a) { return direction.x() * a.y() - direction.y() * a.x(); }
 
-/// One view against its partners. False where nothing could be compared. \p lean: of what is compared, as Trunk::lean.
-bool compare(const LevelView &view, const Columns &columns, const Vector2d &lean,
-             const std::vector<std::size_t> &partners, const std::vector<LevelView> &views, Curves &curves)
+/// What a trunk covers in a view [tan of the bearing]; nothing where it is not in sight.
+std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
 {
+  const auto at = locate(trunk, view, std::numeric_limits<double>::infinity());
+  if (!at)
+    return {0, 0};
+  return {std::tan(at->bearing - at->half_angle), std::tan(at->bearing + at->half_angle)};
+}
+
+/// One view against its partners. False where nothing could be compared.
+bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
+             const std::vector<std::size_t> &partners, const std::vector<LevelView> &views, ColumnCurves &curves)
+{
+  const Vector2d &lean = trunk.lean;
+  std::vector<std::pair<double, double>> covered;
+  for (const std::size_t partner : partners)
+    covered.push_back(coveredBy(trunk, views[partner]));
   constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008; // [full scale] noise of the camera
-  Curves here;
+  ColumnCurves here;
   for (std::size_t i = 0; i < columns.angle.size(); ++i) {
     const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
     const Vector2d direction = c * view.forward + s * view.left;
@@ -137,8 +127,8 @@ bool compare(const LevelView &view, const Columns &columns, const Vector2d &lean
     if (column.bands == 0)
       continue;
     const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
-    for (const std::size_t partner : partners) {
-      const LevelView &other = views[partner];
+    for (std::size_t p = 0; p < partners.size(); ++p) {
+      const LevelView &other = views[partners[p]];
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
       const auto by_value = static_cast<float>(1 / unit);
       for (std::size_t k = 0; k < kScales.size(); ++k) {
@@ -146,7 +136,10 @@ bool compare(const LevelView &view, const Columns &columns, const Vector2d &lean
         const double ahead = at.dot(other.forward);
         if (ahead < 0.1)
           continue;
-        const LevelColumn there = other.image->at(at.dot(other.left) / ahead, across(at, lean) / at.norm());
+        const double q = at.dot(other.left) / ahead;
+        if (kind > 0 && k > kOwn && q > covered[p].first && q < covered[p].second)
+          continue; // what stands behind the trunk there is hidden by it
+        const LevelColumn there = other.image->at(q, across(at, lean) / at.norm());
         const double d = difference(column, there, by_value, 2 * by_value);
         if (d >= 0)
           here.add(kind, k, d);
@@ -155,13 +148,66 @@ bool compare(const LevelView &view, const Columns &columns, const Vector2d &lean
   }
   if (here.count[0][kOwn] == 0)
     return false;
-  for (std::size_t kind = 0; kind < 3; ++kind)
-    for (std::size_t k = 0; k < kScales.size(); ++k)
-      if (here.count[kind][k] > 0)
-        curves.add(kind, k, here.mean(kind, k));
+  curves.add(here);
   return true;
 }
+
+/// The views that show it.
+std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  std::vector<Seen> all;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (const auto at = locate(trunk, views[i], farthest))
+      all.push_back({i, *at});
+  return all;
+}
+
+void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views,
+             ColumnCurves &curves)
+{
+  const std::vector<std::size_t> partners = partnersOf(seen, all, views);
+  if (!partners.empty())
+    compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), trunk, partners, views,
+            curves);
+}
 } // namespace
+
+void ColumnCurves::add(std::size_t kind, std::size_t range, double value)
+{
+  sum[kind][range] += value;
+  ++count[kind][range];
+}
+
+void ColumnCurves::add(const ColumnCurves &view)
+{
+  for (std::size_t kind = 0; kind < sum.size(); ++kind)
+    for (std::size_t k = 0; k < kTriedRanges; ++k)
+      if (view.count[kind][k] > 0)
+        add(kind, k, view.mean(kind, k));
+  ++views;
+}
+
+void ColumnCurves::fade(double share)
+{
+  for (std::size_t kind = 0; kind < sum.size(); ++kind)
+    for (std::size_t k = 0; k < kTriedRanges; ++k) {
+      sum[kind][k] *= share;
+      count[kind][k] *= share;
+    }
+}
+
+double ColumnCurves::mean(std::size_t kind, std::size_t range) const
+{
+  return count[kind][range] > 0 ? sum[kind][range] / count[kind][range] : std::numeric_limits<double>::infinity();
+}
+
+double ColumnCurves::least(std::size_t kind, std::size_t first, std::size_t end) const
+{
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t s = first; s < end; ++s)
+    best = std::min(best, mean(kind, s));
+  return best;
+}
 
 LevelView::LevelView(const LevelImage &level, const Pose &wMc) : image(&level), position(wMc.t.head<2>()), z(wMc.t.z())
 {
@@ -182,25 +228,34 @@ std::optional<TrunkInLevelView> locate(const Trunk &trunk, const LevelView &view
   return at;
 }
 
+std::optional<ColumnCurves> columnsOfView(const Trunk &trunk, std::size_t which, const std::vector<LevelView> &views,
+                                          double farthest)
+{
+  const auto at = locate(trunk, views[which], farthest);
+  if (!at)
+    return std::nullopt;
+  ColumnCurves curves;
+  compare(trunk, {which, *at}, locateAll(trunk, views, farthest), views, curves);
+  return curves.views > 0 ? std::optional(curves) : std::nullopt;
+}
+
 std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
-  constexpr int kLeastViews = 3;
-  std::vector<Seen> all;
-  for (std::size_t i = 0; i < views.size(); ++i)
-    if (const auto at = locate(trunk, views[i], farthest))
-      all.push_back({i, *at});
-  ColumnEvidence evidence;
-  Curves curves;
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  ColumnCurves curves;
   const std::size_t n = std::min<std::size_t>(all.size(), kViews);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Seen &seen = all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0];
-    const std::vector<std::size_t> partners = partnersOf(seen, all, views);
-    if (!partners.empty() && compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step),
-                                     trunk.lean, partners, views, curves))
-      ++evidence.views;
-  }
-  if (evidence.views < kLeastViews)
+  for (std::size_t i = 0; i < n; ++i)
+    compare(trunk, all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0], all, views, curves);
+  return evidenceOf(curves);
+}
+
+std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
+{
+  constexpr int kLeastViews = 3;
+  if (curves.views < kLeastViews)
     return std::nullopt;
+  ColumnEvidence evidence;
+  evidence.views = curves.views;
   const auto from = [&](std::size_t kind, std::size_t first, std::size_t end, double own) {
     const double best = curves.least(kind, first, end);
     return std::isfinite(best) ? best - own : 0;

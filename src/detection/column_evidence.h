@@ -12,6 +12,7 @@
 #include "detection/level_image.h"
 #include <bole/trunk.h>
 
+#include <array>
 #include <optional>
 
 namespace bole
@@ -47,6 +48,30 @@ struct ColumnEvidence
   double left = 0, right = 0; ///< beside a border: at the trunk's range less the best farther one. Below 0: the trunk
                               ///< goes on there, and the border is one of light and shade
 };
+
+/// Ranges that are tried, over that of the trunk.
+constexpr std::size_t kTriedRanges = 11;
+
+/// Means by range of what columns differ by, over the views of a trunk: inside it, beside its left border, beside its
+/// right one.
+struct ColumnCurves
+{
+  int views = 0;
+  std::array<std::array<double, kTriedRanges>, 3> sum{}, count{};
+
+  void add(std::size_t kind, std::size_t range, double value);
+  void add(const ColumnCurves &view); ///< as one view
+  /// What was added before counts by \p share of it.
+  void fade(double share);
+  double mean(std::size_t kind, std::size_t range) const;
+  double least(std::size_t kind, std::size_t first, std::size_t end) const;
+};
+
+/// What \p views[which] says of \p trunk beside the others; none where it is not in sight or nothing has a parallax.
+std::optional<ColumnCurves> columnsOfView(const Trunk &trunk, std::size_t which, const std::vector<LevelView> &views,
+                                          double farthest);
+/// None of fewer than three views.
+std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves);
 
 /// None where fewer than three views have a parallax.
 std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);

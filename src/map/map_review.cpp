@@ -7,12 +7,20 @@
 
 namespace bole
 {
+namespace
+{
+constexpr int kColumnViews = 12;     ///< compared before a trunk is given up for its columns
+constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
+}
+
 bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
 {
   if (trunk.observations < m_options.doubt_observations)
     return false;
   if (!has_ranges)
     return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
+  if (trunk.column_views >= kColumnViews && trunk.column_odds < m_options.final_odds - kHysteresis)
+    return true;
   if (trunk.status == TrunkStatus::confirmed)
     return evidence(trunk) < m_options.doubt_confirmed;
   return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
@@ -26,7 +34,8 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
-         isPlaced(trunk.covariance) && evidence(trunk) >= m_options.confirm_evidence;
+         isPlaced(trunk.covariance) && evidence(trunk) >= m_options.confirm_evidence &&
+         (trunk.column_views == 0 || trunk.column_odds >= m_options.final_odds);
 }
 
 namespace

@@ -112,6 +112,33 @@ void TrunkMap::record(const PointCount &points)
   trunk.points_behind += points.behind;
 }
 
+void TrunkMap::record(const ColumnOdds &odds)
+{
+  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(odds.id)];
+  trunk.column_odds = odds.log_odds;
+  trunk.column_views = odds.views;
+}
+
+std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
+{
+  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
+  const std::size_t before = trunk.smoother_id;
+  trunk.smoother_id = reading.smoother_id;
+  trunk.trunk = reading.trunk;
+  trunk.covariance = reading.covariance;
+  trunk.observations = trunk.column_views = 0;
+  trunk.left_contrast.reset();
+  trunk.right_contrast.reset();
+  const double first_seen_s = trunk.first_seen_s;
+  const int hits = trunk.hits;
+  for (const TrunkView &view : reading.views)
+    addView(trunk, view);
+  trunk.innovation2 = reading.innovation2;
+  trunk.hits = hits; // frames in which it was looked for
+  trunk.first_seen_s = first_seen_s;
+  return before;
+}
+
 void BearingSpread::add(double bearing)
 {
   const double turned = std::remainder(bearing - first, 2 * M_PI);

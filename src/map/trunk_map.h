@@ -89,6 +89,8 @@ struct MapTrunk
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
+  double column_odds = 0;               ///< log-odds by the columns of the last frames,
+  int column_views = 0;                 ///< and in how many of them it was compared
   std::optional<double> final_odds;     ///< log-odds by all frames, where they were judged: see TrunkMap::decide()
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
@@ -138,6 +140,14 @@ struct PointCount
 {
   int id = 0;
   int on = 0, behind = 0; ///< at its range, and beyond it
+};
+
+/// What the columns of the frames since a trunk was found say of it.
+struct ColumnOdds
+{
+  int id = 0;
+  double log_odds = 0; ///< that it is a trunk
+  int views = 0;
 };
 
 /// What the detector found, with the views that it was seen in.
@@ -213,6 +223,10 @@ public:
   bool recognise(const Trunk &found);
   void record(const Sighting &sighting);
   void record(const PointCount &points);
+  void record(const ColumnOdds &odds);
+  /// Another reading of the lines of \p id takes its place: what was seen between the former borders is forgotten.
+  /// Returns what the smoother is to forget.
+  std::size_t readAgain(int id, const NewTrunk &reading);
   void refresh(const TrunkEstimate &estimate);
   /// Stops looking for a trunk, which stays in the map as it is.
   void end(int id);

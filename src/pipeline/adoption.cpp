@@ -152,18 +152,24 @@ Adoption Follower::fitted(double found_s, const PinholeCamera &camera, const Sta
   return adoption;
 }
 
-Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
+Adoption followThroughWindow(const Hypothesis &hypothesis, const DetectionWindow &window, const Smoother &smoother,
                              const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
 {
-  Follower follower(detection.trunk, Matrix5d::Zero());
+  Follower follower(hypothesis.trunk, hypothesis.covariance);
   Viewpoint at = view;
   for (const WindowView &frame : window.views()) {
     const Pose wMb = smoother.pose(frame.pose);
     at.wMc = wMb * options.smoothing.bMc;
     at.time_s = frame.time_s;
-    follower.look(*frame.gradient, frame.pose, wMb, at, map, -1, options);
+    follower.look(*frame.gradient, frame.pose, wMb, at, map, hypothesis.id, options);
   }
-  Adoption adoption = follower.fitted(view.time_s, view.camera, options);
+  return follower.fitted(view.time_s, view.camera, options);
+}
+
+Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
+                             const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
+{
+  Adoption adoption = followThroughWindow(Hypothesis{-1, detection.trunk}, window, smoother, map, view, options);
   if (adoption.views.empty()) {
     adoption.trunk.covariance.setIdentity();
     adoption.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;

@@ -50,6 +50,15 @@ struct Adoption
   std::vector<AdoptedView> views;
 };
 
+/// A place where a trunk may stand.
+struct Hypothesis
+{
+  int id = 0; ///< in the map
+  Trunk trunk;
+  double online = 0;                      ///< log-odds by TrunkMap::evidence
+  Matrix5d covariance = Matrix5d::Zero(); ///< of the place, given the poses: how far its borders are looked for
+};
+
 /// What stands in several frames of the window where one trunk would, best first.
 std::vector<Detection> detectInWindow(const DetectionWindow &window, const Smoother &smoother, const TrunkMap &map,
                                       const Viewpoint &view, const vpImage<float> *p_background,
@@ -90,6 +99,9 @@ private:
   std::optional<double> m_left_contrast, m_right_contrast;
 };
 
+/// What the views of the window show of a hypothesis. \p view: of the newest frame.
+Adoption followThroughWindow(const Hypothesis &hypothesis, const DetectionWindow &window, const Smoother &smoother,
+                             const TrunkMap &map, const Viewpoint &view, const StageOptions &options);
 /// A detection of the window, followed through its views. \p view: of the newest frame.
 Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
                              const TrunkMap &map, const Viewpoint &view, const StageOptions &options);

@@ -111,10 +111,9 @@ FrameReport Engine::process(const Frame &frame)
     add(tracked, view);                                                                // Eq. 9
     lap("tracking");
     m_window.push(gradient, newest(), view, m_smoother, m_units);
+    lookAtColumns(frame, tracked, view);
     adoptNew(view, background(saliency)); // Eq. 18-21
     lap("detection");
-    if (m_units.flow.final_pass)
-      m_album.add(frame.image, newest(), view, m_units.flow.view_spacing, m_units.detection.profile.range);
     report.trunks = inView(tracked, m_map, view.has_ranges);
     report.points = points();
     reviewMap(report.points, view); // Sec. 7
@@ -227,11 +226,18 @@ void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, con
 
 void Engine::adopt(Adoption adoption)
 {
-  const Trunk &trunk = adoption.trunk.trunk;
-  adoption.trunk.smoother_id = m_smoother.addTrunk(trunk, priorOf(trunk, m_units.smoothing));
-  for (const AdoptedView &view : adoption.views)
-    m_smoother.addObservation(view.pose, adoption.trunk.smoother_id, view.summary);
+  adoption.trunk.smoother_id = hold(adoption);
   m_map.add(adoption.trunk);
+}
+
+/// Gives a trunk with its views to the smoother, and returns its number there.
+std::size_t Engine::hold(const Adoption &adoption)
+{
+  const Trunk &trunk = adoption.trunk.trunk;
+  const std::size_t id = m_smoother.addTrunk(trunk, priorOf(trunk, m_units.smoothing));
+  for (const AdoptedView &view : adoption.views)
+    m_smoother.addObservation(view.pose, id, view.summary);
+  return id;
 }
 
 std::vector<TriangulatedRay> Engine::points() const

@@ -9,6 +9,7 @@
 
 #include "pipeline/final_pass.h"
 #include "pipeline/motion_source.h"
+#include "pipeline/recent_columns.h"
 #include "pipeline/units.h"
 #include "saliency/saliency.h"
 #include <bole/pipeline.h>
@@ -38,6 +39,7 @@ private:
   std::vector<Judged> judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before = {}) const;
   std::vector<LevelView> levelViews() const;
   Viewpoint viewpointOf(const KeptFrame &frame) const;
+  static constexpr int kLeastViews = 4;    ///< of a hypothesis that is judged
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
 
   /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
@@ -56,6 +58,9 @@ private:
   void adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
                  const vpImage<float> *p_background, const StageOptions &options);
   void adopt(Adoption adoption);
+  std::size_t hold(const Adoption &adoption);
+  void readWider(const Judged &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
+  void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
   void reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
   void refreshMap(double seen_since_s);
@@ -84,6 +89,7 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  RecentColumns m_columns;
   Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;
   std::vector<Judged> m_judged;

@@ -10,8 +10,6 @@ namespace bole
 {
 namespace
 {
-constexpr int kLeastViews = 4; ///< of a hypothesis that is judged
-
 std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
 {
   std::vector<int> ids;
@@ -212,9 +210,7 @@ void Engine::decideByAllFrames()
     if (!reading.judged || !reading.views || !decisions[reading.judged->id].is_trunk)
       continue;
     NewTrunk trunk = reading.views->trunk;
-    trunk.smoother_id = m_smoother.addTrunk(trunk.trunk, priorOf(trunk.trunk, m_units.smoothing));
-    for (const AdoptedView &view : reading.views->views)
-      m_smoother.addObservation(view.pose, trunk.smoother_id, view.summary);
+    trunk.smoother_id = hold(*reading.views);
     decisions[reading.judged->id].found = trunk;
   }
   std::vector<TrunkDecision> list;

@@ -6,24 +6,19 @@
 
 namespace bole
 {
-void Album::add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
-                const ElevationRange &range)
+void Album::add(const vpImage<unsigned char> &image, const LevelImage &level, std::size_t pose, double time_s)
 {
   constexpr std::size_t kMostBytes = std::size_t(256) << 20; // of pictures
-  if (m_last && (at.wMc.t - *m_last).norm() < spacing)
-    return;
-  m_last = at.wMc.t;
   if (m_offered++ % m_every != 0)
     return;
-  m_frames.push_back({pose, at.time_s, image, computeLevelImage(image, at.camera, at.wMc.R, range)});
+  m_frames.push_back({pose, time_s, image, level});
   if (m_frames.size() * image.getSize() <= kMostBytes)
     return;
   m_every *= 2;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < m_frames.size(); i += 2, ++kept)
-    if (kept != i)
-      m_frames[kept] = std::move(m_frames[i]);
-  m_frames.resize(kept);
+  std::deque<KeptFrame> kept; // a vpImage that was moved from would not own what is assigned to it
+  for (std::size_t i = 0; i < m_frames.size(); i += 2)
+    kept.push_back(std::move(m_frames[i]));
+  m_frames = std::move(kept);
 }
 
 AlbumGradients::AlbumGradients(const std::deque<KeptFrame> &frames, const GradientOptions &options)
@@ -65,17 +60,32 @@ std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<Leve
   const auto evidence = columnEvidence(hypothesis.trunk, views, farthest);
   if (!evidence)
     return std::nullopt;
-  return Judged{hypothesis.id, hypothesis.trunk, hypothesis.online, *evidence,
-                oddsWeights().dot(oddsTerms(*evidence, hypothesis.online))};
+  return judgedBy(*evidence, hypothesis);
+}
+
+Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis)
+{
+  return {hypothesis.id, hypothesis.trunk, hypothesis.online, evidence,
+          oddsWeights().dot(oddsTerms(evidence, hypothesis.online))};
 }
 
 namespace
 {
-/// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts.
-double silhouette(const Judged &judged)
+constexpr double kGoesOn = -0.25; ///< difference beside a border below which the trunk surely goes on there,
+constexpr double kShading = 0.2;  ///< difference beside a border and below which it may
+} // namespace
+
+double leastBeside(const Judged &judged) { return std::min(judged.evidence.left, judged.evidence.right); }
+
+bool goesOnBeside(const Judged &judged) { return leastBeside(judged) < kGoesOn; }
+
+namespace
 {
-  constexpr double kShading = 0.2; // of the difference beside a border: below it the trunk goes on there
-  const auto beside = [](double difference) { return std::min(difference - kShading, 0.0); };
+/// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts, where
+/// the difference there is below \p least.
+double silhouette(const Judged &judged, double least = kShading)
+{
+  const auto beside = [least](double difference) { return std::min(difference - least, 0.0); };
   return judged.log_odds + 0.5 * (beside(judged.evidence.left) + beside(judged.evidence.right));
 }
 } // namespace
@@ -85,16 +95,14 @@ bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
   constexpr double kGain = 0.25;                   // of the difference beside the borders
   constexpr double kWorse = 0.5, kLeastOdds = 1.0; // log-odds
   const auto worst = [](const Judged &one) { return std::min({one.evidence.left, one.evidence.right, 0.0}); };
-  return wider.trunk.log_radius > narrow.trunk.log_radius && worst(wider) > worst(narrow) + kGain &&
-         wider.log_odds > std::max(narrow.log_odds - kWorse, kLeastOdds);
+  return worst(wider) > worst(narrow) + kGain && wider.log_odds > std::max(narrow.log_odds - kWorse, kLeastOdds);
 }
 
 std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
                                        double radius_max)
 {
-  constexpr double kGoesOn = -0.25; // of the difference beside a border
   const ColumnEvidence &evidence = judged.evidence;
-  if (std::min(evidence.left, evidence.right) > kGoesOn)
+  if (!goesOnBeside(judged))
     return std::nullopt;
   Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
   for (const LevelView &view : views)
@@ -103,6 +111,12 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
   const Eigen::Vector2d left = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
   const double radius = judged.trunk.radius();
   std::optional<Judged> best = judged;
+  bool is_other = false;
+  const auto consider = [&](const Trunk &trunk) {
+    const auto one = judge({judged.id, trunk, judged.online}, views, farthest);
+    if (one && silhouette(*one) > silhouette(*best))
+      best = one, is_other = true;
+  };
   for (const double more : {0.25, 0.5, 0.75, 1.0, 1.5, 2.0})
     for (const int side : {1, -1}) {
       if ((side > 0 ? evidence.left : evidence.right) > kGoesOn || (1 + more) * radius > radius_max)
@@ -110,11 +124,9 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
       Trunk wider = judged.trunk;
       wider.xy += side * more * radius * left;
       wider.log_radius += std::log(1 + more);
-      const auto one = judge({judged.id, wider, judged.online}, views, farthest);
-      if (one && silhouette(*one) > silhouette(*best))
-        best = one;
+      consider(wider);
     }
-  if (best->trunk.log_radius == judged.trunk.log_radius)
+  if (!is_other)
     return std::nullopt;
   constexpr double kStep = 0.15; // standard deviation, of the radius: the steps above are as fine
   Hypothesis guess{judged.id, best->trunk, judged.online};

@@ -25,20 +25,17 @@ struct KeptFrame
   LevelImage level;
 };
 
-/// Frames of the flight, from places apart. Bounded: when it is full every other frame goes, and the next ones are
+/// Frames of the flight. Bounded: when it is full every other frame goes, and the next ones are
 /// taken half as often.
 class Album
 {
 public:
-  /// \p spacing: least move of the camera between two frames [units of the motion].
-  void add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
-           const ElevationRange &range);
+  void add(const vpImage<unsigned char> &image, const LevelImage &level, std::size_t pose, double time_s);
   const std::deque<KeptFrame> &frames() const { return m_frames; }
 
 private:
   std::deque<KeptFrame> m_frames; ///< never moved to another place: pictures would be copied
   std::size_t m_every = 1, m_offered = 0;
-  std::optional<Eigen::Vector3d> m_last;
 };
 
 /// Gradients of the frames of an album. Each is made once, and kept as far as the memory goes.
@@ -54,15 +51,6 @@ private:
   GradientOptions m_options;
   std::vector<std::shared_ptr<const Gradient>> m_made;
   std::size_t m_bytes = 0;
-};
-
-/// A place where a trunk may stand.
-struct Hypothesis
-{
-  int id = 0; ///< in the map
-  Trunk trunk;
-  double online = 0;                      ///< log-odds by TrunkMap::evidence
-  Matrix5d covariance = Matrix5d::Zero(); ///< of the place, given the poses: how far its borders are looked for
 };
 
 /// A hypothesis with the odds that all frames give it.
@@ -86,6 +74,13 @@ OddsTerms oddsWeights();
 /// What the columns of all frames say of \p hypothesis; none where too few views have a parallax.
 std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest);
 
+/// The same of evidence at hand.
+Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis);
+
+/// The lesser of the differences beside its two borders.
+double leastBeside(const Judged &judged);
+/// Whether the trunk goes on beside a border.
+bool goesOnBeside(const Judged &judged);
 /// Where columns beside a border stand at the range of the trunk: the best guess of the silhouette that takes them in.
 /// None where there is none, or none up to \p radius_max.
 std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,

@@ -150,10 +150,11 @@ std::vector<BorderPeak> peaksOf(const std::vector<float> &contrast, double step_
 
 double contrastCost(double contrast, const std::optional<double> &before)
 {
+  constexpr double kChanged = 2; // -log of how often light, shade or what stands behind gives a border another contrast
   if (before) {
     const double sigma = 0.3 * std::abs(*before) + 0.01;
     const double z = (contrast - *before) / sigma;
-    return 0.5 * std::min(z * z, 16.0);
+    return std::min(0.5 * z * z, kChanged);
   }
   return 4 - 2 * std::min(std::abs(contrast) / 0.03, 2.0);
 }

@@ -59,6 +59,6 @@ struct BorderPeak
 std::vector<BorderPeak> peaksOf(const std::vector<float> &contrast, double step_px, double least);
 
 /// How badly a contrast continues the one of the frames before, or how weak it is where there is none: a negative
-/// log-likelihood, 0 to 8. Both in full scale a pixel.
+/// log-likelihood, 0 to 4. Both in full scale a pixel.
 double contrastCost(double contrast, const std::optional<double> &before);
 } // namespace bole

@@ -156,6 +156,31 @@ TEST(ColumnEvidence, BesideAnEdgeOfShadowTheTrunkGoesOn)
   EXPECT_LT(evidence->right, -0.25);
 }
 
+/// Taken view by view it is what it is taken at once; what was seen long ago fades.
+TEST(ColumnEvidence, ViewByViewItIsTheSame)
+{
+  const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
+  const LevelFlight flight({trunk}, sweep());
+  const std::vector<LevelView> views = flight.views();
+  const auto at_once = columnEvidence(trunkOf(trunk), views, kFarthest);
+  ColumnCurves all, faded;
+  EXPECT_FALSE(evidenceOf(all).has_value());
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (const auto view = columnsOfView(trunkOf(trunk), i, views, kFarthest)) {
+      all.add(*view);
+      faded.fade(0.5);
+      faded.add(*view);
+    }
+  const auto by_view = evidenceOf(all), lately = evidenceOf(faded);
+  ASSERT_TRUE(at_once && by_view && lately);
+  EXPECT_EQ(by_view->views, at_once->views);
+  EXPECT_NEAR(by_view->own, at_once->own, 1e-9);
+  EXPECT_NEAR(by_view->left, at_once->left, 1e-9);
+  const auto last = columnsOfView(trunkOf(trunk), views.size() - 1, views, kFarthest);
+  ASSERT_TRUE(last.has_value());
+  EXPECT_LT(std::abs(lately->own - last->mean(0, 4)), std::abs(by_view->own - last->mean(0, 4)) + 1e-9);
+}
+
 TEST(ColumnEvidence, WithoutParallaxThereIsNone)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};

@@ -239,6 +239,56 @@ TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
   EXPECT_TRUE(at(trunk).removed);
 }
 
+/// What the columns of many frames speak against goes, also when its borders are tracked well.
+TEST_F(Life, ATrunkWhoseColumnsSpeakAgainstItIsGivenUpOnceEnoughWereSeen)
+{
+  const int trunk = confirmed(trunkAt(3, 1)), other = confirmed(trunkAt(6, 1));
+  m_map.record(ColumnOdds{trunk, -2, 6});
+  m_map.record(ColumnOdds{other, 2, 30});
+  review();
+  EXPECT_FALSE(at(trunk).removed);
+  m_map.record(ColumnOdds{trunk, -2, 12});
+  review();
+  EXPECT_TRUE(at(trunk).removed);
+  EXPECT_FALSE(at(other).removed);
+}
+
+TEST_F(Life, WhatTheColumnsSpeakAgainstIsNotConfirmed)
+{
+  const int trunk = add(trunkAt(3, 1));
+  m_map.record(ColumnOdds{trunk, -0.7, 4});
+  see(trunk, 20);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::candidate);
+  m_map.record(ColumnOdds{trunk, 0.5, 5});
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+}
+
+/// Between other borders it is the same trunk of the map, and nothing that was seen between the former ones is left.
+TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
+{
+  const int trunk = confirmed(trunkAt(3, 1, 0.08));
+  m_map.record(ColumnOdds{trunk, 1, 20});
+  const std::size_t before = at(trunk).smoother_id;
+  const double first_s = at(trunk).first_seen_s;
+  NewTrunk wider;
+  wider.smoother_id = 77;
+  wider.trunk = trunkAt(3.02, 0.95, 0.15);
+  wider.covariance = 4e-4 * Matrix5d::Identity();
+  wider.views = {viewAt(m_time_s, 0.5, 0.2, -0.2, 0.9, 0.1), viewAt(m_time_s + 0.1, 0.52, 0.2, -0.2, 0.9, 0.1)};
+  EXPECT_EQ(m_map.readAgain(trunk, wider), before);
+  EXPECT_EQ(at(trunk).smoother_id, 77u);
+  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+  EXPECT_NEAR(at(trunk).trunk.radius(), 0.15, 1e-12);
+  EXPECT_EQ(at(trunk).observations, 2);
+  EXPECT_EQ(at(trunk).column_views, 0);
+  EXPECT_NEAR(at(trunk).left_contrast.value_or(0), 0.2, 1e-12); // not mixed with the former border's
+  EXPECT_NEAR(at(trunk).left.high - at(trunk).left.low, 0.02, 1e-12);
+  EXPECT_EQ(at(trunk).first_seen_s, first_s);
+  EXPECT_EQ(at(trunk).last_seen_s, m_time_s + 0.1);
+}
+
 TEST_F(Life, WhatHidesALostTrunkSaysNothingMoreAgainstIt)
 {
   const int trunk = confirmed(trunkAt(3, 1), 200);

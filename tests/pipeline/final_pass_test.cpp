@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/final_pass.h"
+#include "pipeline/recent_columns.h"
 
 #include <gmock/gmock.h>
 
@@ -84,21 +85,33 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   EXPECT_FALSE(isSilhouetteOf(wide, narrow)); // less of a trunk
 }
 
-TEST(FinalPass, TheAlbumIsBoundedAndTakesFramesFromPlacesApart)
+TEST(FinalPass, TheAlbumIsBounded)
 {
   Album album;
   const vpImage<unsigned char> image(4000, 4000, 90); // 16 MB each
-  const PinholeCamera camera{3000, 3000, 1999.5, 1999.5, 4000, 4000};
-  Viewpoint at{camera, SmootherOptions::forwardCamera()};
-  for (std::size_t i = 0; i < 40; ++i) {
-    at.wMc.t.x() = 0.1 * static_cast<double>(i);
-    album.add(image, i, at, 0.05, ElevationRange());
-    album.add(image, i, at, 0.05, ElevationRange()); // where the last one was taken
-  }
+  for (std::size_t i = 0; i < 40; ++i)
+    album.add(image, LevelImage(), i, 0.1 * static_cast<double>(i));
   EXPECT_GE(album.frames().size(), 8u);
   EXPECT_LE(album.frames().size(), 17u);
   for (std::size_t i = 1; i < album.frames().size(); ++i)
     EXPECT_GT(album.frames()[i].pose, album.frames()[i - 1].pose);
   EXPECT_GE(album.frames().back().pose, 30u); // the end of the flight is kept too
+}
+
+TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
+{
+  RecentColumns columns;
+  const vpImage<unsigned char> image(240, 320, 90);
+  Viewpoint at;
+  at.wMc = SmootherOptions::forwardCamera();
+  Smoother smoother;
+  smoother.addFirstPose(Pose(), 1e-6 * Matrix6d::Identity());
+  for (int i = 0; i < 60; ++i) {
+    at.wMc.t.x() = 0.1 * i;
+    EXPECT_NE(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
+    at.wMc.t.x() += 0.04;
+    EXPECT_EQ(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
+  }
+  EXPECT_EQ(columns.views(smoother).size(), 24u);
 }
 } // namespace

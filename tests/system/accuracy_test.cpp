@@ -83,6 +83,48 @@ INSTANTIATE_TEST_SUITE_P(
                     .075, .06}),
     [](const auto &flight) { return std::string(flight.param.name); });
 
+/// The frames of \p sequence there and back again and again, without its gyro.
+void flyToAndFro(const std::string &sequence, const std::string &folder, std::size_t frames)
+{
+  constexpr std::int64_t kPeriod_ns = 100'000'000;
+  const std::filesystem::path from = std::filesystem::path(sequence) / "mav0",
+                              to = std::filesystem::path(folder) / "mav0";
+  std::filesystem::create_directories(to / "cam0");
+  std::filesystem::copy(from / "cam0/sensor.yaml", to / "cam0/sensor.yaml");
+  std::filesystem::copy(std::filesystem::path(sequence) / "trees.csv", std::filesystem::path(folder) / "trees.csv");
+  std::filesystem::create_directory_symlink(from / "cam0/data", to / "cam0/data");
+  for (const char *table : {"cam0", "odom0", "state_groundtruth_estimate0"}) {
+    std::ifstream in(from / table / "data.csv");
+    std::string head, line;
+    std::vector<std::string> rows; // without their stamps
+    std::getline(in, head);
+    while (std::getline(in, line))
+      rows.push_back(line.substr(line.find(',')));
+    std::filesystem::create_directories(to / table);
+    std::ofstream out(to / table / "data.csv");
+    out << head << '\n';
+    const std::size_t round = 2 * (rows.size() - 1);
+    for (std::size_t k = 0; k < frames; ++k)
+      out << std::int64_t(k) * kPeriod_ns << rows[std::min(k % round, round - k % round)] << '\n';
+  }
+}
+
+/// Whoever looks for long at light, shade and branches meets many lines that look like a trunk for a while.
+TEST(Accuracy, ALongLookMakesNoTrunks)
+{
+  const std::string sequence = BOLE_SHARED_DATA_DIR "/rendered/winter-weave", flight = freshFolder("to_and_fro"),
+                    folder = freshFolder("to_and_fro_map");
+  if (!std::filesystem::exists(sequence))
+    GTEST_SKIP() << sequence << " is absent";
+  flyToAndFro(sequence, flight, 700);
+  ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video --online").status, 0);
+  const bole::Evaluation evaluation = bole::evaluate(folder, flight);
+  ASSERT_TRUE(evaluation.trunks);
+  EXPECT_GE(evaluation.trunks->all.found, 5u) << "of " << evaluation.trunks->all.expected;
+  EXPECT_LE(evaluation.trunks->false_positives.size(), 1u) << "of " << evaluation.trunks->confirmed;
+  EXPECT_LE(evaluation.trunks->all.radius_rmse, .05); // the sun is low: half of most trunks is in shade
+}
+
 /// A pole in a hall of ropes and beams, seen through a wide lens that others rendered, with their log as odometry.
 TEST(Accuracy, ThePoleInAHallStandsWhereItIs)
 {

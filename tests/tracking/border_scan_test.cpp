@@ -146,12 +146,12 @@ TEST(ContrastCost, FallsWithTheContrastFrom4To0WhereNothingWasSeenBefore)
   EXPECT_EQ(contrastCost(0.5, {}), 0);
 }
 
-TEST(ContrastCost, GrowsWithTheDifferenceFromTheFramesBeforeUpTo8)
+TEST(ContrastCost, GrowsWithTheDifferenceFromTheFramesBeforeUpTo2)
 {
   EXPECT_EQ(contrastCost(0.1, 0.1), 0);
   EXPECT_NEAR(contrastCost(0.14, 0.1), 0.5, 1e-12); // one sigma: 0.3 * 0.1 + 0.01
   EXPECT_NEAR(contrastCost(0.02, 0.1), 2, 1e-12);
-  EXPECT_EQ(contrastCost(-0.1, 0.1), 8); // the other polarity
+  EXPECT_EQ(contrastCost(-0.1, 0.1), 2); // the other polarity
 }
 
 TEST(PairPeaks, PrefersWhatThePredictionExpects)
@@ -174,6 +174,20 @@ TEST(PairPeaks, PrefersTheContrastOfTheFramesBeforeAndThenTheStrongest)
   EXPECT_EQ(pairPeaks(left, right, prior)[0].left.contrast, 0.1);
   prior.left_contrast = -0.025;
   EXPECT_EQ(pairPeaks(left, right, prior)[0].left.contrast, -0.02);
+}
+
+/// The sun comes round the trunk: its left border turns from dark to bright, and the line of its shade stands on the
+/// bark with the contrast that the border had.
+TEST(PairPeaks, LightAndShadeOnTheBarkAreNotFollowedAwayFromThePrediction)
+{
+  PairPrior prior;
+  prior.covariance_px << 7, 6.5, 6.5, 7;
+  prior.left_contrast = -0.1;
+  prior.right_contrast = 0.1;
+  const std::vector<BorderPeak> left = {{0.2, 0.1}, {9, -0.1}}, right = {{-0.1, 0.1}, {9, 0.02}};
+  const PeakPair best = pairPeaks(left, right, prior)[0];
+  EXPECT_EQ(best.left.offset_px, 0.2);
+  EXPECT_EQ(best.right.offset_px, -0.1);
 }
 
 TEST(PairPeaks, ABorderWithoutPeaksLeavesTheOtherAlone)

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the columns of the last frames say of the trunks in sight: whether they are trunks, and whether the borders are
+// those of the silhouette.
+#include "pipeline/engine.h"
+
+namespace bole
+{
+namespace
+{
+/// The trunk between the borders that this frame shows, at the range that is known: what the estimate is wrong by does
+/// not count as what stands beside them.
+Trunk asSeen(const TrackedTrunk &tracked, const Trunk &trunk, const Viewpoint &view)
+{
+  const RelativeTrunk &seen = tracked.result.optimum;
+  const double distance = trunk.radius() / tracked.predicted.tracking.relative.ratio();
+  Trunk between = trunkFromRelative(view.wMc, seen, seen.ratio() * distance);
+  between.lean = trunk.lean; // about its place at the height of the camera
+  between.xy -= view.wMc.t.z() * trunk.lean;
+  return between;
+}
+
+} // namespace
+
+/// Depth inside and beside the borders of what was tracked: whether it is a trunk, and whether its borders are those of
+/// the silhouette.
+void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)
+{
+  const LevelImage *level =
+      m_columns.add(frame.image, newest(), view, m_units.flow.view_spacing, m_units.detection.profile.range);
+  if (!level)
+    return;
+  if (m_units.flow.final_pass)
+    m_album.add(frame.image, *level, newest(), view.time_s);
+  if (!view.has_ranges)
+    return;
+  const std::vector<LevelView> views = m_columns.views(m_smoother);
+  std::optional<Judged> narrow; // the one whose borders are the least those of its silhouette
+  for (const TrackedTrunk &one : tracked) {
+    if (one.result.status != TrackingStatus::tracked || one.is_flipped)
+      continue;
+    const MapTrunk &trunk = m_map.trunk(one.predicted.id);
+    const auto evidence = m_columns.look(trunk.id, asSeen(one, trunk.trunk, view), views, farthestJudged());
+    if (!evidence)
+      continue;
+    const Judged judged = judgedBy(*evidence, {trunk.id, trunk.trunk, m_map.evidence(trunk)});
+    m_map.record(ColumnOdds{trunk.id, judged.log_odds, evidence->views});
+    if (const auto all = m_columns.sinceReading(trunk.id); all && m_units.flow.read_wider) {
+      const Judged reading = judgedBy(*all, {trunk.id, trunk.trunk, m_map.evidence(trunk)});
+      if (goesOnBeside(reading) && (!narrow || leastBeside(reading) < leastBeside(*narrow)))
+        narrow = reading;
+    }
+  }
+  m_columns.forgetIf([this](int id) { return m_map.trunk(id).removed || m_map.trunk(id).inactive; });
+  if (narrow)
+    readWider(*narrow, views, view);
+}
+
+/// A reading of \p narrow between wider borders takes its place where the columns speak for it.
+void Engine::readWider(const Judged &narrow, const std::vector<LevelView> &views, const Viewpoint &view)
+{
+  m_columns.noteReading(narrow.id);
+  const auto before = judge({narrow.id, narrow.trunk, narrow.online}, views, farthestJudged()); // where it stands now
+  if (!before)
+    return;
+  const auto guess = widerReading(*before, views, farthestJudged(), m_units.detection.radius_max);
+  if (!guess)
+    return;
+  const Adoption wider = followThroughWindow(*guess, m_window, m_smoother, m_map, view, m_units);
+  if (static_cast<int>(wider.views.size()) < kLeastViews)
+    return;
+  const auto judged = judge({narrow.id, wider.trunk.trunk, narrow.online}, views, farthestJudged());
+  if (!judged || !isSilhouetteOf(*judged, *before))
+    return;
+  NewTrunk trunk = wider.trunk;
+  trunk.smoother_id = hold(wider);
+  m_smoother.removeTrunk(m_map.readAgain(narrow.id, trunk));
+  m_columns.forget(narrow.id);
+}
+} // namespace bole

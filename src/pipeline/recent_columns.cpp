@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/recent_columns.h"
+
+namespace bole
+{
+namespace
+{
+constexpr std::size_t kFrames = 24; ///< that are compared with a new one
+constexpr double kMemory = 24;      ///< views in which what was seen fades to a third
+} // namespace
+
+const LevelImage *RecentColumns::add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at,
+                                     double spacing, const ElevationRange &range)
+{
+  if (m_last && (at.wMc.t - *m_last).norm() < spacing)
+    return nullptr;
+  m_last = at.wMc.t;
+  if (m_frames.size() == kFrames)
+    m_frames.pop_front();
+  m_frames.push_back({pose, computeLevelImage(image, at.camera, at.wMc.R, range)});
+  return &m_frames.back().level;
+}
+
+std::vector<LevelView> RecentColumns::views(const Smoother &smoother) const
+{
+  std::vector<LevelView> views;
+  for (const Kept &frame : m_frames)
+    views.emplace_back(frame.level, smoother.pose(frame.pose) * smoother.options().bMc);
+  return views;
+}
+
+std::optional<ColumnEvidence> RecentColumns::look(int id, const Trunk &trunk, const std::vector<LevelView> &views,
+                                                  double farthest)
+{
+  Known &known = m_known[id];
+  if (const auto seen = columnsOfView(trunk, views.size() - 1, views, farthest)) {
+    known.recent.fade(1 - 1 / kMemory);
+    known.recent.add(*seen);
+    known.all.add(*seen);
+  }
+  return evidenceOf(known.recent);
+}
+
+std::optional<ColumnEvidence> RecentColumns::sinceReading(int id) const
+{
+  constexpr int kViewsBetween = 6; // another reading asks for all that was seen: some milliseconds
+  const auto known = m_known.find(id);
+  if (known == m_known.end() || known->second.all.views < known->second.read_at + kViewsBetween)
+    return std::nullopt;
+  return evidenceOf(known->second.all);
+}
+
+void RecentColumns::noteReading(int id) { m_known[id].read_at = m_known[id].all.views; }
+} // namespace bole

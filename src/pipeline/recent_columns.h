@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// What the columns of the last frames say of each hypothesis, while the drone flies.
+///
+/// Idea: the last frames from places apart are kept as level images. Each new one is compared with those before it at
+/// the range of every hypothesis in sight (ColumnEvidence), and the curves are kept with a fading memory, so that a
+/// frame costs one comparison a hypothesis and not one with all that was seen of it.
+
+#include "detection/column_evidence.h"
+#include "pipeline/prediction.h"
+
+#include <deque>
+#include <unordered_map>
+
+namespace bole
+{
+class RecentColumns
+{
+public:
+  /// The level image of a frame; nullptr where the camera has moved by less than \p spacing [units of the motion] since
+  /// the last one. Valid until the next one.
+  const LevelImage *add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
+                        const ElevationRange &range);
+  /// At the present poses of the smoother.
+  std::vector<LevelView> views(const Smoother &smoother) const;
+  /// What the newest of \p views adds to what is known of a hypothesis; none before three of them had a parallax.
+  std::optional<ColumnEvidence> look(int id, const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
+  /// What all views since its borders were last chosen say, where enough came since another reading was tried.
+  std::optional<ColumnEvidence> sinceReading(int id) const;
+  void noteReading(int id);
+  /// What was known of it was of another reading.
+  void forget(int id) { m_known.erase(id); }
+  template <typename IsGone> void forgetIf(const IsGone &is_gone)
+  {
+    for (auto known = m_known.begin(); known != m_known.end();)
+      known = is_gone(known->first) ? m_known.erase(known) : std::next(known);
+  }
+
+private:
+  struct Kept
+  {
+    std::size_t pose = 0;
+    LevelImage level;
+  };
+  std::deque<Kept> m_frames;
+  std::optional<Eigen::Vector3d> m_last;
+  struct Known
+  {
+    ColumnCurves recent; ///< of a fading memory
+    ColumnCurves all;    ///< of the present reading
+    int read_at = 0;     ///< views when another reading was tried
+  };
+  std::unordered_map<int, Known> m_known; ///< by id of the hypothesis
+};
+} // namespace bole
