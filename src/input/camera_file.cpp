@@ -180,8 +180,14 @@ MountedCamera readXml(const std::string &path, int width, int height)
 {
   MountedCamera camera{{}, forwardCamera()};
   int found = 0;
-  for (const std::string &name : cameraNames(path))
-    found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
+  const auto names = cameraNames(path);
+  try {
+    for (const std::string &name : names)
+      found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
+  }
+  catch (const vpException &error) { // ViSP refuses what it reads, without the name of the file
+    throw vpException(vpException::badValue, fmt::format("{}: {}", path, error.getStringMessage()));
+  }
   const std::string size = width > 0 ? fmt::format(" for {}x{} images", width, height) : "";
   if (found != 1)
     throw vpException(vpException::ioError, fmt::format("{}: {} ViSP cameras{} in it, must be one", path, found, size));

@@ -219,6 +219,11 @@ ImageFile readImageFile(const std::string &path, int width, int height)
   ImageFile result;
   if (!decodeGrey(bytes, result.image))
     return broken(FrameStatus::corrupt, path, "cannot be decoded");
+  const cv::Size decoded(static_cast<int>(result.image.getWidth()), static_cast<int>(result.image.getHeight()));
+  if (decoded != *size) // a second header further on
+    return broken(
+        FrameStatus::corrupt, path,
+        fmt::format("two sizes: {}x{} and {}x{} px", size->width, size->height, decoded.width, decoded.height));
   return result;
 }
 } // namespace bole

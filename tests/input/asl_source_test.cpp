@@ -115,6 +115,22 @@ TEST(AslSource, AHugePictureAmongSmallOnesIsNotDecoded)
   EXPECT_EQ(frames[2].status, FrameStatus::ok);
 }
 
+TEST(AslSource, AJpegOfTwoSizesIsCorrupt)
+{
+  FlightFolder flight(2);
+  std::vector<unsigned char> jpeg;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(16, 32, CV_8UC1, cv::Scalar(90)), jpeg));
+  const std::vector<unsigned char> header{0xFF, 0xC0, 0, 11, 8, 0, 48, 0, 64, 1, 1, 0x11, 0}; // of 64x48
+  jpeg.insert(jpeg.begin() + 2, header.begin(), header.end());
+  const std::string path = flight.path() + "/two.jpg";
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char *>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
+  const ImageFile file = readImageFile(path, 64, 48);
+  EXPECT_EQ(file.status, FrameStatus::corrupt);
+  EXPECT_THAT(file.message, HasSubstr("64x48 and 32x16 px"));
+  EXPECT_EQ(file.image.getSize(), 0u);
+}
+
 TEST(AslSource, ATiffThatWasCutOffIsCorrupt)
 {
   FlightFolder flight(2);

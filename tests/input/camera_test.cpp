@@ -214,6 +214,9 @@ TEST_F(CameraFile, NamesFileLineAndKeyOfAMistake)
   EXPECT_THAT(messageOf([&] { readCamera("/none/c.yaml"); }), HasSubstr("/none/c.yaml: no such file"));
   EXPECT_THAT(messageOf([&] { readCamera(write("c.txt", "")); }), HasSubstr("must end in"));
   EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", "<root></root>")); }), HasSubstr("0 ViSP cameras"));
+  std::string without_focal = kXml; // ViSP itself refuses it, and does not know where it stood
+  without_focal.replace(without_focal.find("<px>547.5"), 9, "<px>none5");
+  EXPECT_THAT(messageOf([&] { readCamera(write("c.xml", without_focal)); }), HasSubstr("c.xml: "));
 }
 
 namespace
