@@ -33,11 +33,13 @@ struct Columns
   std::vector<double> angle, range; ///< from the heading [rad], of what they show if the trunk is there [m]
   std::size_t inside = 0;           ///< the first ones are; four each follow beside the borders
 };
-constexpr std::size_t kBeside = 4;
+constexpr std::size_t kBeside = 4, kMostColumns = 12 + 2 * kBeside;
 
 Columns columnsOf(const TrunkInLevelView &at, double radius, double px)
 {
   Columns columns;
+  columns.angle.reserve(kMostColumns);
+  columns.range.reserve(kMostColumns);
   const auto add = [&](double offset, double range) {
     columns.angle.push_back(at.bearing + offset);
     columns.range.push_back(range);
@@ -80,6 +82,7 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
   const double c = std::cos(seen.at.bearing), s = std::sin(seen.at.bearing);
   const Vector2d toward = c * view.forward + s * view.left;
   std::vector<std::pair<double, std::size_t>> good;
+  good.reserve(all.size());
   std::pair<double, std::size_t> widest{0, 0};
   for (const Seen &other : all) {
     const Vector2d base = views[other.view].position - view.position;
@@ -93,6 +96,7 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
   const std::size_t n = std::min<std::size_t>(good.size(), kPartners);
   std::partial_sort(good.begin(), good.begin() + static_cast<long>(n), good.end());
   std::vector<std::size_t> partners;
+  partners.reserve(n);
   for (std::size_t i = 0; i < n; ++i)
     partners.push_back(good[i].second);
   return partners;
@@ -115,6 +119,7 @@ bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
 {
   const Vector2d &lean = trunk.lean;
   std::vector<std::pair<double, double>> covered;
+  covered.reserve(partners.size());
   for (const std::size_t partner : partners)
     covered.push_back(coveredBy(trunk, views[partner]));
   constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
@@ -156,6 +161,7 @@ bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
 std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
   std::vector<Seen> all;
+  all.reserve(views.size());
   for (std::size_t i = 0; i < views.size(); ++i)
     if (const auto at = locate(trunk, views[i], farthest))
       all.push_back({i, *at});

@@ -46,6 +46,7 @@ bool addBand(const vpImage<unsigned char> &image, const PinholeCamera &camera, c
 void findSlopes(std::vector<LevelColumn> &columns)
 {
   std::vector<unsigned> seen;
+  seen.reserve(columns.size());
   for (const LevelColumn &column : columns)
     seen.push_back(column.bands);
   for (std::size_t i = 0; i < columns.size(); ++i) {

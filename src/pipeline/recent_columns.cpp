@@ -24,6 +24,7 @@ const LevelImage *RecentColumns::add(const vpImage<unsigned char> &image, std::s
 std::vector<LevelView> RecentColumns::views(const Smoother &smoother) const
 {
   std::vector<LevelView> views;
+  views.reserve(m_frames.size());
   for (const Kept &frame : m_frames)
     views.emplace_back(frame.level, smoother.pose(frame.pose) * smoother.options().bMc);
   return views;
