@@ -117,7 +117,11 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
 bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
              const std::vector<std::size_t> &partners, const std::vector<LevelView> &views, ColumnCurves &curves)
 {
+  constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   const Vector2d &lean = trunk.lean;
+  unsigned above = 0; // bands
+  for (std::size_t b = 0; b < kLevelBands; ++b)
+    above |= view.image->elevation[b] > kGround ? 1U << b : 0;
   std::vector<std::pair<double, double>> covered;
   covered.reserve(partners.size());
   for (const std::size_t partner : partners)
@@ -128,10 +132,12 @@ bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
   for (std::size_t i = 0; i < columns.angle.size(); ++i) {
     const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
     const Vector2d direction = c * view.forward + s * view.left;
-    const LevelColumn column = view.image->at(s / c, across(direction, lean));
+    const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
+    LevelColumn column = view.image->at(s / c, across(direction, lean));
+    if (kind > 0)
+      column.bands &= above;
     if (column.bands == 0)
       continue;
-    const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
     for (std::size_t p = 0; p < partners.size(); ++p) {
       const LevelView &other = views[partners[p]];
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);

@@ -9,9 +9,9 @@ namespace bole
 {
 namespace
 {
-constexpr int kColumnViews = 12;     ///< compared before a trunk is given up for its columns
+constexpr int kColumnViews = 12;    ///< compared before a trunk is given up for its columns
 constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
-}
+} // namespace
 
 bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
 {
