@@ -71,8 +71,7 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis)
 
 namespace
 {
-constexpr double kGoesOn = -0.25; ///< difference beside a border below which the trunk surely goes on there,
-constexpr double kShading = 0.2;  ///< difference beside a border and below which it may
+constexpr double kGoesOn = -0.25; ///< difference beside a border below which the trunk goes on there
 } // namespace
 
 double leastBeside(const Judged &judged) { return std::min(judged.evidence.left, judged.evidence.right); }
@@ -81,11 +80,11 @@ bool goesOnBeside(const Judged &judged) { return leastBeside(judged) < kGoesOn; 
 
 namespace
 {
-/// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts, where
-/// the difference there is below \p least.
-double silhouette(const Judged &judged, double least = kShading)
+/// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts.
+double silhouette(const Judged &judged)
 {
-  const auto beside = [least](double difference) { return std::min(difference - least, 0.0); };
+  constexpr double kShading = 0.2; // of the difference beside a border: below it the trunk may go on there
+  const auto beside = [](double difference) { return std::min(difference - kShading, 0.0); };
   return judged.log_odds + 0.5 * (beside(judged.evidence.left) + beside(judged.evidence.right));
 }
 } // namespace
@@ -111,12 +110,6 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
   const Eigen::Vector2d left = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
   const double radius = judged.trunk.radius();
   std::optional<Judged> best = judged;
-  bool is_other = false;
-  const auto consider = [&](const Trunk &trunk) {
-    const auto one = judge({judged.id, trunk, judged.online}, views, farthest);
-    if (one && silhouette(*one) > silhouette(*best))
-      best = one, is_other = true;
-  };
   for (const double more : {0.25, 0.5, 0.75, 1.0, 1.5, 2.0})
     for (const int side : {1, -1}) {
       if ((side > 0 ? evidence.left : evidence.right) > kGoesOn || (1 + more) * radius > radius_max)
@@ -124,9 +117,11 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
       Trunk wider = judged.trunk;
       wider.xy += side * more * radius * left;
       wider.log_radius += std::log(1 + more);
-      consider(wider);
+      const auto one = judge({judged.id, wider, judged.online}, views, farthest);
+      if (one && silhouette(*one) > silhouette(*best))
+        best = one;
     }
-  if (!is_other)
+  if (best->trunk.log_radius == judged.trunk.log_radius)
     return std::nullopt;
   constexpr double kStep = 0.15; // standard deviation, of the radius: the steps above are as fine
   Hypothesis guess{judged.id, best->trunk, judged.online};

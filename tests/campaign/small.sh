@@ -24,6 +24,7 @@ fly() {
 fly &
 pid=$!
 while kill -0 $pid 2>/dev/null && ! ls "$folder"/results/default/*.json >/dev/null 2>&1; do sleep 0.2; done
+sleep 1 # the engine notes what it has seen finished
 kill -KILL $pid 2>/dev/null || true
 wait $pid 2>/dev/null || true
 pkill -KILL -f "$folder" 2>/dev/null || true
