@@ -14,8 +14,8 @@ namespace
 /// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
-constexpr int kViews = 24;   // looked at, spread over the flight
-constexpr int kPartners = 3; // each is compared with
+constexpr int kViews = 24;           // looked at, spread over the flight
+constexpr std::size_t kPartners = 3; // each is compared with
 
 /// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
 /// tell, not so much that the bark has turned.
@@ -27,25 +27,26 @@ struct Seen
   TrunkInLevelView at;
 };
 
+constexpr std::size_t kMostInside = 12, kBeside = 4; // columns inside a trunk, beside each of its borders
+
 /// Columns of a view that are compared: inside the trunk, beside its left border, beside its right one.
 struct Columns
 {
-  std::vector<double> angle, range; ///< from the heading [rad], of what they show if the trunk is there [m]
-  std::size_t inside = 0;           ///< the first ones are; four each follow beside the borders
+  std::size_t count = 0;
+  std::array<double, kMostInside + 2 * kBeside> angle, range; ///< from the heading [rad], of what they show if the
+                                                              ///< trunk is there [m]
+  std::size_t inside = 0;                                     ///< the first ones are; those beside the borders follow
 };
-constexpr std::size_t kBeside = 4, kMostColumns = 12 + 2 * kBeside;
 
 Columns columnsOf(const TrunkInLevelView &at, double radius, double px)
 {
   Columns columns;
-  columns.angle.reserve(kMostColumns);
-  columns.range.reserve(kMostColumns);
   const auto add = [&](double offset, double range) {
-    columns.angle.push_back(at.bearing + offset);
-    columns.range.push_back(range);
+    columns.angle[columns.count] = at.bearing + offset;
+    columns.range[columns.count++] = range;
   };
   const double half = std::max(at.half_angle - px, 0.3 * at.half_angle);
-  columns.inside = static_cast<std::size_t>(std::clamp(2 * half / px, 3.0, 12.0));
+  columns.inside = static_cast<std::size_t>(std::clamp(2 * half / px, 3.0, double(kMostInside)));
   for (std::size_t i = 0; i < columns.inside; ++i) {
     const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(columns.inside - 1) - 1);
     const double across = at.range * std::sin(offset);
@@ -93,7 +94,7 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
   }
   if (good.empty() && widest.first >= kWeakParallax)
     return {widest.second};
-  const std::size_t n = std::min<std::size_t>(good.size(), kPartners);
+  const std::size_t n = std::min(good.size(), kPartners);
   std::partial_sort(good.begin(), good.begin() + static_cast<long>(n), good.end());
   std::vector<std::size_t> partners;
   partners.reserve(n);
@@ -113,23 +114,25 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
   return {std::tan(at->bearing - at->half_angle), std::tan(at->bearing + at->half_angle)};
 }
 
-/// One view against its partners. False where nothing could be compared.
-bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
-             const std::vector<std::size_t> &partners, const std::vector<LevelView> &views, ColumnCurves &curves)
+/// Adds what one view says of \p trunk beside its partners among \p all, if there is anything to compare.
+void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views,
+             ColumnCurves &curves)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
+  constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
+  constexpr double kLeast = 0.008;  // [full scale] noise of the camera
+  const LevelView &view = views[seen.view];
   const Vector2d &lean = trunk.lean;
+  const Columns columns = columnsOf(seen.at, trunk.radius(), view.image->step);
+  const std::vector<std::size_t> partners = partnersOf(seen, all, views);
+  std::array<std::pair<double, double>, kPartners> covered;
+  for (std::size_t p = 0; p < partners.size(); ++p)
+    covered[p] = coveredBy(trunk, views[partners[p]]);
   unsigned above = 0; // bands
   for (std::size_t b = 0; b < kLevelBands; ++b)
     above |= view.image->elevation[b] > kGround ? 1U << b : 0;
-  std::vector<std::pair<double, double>> covered;
-  covered.reserve(partners.size());
-  for (const std::size_t partner : partners)
-    covered.push_back(coveredBy(trunk, views[partner]));
-  constexpr double kUnit = 0.25;   // of the contrast of the image: how much one place differs between two frames
-  constexpr double kLeast = 0.008; // [full scale] noise of the camera
   ColumnCurves here;
-  for (std::size_t i = 0; i < columns.angle.size(); ++i) {
+  for (std::size_t i = 0; i < columns.count; ++i) {
     const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
     const Vector2d direction = c * view.forward + s * view.left;
     const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
@@ -157,10 +160,8 @@ bool compare(const LevelView &view, const Columns &columns, const Trunk &trunk,
       }
     }
   }
-  if (here.count[0][kOwn] == 0)
-    return false;
-  curves.add(here);
-  return true;
+  if (here.count[0][kOwn] > 0)
+    curves.add(here);
 }
 
 /// The views that show it.
@@ -172,15 +173,6 @@ std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &vi
     if (const auto at = locate(trunk, views[i], farthest))
       all.push_back({i, *at});
   return all;
-}
-
-void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views,
-             ColumnCurves &curves)
-{
-  const std::vector<std::size_t> partners = partnersOf(seen, all, views);
-  if (!partners.empty())
-    compare(views[seen.view], columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), trunk, partners, views,
-            curves);
 }
 } // namespace
 

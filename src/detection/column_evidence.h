@@ -12,6 +12,7 @@
 #include "detection/level_image.h"
 #include <bole/trunk.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -47,6 +48,8 @@ struct ColumnEvidence
   bool is_best_at_own = true; ///< among all ranges, its own to a ninth is best
   double left = 0, right = 0; ///< beside a border: at the trunk's range less the best farther one. Below 0: the trunk
                               ///< goes on there, and the border is one of light and shade
+
+  double leastBeside() const { return std::min(left, right); }
 };
 
 /// Ranges that are tried, over that of the trunk.

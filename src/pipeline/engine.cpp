@@ -224,20 +224,16 @@ void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, con
     }
 }
 
-void Engine::adopt(Adoption adoption)
-{
-  adoption.trunk.smoother_id = hold(adoption);
-  m_map.add(adoption.trunk);
-}
+void Engine::adopt(const Adoption &adoption) { m_map.add(hold(adoption)); }
 
-/// Gives a trunk with its views to the smoother, and returns its number there.
-std::size_t Engine::hold(const Adoption &adoption)
+/// Gives a trunk with its views to the smoother, and returns it with its number there.
+NewTrunk Engine::hold(const Adoption &adoption)
 {
-  const Trunk &trunk = adoption.trunk.trunk;
-  const std::size_t id = m_smoother.addTrunk(trunk, priorOf(trunk, m_units.smoothing));
+  NewTrunk held = adoption.trunk;
+  held.smoother_id = m_smoother.addTrunk(held.trunk, priorOf(held.trunk, m_units.smoothing));
   for (const AdoptedView &view : adoption.views)
-    m_smoother.addObservation(view.pose, id, view.summary);
-  return id;
+    m_smoother.addObservation(view.pose, held.smoother_id, view.summary);
+  return held;
 }
 
 std::vector<TriangulatedRay> Engine::points() const

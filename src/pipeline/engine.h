@@ -37,7 +37,7 @@ public:
 
 private:
   std::vector<Judged> judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before = {}) const;
-  std::vector<LevelView> levelViews() const;
+  template <typename Frames> std::vector<LevelView> levelViews(const Frames &frames) const;
   Viewpoint viewpointOf(const KeptFrame &frame) const;
   static constexpr int kLeastViews = 4;    ///< of a hypothesis that is judged
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
@@ -57,9 +57,9 @@ private:
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
   void adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
                  const vpImage<float> *p_background, const StageOptions &options);
-  void adopt(Adoption adoption);
-  std::size_t hold(const Adoption &adoption);
-  void readWider(const Judged &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
+  void adopt(const Adoption &adoption);
+  NewTrunk hold(const Adoption &adoption);
+  void readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
   void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
   void reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
@@ -96,4 +96,14 @@ private:
   Trajectory m_online;                    ///< in units of the motion
   Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion
 };
+
+/// Frames that are kept, at the present poses.
+template <typename Frames> std::vector<LevelView> Engine::levelViews(const Frames &frames) const
+{
+  std::vector<LevelView> views;
+  views.reserve(frames.size());
+  for (const auto &frame : frames)
+    views.emplace_back(frame.level, cameraAt(frame.pose));
+  return views;
+}
 } // namespace bole

@@ -18,7 +18,6 @@ Trunk asSeen(const TrackedTrunk &tracked, const Trunk &trunk, const Viewpoint &v
   between.xy -= view.wMc.t.z() * trunk.lean;
   return between;
 }
-
 } // namespace
 
 /// Depth inside and beside the borders of what was tracked: whether it is a trunk, and whether its borders are those of
@@ -33,8 +32,9 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     m_album.add(frame.image, *level, newest(), view.time_s);
   if (!view.has_ranges)
     return;
-  const std::vector<LevelView> views = m_columns.views(m_smoother);
-  std::optional<Judged> narrow; // the one whose borders are the least those of its silhouette
+  const std::vector<LevelView> views = levelViews(m_columns.frames());
+  std::optional<Hypothesis> narrow; // the one whose borders are the least those of its silhouette
+  double least_beside = 0;
   for (const TrackedTrunk &one : tracked) {
     if (one.result.status != TrackingStatus::tracked || one.is_flipped)
       continue;
@@ -42,12 +42,12 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     const auto evidence = m_columns.look(trunk.id, asSeen(one, trunk.trunk, view), views, farthestJudged());
     if (!evidence)
       continue;
-    const Judged judged = judgedBy(*evidence, {trunk.id, trunk.trunk, m_map.evidence(trunk)});
-    m_map.record(ColumnOdds{trunk.id, judged.log_odds, evidence->views});
-    if (const auto all = m_columns.sinceReading(trunk.id); all && m_units.flow.read_wider) {
-      const Judged reading = judgedBy(*all, {trunk.id, trunk.trunk, m_map.evidence(trunk)});
-      if (goesOnBeside(reading) && (!narrow || leastBeside(reading) < leastBeside(*narrow)))
-        narrow = reading;
+    const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
+    m_map.record(ColumnOdds{trunk.id, judgedBy(*evidence, hypothesis).log_odds, evidence->views});
+    const auto all = m_columns.sinceReading(trunk.id);
+    if (m_units.flow.read_wider && all && goesOnBeside(*all) && all->leastBeside() < least_beside) {
+      narrow = hypothesis;
+      least_beside = all->leastBeside();
     }
   }
   m_columns.forgetIf([this](int id) { return m_map.trunk(id).removed || m_map.trunk(id).inactive; });
@@ -56,10 +56,10 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
 }
 
 /// A reading of \p narrow between wider borders takes its place where the columns speak for it.
-void Engine::readWider(const Judged &narrow, const std::vector<LevelView> &views, const Viewpoint &view)
+void Engine::readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view)
 {
   m_columns.noteReading(narrow.id);
-  const auto before = judge({narrow.id, narrow.trunk, narrow.online}, views, farthestJudged()); // where it stands now
+  const auto before = judge(narrow, views, farthestJudged()); // where it stands now
   if (!before)
     return;
   const auto guess = widerReading(*before, views, farthestJudged(), m_units.detection.radius_max);
@@ -71,9 +71,7 @@ void Engine::readWider(const Judged &narrow, const std::vector<LevelView> &views
   const auto judged = judge({narrow.id, wider.trunk.trunk, narrow.online}, views, farthestJudged());
   if (!judged || !isSilhouetteOf(*judged, *before))
     return;
-  NewTrunk trunk = wider.trunk;
-  trunk.smoother_id = hold(wider);
-  m_smoother.removeTrunk(m_map.readAgain(narrow.id, trunk));
+  m_smoother.removeTrunk(m_map.readAgain(narrow.id, hold(wider)));
   m_columns.forget(narrow.id);
 }
 } // namespace bole

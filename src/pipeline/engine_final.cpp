@@ -25,14 +25,6 @@ bool isOf(const Judged &one, const Hypothesis &hypothesis)
 }
 } // namespace
 
-std::vector<LevelView> Engine::levelViews() const
-{
-  std::vector<LevelView> views;
-  for (const KeptFrame &frame : m_album.frames())
-    views.emplace_back(frame.level, cameraAt(frame.pose));
-  return views;
-}
-
 Viewpoint Engine::viewpointOf(const KeptFrame &frame) const
 {
   return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
@@ -183,7 +175,7 @@ void Engine::decideByAllFrames()
   MapOptions unsure = m_units.map; // metres are as sure as the scale is: those of a plain video are a guess
   unsure.confirm_position_sigma *= std::exp(m_motion->scale().sigma);
   m_map.setOptions(unsure);
-  const std::vector<LevelView> views = levelViews();
+  const std::vector<LevelView> views = levelViews(m_album.frames());
   const std::vector<Judged> before = judgeAll(views);
   AlbumGradients gradients(m_album.frames(), m_units.gradient);
   detectLeaning(before, gradients);
@@ -209,9 +201,7 @@ void Engine::decideByAllFrames()
   for (Reading &reading : readings) {
     if (!reading.judged || !reading.views || !decisions[reading.judged->id].is_trunk)
       continue;
-    NewTrunk trunk = reading.views->trunk;
-    trunk.smoother_id = hold(*reading.views);
-    decisions[reading.judged->id].found = trunk;
+    decisions[reading.judged->id].found = hold(*reading.views);
   }
   std::vector<TrunkDecision> list;
   for (auto &[id, decision] : decisions)

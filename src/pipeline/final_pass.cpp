@@ -74,9 +74,7 @@ namespace
 constexpr double kGoesOn = -0.25; ///< difference beside a border below which the trunk goes on there
 } // namespace
 
-double leastBeside(const Judged &judged) { return std::min(judged.evidence.left, judged.evidence.right); }
-
-bool goesOnBeside(const Judged &judged) { return leastBeside(judged) < kGoesOn; }
+bool goesOnBeside(const ColumnEvidence &evidence) { return evidence.leastBeside() < kGoesOn; }
 
 namespace
 {
@@ -93,7 +91,7 @@ bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
 {
   constexpr double kGain = 0.25;                   // of the difference beside the borders
   constexpr double kWorse = 0.5, kLeastOdds = 1.0; // log-odds
-  const auto worst = [](const Judged &one) { return std::min({one.evidence.left, one.evidence.right, 0.0}); };
+  const auto worst = [](const Judged &one) { return std::min(one.evidence.leastBeside(), 0.0); };
   return worst(wider) > worst(narrow) + kGain && wider.log_odds > std::max(narrow.log_odds - kWorse, kLeastOdds);
 }
 
@@ -101,7 +99,7 @@ std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<L
                                        double radius_max)
 {
   const ColumnEvidence &evidence = judged.evidence;
-  if (!goesOnBeside(judged))
+  if (!goesOnBeside(evidence))
     return std::nullopt;
   Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
   for (const LevelView &view : views)

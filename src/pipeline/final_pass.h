@@ -25,8 +25,7 @@ struct KeptFrame
   LevelImage level;
 };
 
-/// Frames of the flight. Bounded: when it is full every other frame goes, and the next ones are
-/// taken half as often.
+/// Frames of the flight. Bounded: when it is full every other frame goes, and the next ones are taken half as often.
 class Album
 {
 public:
@@ -77,10 +76,8 @@ std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<Leve
 /// The same of evidence at hand.
 Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis);
 
-/// The lesser of the differences beside its two borders.
-double leastBeside(const Judged &judged);
 /// Whether the trunk goes on beside a border.
-bool goesOnBeside(const Judged &judged);
+bool goesOnBeside(const ColumnEvidence &evidence);
 /// Where columns beside a border stand at the range of the trunk: the best guess of the silhouette that takes them in.
 /// None where there is none, or none up to \p radius_max.
 std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,

@@ -21,15 +21,6 @@ const LevelImage *RecentColumns::add(const vpImage<unsigned char> &image, std::s
   return &m_frames.back().level;
 }
 
-std::vector<LevelView> RecentColumns::views(const Smoother &smoother) const
-{
-  std::vector<LevelView> views;
-  views.reserve(m_frames.size());
-  for (const Kept &frame : m_frames)
-    views.emplace_back(frame.level, smoother.pose(frame.pose) * smoother.options().bMc);
-  return views;
-}
-
 std::optional<ColumnEvidence> RecentColumns::look(int id, const Trunk &trunk, const std::vector<LevelView> &views,
                                                   double farthest)
 {

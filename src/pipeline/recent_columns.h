@@ -18,12 +18,16 @@ namespace bole
 class RecentColumns
 {
 public:
+  struct Frame
+  {
+    std::size_t pose = 0;
+    LevelImage level;
+  };
   /// The level image of a frame; nullptr where the camera has moved by less than \p spacing [units of the motion] since
   /// the last one. Valid until the next one.
   const LevelImage *add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at, double spacing,
                         const ElevationRange &range);
-  /// At the present poses of the smoother.
-  std::vector<LevelView> views(const Smoother &smoother) const;
+  const std::deque<Frame> &frames() const { return m_frames; } ///< the newest last
   /// What the newest of \p views adds to what is known of a hypothesis; none before three of them had a parallax.
   std::optional<ColumnEvidence> look(int id, const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
   /// What all views since its borders were last chosen say, where enough came since another reading was tried.
@@ -38,19 +42,14 @@ public:
   }
 
 private:
-  struct Kept
-  {
-    std::size_t pose = 0;
-    LevelImage level;
-  };
-  std::deque<Kept> m_frames;
-  std::optional<Eigen::Vector3d> m_last;
   struct Known
   {
     ColumnCurves recent; ///< of a fading memory
     ColumnCurves all;    ///< of the present reading
     int read_at = 0;     ///< views when another reading was tried
   };
+  std::deque<Frame> m_frames;
+  std::optional<Eigen::Vector3d> m_last;
   std::unordered_map<int, Known> m_known; ///< by id of the hypothesis
 };
 } // namespace bole

@@ -104,14 +104,12 @@ TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
   const vpImage<unsigned char> image(240, 320, 90);
   Viewpoint at;
   at.wMc = SmootherOptions::forwardCamera();
-  Smoother smoother;
-  smoother.addFirstPose(Pose(), 1e-6 * Matrix6d::Identity());
   for (int i = 0; i < 60; ++i) {
     at.wMc.t.x() = 0.1 * i;
     EXPECT_NE(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
     at.wMc.t.x() += 0.04;
     EXPECT_EQ(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
   }
-  EXPECT_EQ(columns.views(smoother).size(), 24u);
+  EXPECT_EQ(columns.frames().size(), 24u);
 }
 } // namespace
