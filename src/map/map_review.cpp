@@ -9,7 +9,6 @@ namespace bole
 {
 namespace
 {
-constexpr int kColumnViews = 12;    ///< compared before a trunk is given up for its columns
 constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
 } // namespace
 
@@ -58,6 +57,12 @@ bool isInside(const Trunk &narrow, const Trunk &wide)
          distanceBetween(narrow, wide) + narrow.radius() < wide.radius() + 0.05;
 }
 
+/// What shows the background beside it is no edge on the bark of \p wide.
+bool mayBeEdgeOf(const MapTrunk &known, const Trunk &wide)
+{
+  return !known.is_silhouette && isInside(known.trunk, wide);
+}
+
 /// The same trunk at two visits: alike in place and radius, and seen at different times. What is seen at the same time
 /// shares its views' image lines, which must not count twice.
 bool isAnotherVisit(const MapTrunk &a, const MapTrunk &b)
@@ -99,7 +104,7 @@ bool TrunkMap::recognise(const Trunk &found)
       ++known.found_again;
       is_known = true;
     }
-    else if (known.status == TrunkStatus::confirmed && !isInside(known.trunk, found))
+    else if (known.status == TrunkStatus::confirmed && !mayBeEdgeOf(known, found))
       is_known = is_known || areTooNear(known.trunk, found);
   }
   return is_known;
@@ -142,7 +147,7 @@ MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
   const bool is_a_candidate = a.status == TrunkStatus::candidate, is_b_candidate = b.status == TrunkStatus::candidate;
   if (is_a_candidate != is_b_candidate) {
     MapTrunk &candidate = is_a_candidate ? a : b, &known = is_a_candidate ? b : a;
-    return isInside(known.trunk, candidate.trunk) ? nullptr : &candidate; // what holds it may still turn out to be it
+    return mayBeEdgeOf(known, candidate.trunk) ? nullptr : &candidate; // what holds it may still turn out to be it
   }
   if (!is_a_candidate || isSameHypothesis(a.trunk, b.trunk))
     return advantage(a, b) >= 0 ? &b : &a;

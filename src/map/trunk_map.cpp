@@ -114,9 +114,11 @@ void TrunkMap::record(const PointCount &points)
 
 void TrunkMap::record(const ColumnOdds &odds)
 {
+  constexpr double kBackground = 0.25; // beside a border: as much as tells that the trunk goes on, the other way
   MapTrunk &trunk = m_trunks[static_cast<std::size_t>(odds.id)];
   trunk.column_odds = odds.log_odds;
   trunk.column_views = odds.views;
+  trunk.is_silhouette |= odds.views >= kColumnViews && odds.least_beside > kBackground;
 }
 
 std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
@@ -127,6 +129,7 @@ std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
   trunk.trunk = reading.trunk;
   trunk.covariance = reading.covariance;
   trunk.observations = trunk.column_views = 0;
+  trunk.is_silhouette = false;
   trunk.left_contrast.reset();
   trunk.right_contrast.reset();
   const double first_seen_s = trunk.first_seen_s;

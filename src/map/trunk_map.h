@@ -91,6 +91,7 @@ struct MapTrunk
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
   double column_odds = 0;               ///< log-odds by the columns of the last frames,
   int column_views = 0;                 ///< and in how many of them it was compared
+  bool is_silhouette = false;           ///< the background was seen beside both its borders
   std::optional<double> final_odds;     ///< log-odds by all frames, where they were judged: see TrunkMap::decide()
   bool removed = false;                 ///< out of the smoother
   bool inactive = false;                ///< a candidate that is not looked for any more
@@ -142,12 +143,16 @@ struct PointCount
   int on = 0, behind = 0; ///< at its range, and beyond it
 };
 
+/// Views compared before columns decide.
+inline constexpr int kColumnViews = 12;
+
 /// What the columns of the frames since a trunk was found say of it.
 struct ColumnOdds
 {
   int id = 0;
-  double log_odds = 0; ///< that it is a trunk
-  int views = 0;
+  double log_odds = 0;     ///< that it is a trunk
+  int views = 0;           ///< of both
+  double least_beside = 0; ///< ColumnEvidence::leastBeside(): above 0 the background stands beside both borders
 };
 
 /// What the detector found, with the views that it was seen in.

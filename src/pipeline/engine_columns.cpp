@@ -43,9 +43,10 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     if (!evidence)
       continue;
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
-    m_map.record(ColumnOdds{trunk.id, judgedBy(*evidence, hypothesis).log_odds, evidence->views});
+    m_map.record(
+        ColumnOdds{trunk.id, judgedBy(*evidence, hypothesis).log_odds, evidence->views, evidence->leastBeside()});
     const auto all = m_columns.sinceReading(trunk.id);
-    if (m_units.flow.read_wider && all && goesOnBeside(*all) && all->leastBeside() < least_beside) {
+    if (all && goesOnBeside(*all) && all->leastBeside() < least_beside) {
       narrow = hypothesis;
       least_beside = all->leastBeside();
     }

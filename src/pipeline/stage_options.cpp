@@ -151,7 +151,6 @@ void setServoing(StageOptions &o)
 {
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
   o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
-  o.flow.read_wider = false;      // the width of what it goes round must not jump
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
 }
 

@@ -40,7 +40,6 @@ struct FlowOptions
 {
   bool use_points = true;       ///< relative poses from point features
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
-  bool read_wider = true;       ///< a trunk that goes on beside a border is read again between wider ones in flight
   bool final_pass = true;       ///< at the end every hypothesis is judged by all frames: see final_pass.h
   bool as_paper = false;        ///< detection, tracking and map as the paper has them: see paper_policy.h
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100

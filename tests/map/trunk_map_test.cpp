@@ -269,7 +269,7 @@ TEST_F(Life, WhatTheColumnsSpeakAgainstIsNotConfirmed)
 TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
 {
   const int trunk = confirmed(trunkAt(3, 1, 0.08));
-  m_map.record(ColumnOdds{trunk, 1, 20});
+  m_map.record(ColumnOdds{trunk, 1, 20, 1});
   const std::size_t before = at(trunk).smoother_id;
   const double first_s = at(trunk).first_seen_s;
   NewTrunk wider;
@@ -283,6 +283,7 @@ TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
   EXPECT_NEAR(at(trunk).trunk.radius(), 0.15, 1e-12);
   EXPECT_EQ(at(trunk).observations, 2);
   EXPECT_EQ(at(trunk).column_views, 0);
+  EXPECT_FALSE(at(trunk).is_silhouette);
   EXPECT_NEAR(at(trunk).left_contrast.value_or(0), 0.2, 1e-12); // not mixed with the former border's
   EXPECT_NEAR(at(trunk).left.high - at(trunk).left.low, 0.02, 1e-12);
   EXPECT_EQ(at(trunk).first_seen_s, first_s);
@@ -490,6 +491,26 @@ TEST_F(Life, AWiderHypothesisThatIsSoundReplacesAConfirmedEdgeOnItsBark)
   EXPECT_EQ(at(edge).status, TrunkStatus::merged);
   review();
   EXPECT_EQ(at(silhouette).status, TrunkStatus::confirmed);
+}
+
+/// The background beside both borders: nothing wider can be that trunk, and two cannot stand in one place.
+TEST_F(Life, NothingWiderIsHeldBesideATrunkWhoseSilhouetteWasSeen)
+{
+  const int trunk = confirmed(trunkAt(3, 1, 0.1)), round = add(trunkAt(3.05, 1, 0.18));
+  see(round, 5);
+  m_map.record(ColumnOdds{trunk, 3, 11, 0.5}); // too few views
+  review();
+  EXPECT_EQ(at(round).status, TrunkStatus::candidate);
+  m_map.record(ColumnOdds{trunk, 3, 12, 0.1}); // nor is this the background
+  review();
+  EXPECT_EQ(at(round).status, TrunkStatus::candidate);
+  EXPECT_FALSE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
+  m_map.record(ColumnOdds{trunk, 3, 12, 0.5});
+  review();
+  EXPECT_EQ(at(round).status, TrunkStatus::merged);
+  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
+  m_map.record(ColumnOdds{trunk, 3, 20, -0.5}); // light that changes takes nothing back
+  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
 }
 
 TEST_F(Life, TheSameHypothesisIsNotTakenInTwice)

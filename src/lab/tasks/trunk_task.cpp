@@ -29,6 +29,7 @@ constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity
 constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
 constexpr double kSameTrunk = 0.5;       ///< a trunk that took the target's place stands this near [m]
 constexpr double kRadiusWeight = 0.1;    ///< of a new image in the radius as seen from where it is
+constexpr double kReadAgain = 0.1;       ///< of the log radius in the map, between two frames: other borders
 constexpr double kMisreadJump = 0.12;    ///< a jump of log r/d that no motion explains: other edges than the trunk's
 constexpr int kBelieved = 15;            ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks behind [m/s]
@@ -144,7 +145,7 @@ TaskCommand TrunkTask::search(const FrameReport &report, double time_s)
     m_target = choose(report, elapsed);
   if (m_target >= 0) {
     enter(TaskPhase::servoing);
-    m_has_feature = false;
+    forgetFeature();
   }
   return command;
 }
@@ -169,20 +170,26 @@ RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk
   if (m_options.ratio <= 0)
     return seen;
   const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
-  const bool is_misread = m_has_feature && std::abs(radius - m_log_radius) > kMisreadJump;
+  const bool is_misread = m_log_radius && std::abs(radius - *m_log_radius) > kMisreadJump;
   m_misread = is_misread ? m_misread + 1 : 0;
-  if (!m_has_feature || m_misread > kBelieved) // it does look like that from here
+  if (!m_log_radius || m_misread > kBelieved) // it does look like that from here
     m_log_radius = radius;
   else if (!is_misread)
-    m_log_radius += kRadiusWeight * (radius - m_log_radius);
-  seen.log_ratio = is_misread ? seen.log_ratio + m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
+    *m_log_radius += kRadiusWeight * (radius - *m_log_radius);
+  seen.log_ratio = is_misread ? seen.log_ratio + *m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
   return seen;
+}
+
+void TrunkTask::forgetFeature()
+{
+  m_has_feature = false;
+  m_log_radius.reset();
 }
 
 void TrunkTask::giveUpTarget()
 {
   m_target = -1;
-  m_has_feature = false;
+  forgetFeature();
   m_sway_start_s = -1;
   m_ratio = 0;
   m_sidestep.restart();
@@ -200,6 +207,9 @@ TaskCommand TrunkTask::act(const FrameReport &report)
       giveUpTarget();
     return search(report, time_s);
   }
+  if (std::abs(trunk->trunk.log_radius - m_map_log_radius) > kReadAgain)
+    forgetFeature();
+  m_map_log_radius = trunk->trunk.log_radius;
   m_place = trunk->trunk.xy;
   const RelativeTrunk seen = look(report, *trunk);
   if (!seen.isFinite())

@@ -31,6 +31,8 @@
 
 #include <visp3/vs/vpServo.h>
 
+#include <optional>
+
 namespace bole
 {
 struct TrunkTaskOptions
@@ -77,6 +79,7 @@ private:
   int choose(const FrameReport &report, double elapsed_s) const;
   int successor(const FrameReport &report) const;
   RelativeTrunk look(const FrameReport &report, const KnownTrunk &trunk);
+  void forgetFeature();
   void desire(double radius);
   Eigen::Vector2d swayNow(double time_s);
   bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
@@ -93,12 +96,13 @@ private:
   FeatureFilter m_bearing, m_log_ratio; ///< at the frame
   int m_target = -1;
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
+  double m_map_log_radius = 0;                       ///< of the target
   double m_time_s = 0, m_ratio = 0;
-  double m_log_radius = 0;    ///< as seen from here: of distance by the map times r/d in the image, over a second
-  int m_misread = 0;          ///< frames in a row
-  double m_turned_back = 1;   ///< -1: goes round the other way, since a trunk stood in it
-  int m_blocked = 0;          ///< frames in a row
-  double m_sway_start_s = -1; ///< -1: has not begun
+  std::optional<double> m_log_radius; ///< as seen from here: distance by the map times r/d in the image, over a second
+  int m_misread = 0;                  ///< frames in a row
+  double m_turned_back = 1;           ///< -1: goes round the other way, since a trunk stood in it
+  int m_blocked = 0;                  ///< frames in a row
+  double m_sway_start_s = -1;         ///< -1: has not begun
   bool m_has_feature = false;
 };
 } // namespace bole
