@@ -290,7 +290,7 @@ protected:
     report.trunks = {in_view};
     m_task.step(report);
   }
-  /// Believed r/d over the one asked for, less 1 [%], the other way round: 0 where it is kept.
+  /// By how much the task believes itself too far from the trunk [%].
   double distanceError() const
   {
     for (const auto &[name, value] : m_task.errors())
