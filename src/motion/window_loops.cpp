@@ -98,8 +98,8 @@ void cutWindow(const GreyPlane &image, float x, float y, Window &window)
   for (int k = 0; k < kOuterSize; ++k) {
     const short across = static_cast<short>(down[k + 2] - down[k]);
     const short below = static_cast<short>(3 * (along[k] + along[k + 2]) + 10 * along[k + 1]);
-    dx[k] = static_cast<short>(across << kGradientBits);
-    dy[k] = static_cast<short>(below << kGradientBits);
+    dx[k] = static_cast<short>(across * (1 << kGradientBits));
+    dy[k] = static_cast<short>(below * (1 << kGradientBits));
   }
   const bool is_whole =
       at.left >= 0 && at.top >= 0 && at.left + kOuter <= image.width && at.top + kOuter <= image.height;

@@ -39,7 +39,7 @@ TEST(LucasKanade, FindsWhatOpenCvFinds)
   buildPyramid(second, 3, b);
   int same = 0, both = 0, one = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
-    if (roundness(first, from[i]) < 1.2 * kLeastRoundness)
+    if (roundness(a.front(), from[i]) < 1.2 * kLeastRoundness)
       continue; // OpenCV follows what slides along a line
     cv::Point2f ours = from[i];
     const bool is_found = followWindow(a, b, from[i], ours, {});
