@@ -72,12 +72,7 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis)
 namespace
 {
 constexpr double kGoesOn = -0.25; ///< difference beside a border below which the trunk goes on there
-} // namespace
 
-bool goesOnBeside(const ColumnEvidence &evidence) { return evidence.leastBeside() < kGoesOn; }
-
-namespace
-{
 /// How well the borders of a hypothesis are those of its silhouette, in log-odds: what goes on beside one counts.
 double silhouette(const Judged &judged)
 {
@@ -86,6 +81,8 @@ double silhouette(const Judged &judged)
   return judged.log_odds + 0.5 * (beside(judged.evidence.left) + beside(judged.evidence.right));
 }
 } // namespace
+
+bool goesOnBeside(const ColumnEvidence &evidence) { return evidence.leastBeside() < kGoesOn; }
 
 bool isSilhouetteOf(const Judged &wider, const Judged &narrow)
 {
