@@ -114,13 +114,14 @@ void SensorMonitor::checkReturn(Sensor sensor)
 /// A sensor that two others contradict in this frame has no say in it.
 void SensorMonitor::judgeFrame(const Frame &frame)
 {
+  const bool points_err = oddsOfPoints() > m_options.limit_odds;
   for (auto c = m_comparisons.rbegin(); c != m_comparisons.rend() && c->b_ns == frame.stamp_ns; ++c) {
-    if (!c->gyro || !c->odometry || c->gyro_points < m_options.limit_points)
+    if (!c->gyro || !c->odometry || !trusts(Sensor::odometry) || c->gyro_points <= m_options.limit_points)
       continue;
-    if (c->odometry_points < 0.5 * m_options.limit_odometry && trusts(Sensor::odometry))
-      m_wrong_now[static_cast<int>(Sensor::gyro)] = true;
-    else if (c->odometry_points > m_options.limit_odometry && c->gyro_odometry < 0.5 * m_options.limit_odometry)
+    if (points_err && c->gyro_odometry < 0.5 * m_options.limit_odometry)
       m_wrong_now[static_cast<int>(Sensor::images)] = true;
+    else if (c->odometry_points < 0.5 * m_options.limit_odometry)
+      m_wrong_now[static_cast<int>(Sensor::gyro)] = true;
   }
 }
 
@@ -348,16 +349,32 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
   m_comparisons.push_back(now);
 }
 
+std::deque<SensorMonitor::Comparison>::const_iterator SensorMonitor::windowBegin() const
+{
+  return m_comparisons.end() - std::min<std::ptrdiff_t>(m_options.window, std::ptrdiff_t(m_comparisons.size()));
+}
+
+/// Log-likelihood ratio that the points err and not the gyro, by all of the window where these two differ: 0 without an
+/// odometry that is trusted.
+double SensorMonitor::oddsOfPoints() const
+{
+  if (!trusts(Sensor::odometry))
+    return 0;
+  double ratio = 0;
+  for (auto c = windowBegin(); c != m_comparisons.end(); ++c)
+    if (c->gyro_points > m_options.limit_points)
+      ratio += 0.5 * (c->odometry_points - c->gyro_odometry);
+  return ratio;
+}
+
 /// The sensor that stands in all failing pairs.
 void SensorMonitor::checkRotations()
 {
-  const int window = m_options.window;
   if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
     return;
-  const auto first = m_comparisons.end() - std::min<std::ptrdiff_t>(window, std::ptrdiff_t(m_comparisons.size()));
   int gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
   double since_s = inSeconds(m_comparisons.back().a_ns);
-  for (auto c = first; c != m_comparisons.end(); ++c) {
+  for (auto c = windowBegin(); c != m_comparisons.end(); ++c) {
     gyro_points += c->gyro_points > m_options.limit_points;
     gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
     odometry_points += c->odometry_points > m_options.limit_odometry;
@@ -371,7 +388,7 @@ void SensorMonitor::checkRotations()
     raise(Sensor::images, "rotation", since_s,
           fmt::format("images: contradict gyro and odometry since {:.1f} s (late, skewed or of another camera)",
                       since_s));
-  else if (gyro_failed && !has(Sensor::images)) {
+  else if (gyro_failed && oddsOfPoints() < m_options.limit_odds && !has(Sensor::images)) {
     raise(Sensor::gyro, "rotation", since_s,
           fmt::format("gyro: contradicts the points {}since {:.1f} s", gyro_odometry > 0 ? "and the odometry " : "",
                       since_s));

@@ -10,6 +10,9 @@
 /// `of_window` of the last `window` comparisons exceed a limit, so that one false match raises no alarm. Stamps of the
 /// images that are off by an error of their own show otherwise: see checkStamps().
 ///
+/// Where the points contradict the gyro, the odometry, too coarse to fail against either, still says which of the two
+/// is more likely: its two squared differences are summed over the window.
+///
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
 /// taken, and nothing wrong enters the map before the alarm. A sensor that was silent or repeated itself is trusted
 /// again once all of a window agrees with the points.
@@ -45,6 +48,7 @@ struct SensorMonitorOptions
   double limit_points = 25;           ///< of a squared difference with the points, 3 degrees of freedom; measured on 15
                                       ///< flights: at most 10 without a fault, 20 to 2000 with one
   double limit_odometry = 30;         ///< of one with the odometry; at most 17 without a fault
+  double limit_odds = 3;              ///< of the log-likelihood ratio that the points err and not the gyro: 20 to 1
   double gyro_bias_sigma = 0.008;     ///< that a gyro may have [rad/s]
   double odometry_turn_sigma = 0.007; ///< of the odometry's rotation between two frames [rad]
   double odometry_walk = 0.038;       ///< of its horizontal position [m/sqrt(s)]
@@ -110,6 +114,8 @@ private:
   void checkScatter();
   void judgeFrame(const Frame &frame);
   void checkRotations();
+  std::deque<Comparison>::const_iterator windowBegin() const;
+  double oddsOfPoints() const;
   void checkReturn(Sensor sensor);
   void checkStamps();
   void checkDirection();
