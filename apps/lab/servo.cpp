@@ -87,7 +87,10 @@ nlohmann::json toJson(const ServoTrialResult &result)
   nlohmann::json json{{"seed", result.seed},
                       {"success", result.is_success},
                       {"outcome", result.outcome},
-                      {"other gap", result.is_other_gap}};
+                      {"other gap", result.is_other_gap},
+                      {"sensors", nlohmann::json::array()}};
+  for (const SensorVerdict &verdict : result.record.verdicts)
+    json["sensors"].push_back(verdict.text);
   for (const Column &column : kColumns)
     json[column.name] = std::isnan(result.*column.value) ? nlohmann::json() : nlohmann::json(result.*column.value);
   return json;
@@ -179,6 +182,9 @@ void print(const ServoArguments &arguments, const std::vector<ServoTrialResult> 
              runs, runs == 1 ? "" : "s", interval, contacts(results));
   if (otherGaps(results) > 0)
     fmt::print("  {:3} of them through another gap than the one set up\n", otherGaps(results));
+  for (const ServoTrialResult &result : results)
+    for (const SensorVerdict &verdict : result.record.verdicts)
+      fmt::print("  seed {}: {}\n", result.seed, verdict.text);
   for (const auto &[reason, number] : failures(results))
     fmt::print("  {:3} {}\n", number, reason);
   for (const Column &column : kColumns) {

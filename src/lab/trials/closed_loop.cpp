@@ -119,6 +119,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
     if (judge)
       sample.real = judge(sample.truth, report);
     record.samples.push_back(sample);
+    record.verdicts = report.verdicts;
 
     record.is_contact = robot.leastClearance() < options.contact;
     record.is_finished = task.phase() == TaskPhase::done;

@@ -165,6 +165,8 @@ std::string failureSheet(const LoopRecord &record, const std::vector<SimulatedTr
     html += "<p>Belief and truth did not part while it servoed: what failed is control, or the task's patience.</p>\n";
   html += fmt::format("<p>It ended at {:.1f} s ({}): {}; {:.2f} m from the nearest bark at the least.</p>\n",
                       end.time_s, toString(end.phase), escaped(end.reason), end.clearance);
+  for (const SensorVerdict &verdict : record.verdicts)
+    html += fmt::format("<p>{}.</p>\n", escaped(verdict.text));
   if (!picture.empty())
     html += fmt::format("<p><img src=\"{}\" alt=\"the frame of the parting\"></p>\n", escaped(picture));
   const std::size_t shown = parting ? parting->sample : record.samples.size() - 1;

@@ -96,6 +96,13 @@ TEST(FailureSheet, NamesATrunkNearAheadThatTheMapDoesNotHold)
   EXPECT_FALSE(findParting(flight.record, flight.trunks));
 }
 
+TEST(FailureSheet, TellsWhichSensorsContradictedTheOthers)
+{
+  Resting flight;
+  flight.record.verdicts.push_back({"gyro", "rotation", 1.5, "gyro: contradicts the points since 1.5 s"});
+  EXPECT_NE(flight.sheet().find("<p>gyro: contradicts the points since 1.5 s.</p>"), std::string::npos);
+}
+
 TEST(FailureSheet, IsAPageWithMapsAndCurvesAndNoMarkupOfItsTitle)
 {
   Resting flight;
