@@ -91,10 +91,10 @@ double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, 
   for (std::size_t i = 0; i < rays.size(); ++i)
     upright.add(rays.a[i], rays.b[i] - row.shear * rays.b[i].y() * Eigen::Vector3d::UnitX());
   const double min_sigma = leastNoise(camera, options);
-  const auto costFrom = [&](const motion::Rays &rays, const Pose &start) {
+  const auto costFrom = [&](const motion::Rays &from, const Pose &start) {
     const motion::JointFit fit =
-        motion::fitMotion(rays, {start.R, start.t.normalized()}, prior, row.noise, min_sigma, options);
-    return motion::costOf(rays, fit.motion, prior, row.noise, options);
+        motion::fitMotion(from, {start.R, start.t.normalized()}, prior, row.noise, min_sigma, options);
+    return motion::costOf(from, fit.motion, prior, row.noise, options);
   };
   double without = costFrom(rays, row.aMb);
   for (const Pose &start : starts)

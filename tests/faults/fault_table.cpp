@@ -79,8 +79,9 @@ void readFrames(const fs::path &run, double since_s, Result &result)
     std::string name = fields[2];
     if (name == "doubtful") { // without the figures in which frames differ
       name = reason.substr(0, reason.find_first_of(":0123456789"));
-      if (const std::size_t of = name.rfind(" of "); of != std::string::npos && of + 4 == name.size())
-        name.resize(of);
+      for (const std::string end : {" ", " of", " by"})
+        if (name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
+          name.resize(name.size() - end.size());
     }
     if (std::find(names.begin(), names.end(), name) == names.end())
       names.push_back(name);
