@@ -47,9 +47,9 @@ struct LoopOptions
 struct LoopRecord
 {
   std::vector<LoopSample> samples;
-  double servoing_from_s = -1; ///< first time the task servoed, -1: never
-  bool is_contact = false;     ///< touched a trunk
-  bool is_finished = false;    ///< the task said done
+  double servoing_from_s = -1;         ///< first time the task servoed, -1: never
+  bool is_contact = false;             ///< touched a trunk
+  bool is_finished = false;            ///< the task said done
   std::vector<SensorVerdict> verdicts; ///< on sensors that contradicted the others
 
   double leastClearance() const; ///< of the samples [m]
