@@ -202,7 +202,7 @@ TEST_F(Exported, GeoJsonPutsTheTrunksWhereTheOriginSays)
 TEST_F(Exported, TheEarthIsFlatEnoughWithinAFlight)
 {
   const GeoOrigin origin{60, 25, 0};
-  for (const Eigen::Vector2d xy : {Eigen::Vector2d(350, 0), Eigen::Vector2d(0, 350), Eigen::Vector2d(-250, 240)}) {
+  for (const Eigen::Vector2d &xy : {Eigen::Vector2d(350, 0), Eigen::Vector2d(0, 350), Eigen::Vector2d(-250, 240)}) {
     const Eigen::Vector2d degrees = toEarth(origin, xy), en = eastNorth(origin, degrees.x(), degrees.y());
     EXPECT_LT((en - Eigen::Vector2d(-xy.y(), xy.x())).norm(), 0.02); // north is x, west is y
   }

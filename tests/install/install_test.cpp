@@ -140,8 +140,9 @@ TEST_F(Install, TheSourcesAreAPartOfAnotherProject)
 TEST_F(Install, NothingOfTheSourceOrBuildTreeIsNeeded)
 {
   for (const auto &entry : fs::recursive_directory_iterator(s_prefix))
-    if (entry.path().extension() == ".cmake")
+    if (entry.path().extension() == ".cmake") {
       EXPECT_THAT(textOf(entry.path()), testing::Not(HasSubstr(BOLE_SOURCE_DIR))) << entry.path();
+    }
 }
 
 TEST_F(Install, TheCommandFindsItsPresetsAndItsFlightByName)

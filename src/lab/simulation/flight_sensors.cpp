@@ -10,15 +10,12 @@
 
 namespace bole
 {
-namespace
-{
-} // namespace
-
 void SensorOptions::validate() const
 {
   requireRange("gyro_noise", gyro_noise, 0, 1);
   requireRange("gyro_bias", gyro_bias, 0, 1);
   requireRange("accelerometer_noise", accelerometer_noise, 0, 10);
+  requireRange("accelerometer_bias", accelerometer_bias, 0, 10);
   requireRange("odometry_step_noise", odometry_step_noise, 0, 1);
   requireRange("odometry_scale", odometry_scale, 0, 0.5);
   requireRange("height_noise", height_noise, 0, 1);
@@ -27,7 +24,10 @@ void SensorOptions::validate() const
 }
 
 SimulatedImu::SimulatedImu(const SensorOptions &options)
-    : m_options(options), m_random(options.seed, 401), m_bias(m_random.normal3(options.gyro_bias))
+    : m_options(options),
+      m_random(options.seed, 401),
+      m_gyro_bias(m_random.normal3(options.gyro_bias)),
+      m_accelerometer_bias(Random(options.seed, 403).normal3(options.accelerometer_bias))
 {
   options.validate();
 }
@@ -36,9 +36,9 @@ ImuSample SimulatedImu::measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3
                                 const Eigen::Vector3d &acceleration)
 {
   ImuSample sample;
-  sample.gyro = rate + m_bias + m_random.normal3(m_options.gyro_noise);
-  sample.accelerometer =
-      wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + m_random.normal3(m_options.accelerometer_noise);
+  sample.gyro = rate + m_gyro_bias + m_random.normal3(m_options.gyro_noise);
+  sample.accelerometer = wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + m_accelerometer_bias +
+                         m_random.normal3(m_options.accelerometer_noise);
   return sample;
 }
 

@@ -15,6 +15,7 @@ struct SensorOptions
   double gyro_noise = 0.01;           ///< standard deviation a sample [rad/s], 0 to 1
   double gyro_bias = 0.006;           ///< standard deviation of the constant bias an axis [rad/s], 0 to 1
   double accelerometer_noise = 0.1;   ///< standard deviation a sample [m/s^2], 0 to 10
+  double accelerometer_bias = 0.05;   ///< standard deviation of the constant bias an axis [m/s^2], 0 to 10
   double odometry_step_noise = 0.012; ///< of a frame's horizontal step, an axis [m], 0 to 1
   double odometry_scale = 0.02;       ///< standard deviation of the scale error, 0 to 0.5
   double height_noise = 0.019;        ///< of the height in one frame [m], 0 to 1
@@ -41,7 +42,7 @@ public:
 private:
   SensorOptions m_options;
   Random m_random;
-  Eigen::Vector3d m_bias;
+  Eigen::Vector3d m_gyro_bias, m_accelerometer_bias;
 };
 
 /// The pose filter: dead reckoning in the plane with scale error, step noise and a drifting

@@ -59,6 +59,7 @@ private:
   int m_stride;
   std::vector<Eigen::Vector2f> m_xy;
 };
+} // namespace
 
 /// Those of one place of every pixel, 4x4 pixels after 4x4 pixels: they do not change from frame to frame.
 struct RayTiles
@@ -85,6 +86,8 @@ struct RayTiles
   }
 };
 
+namespace
+{
 /// Of the sample: a rank-1 lattice, regular in time, well spread over the pixel in both directions.
 RayTiles tilesOf(const RayTable &table, const PinholeCamera &camera, int sample)
 {

@@ -64,6 +64,7 @@ template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit
   visit("sensors", "gyro_noise", sensors.gyro_noise);
   visit("sensors", "gyro_bias", sensors.gyro_bias);
   visit("sensors", "accelerometer_noise", sensors.accelerometer_noise);
+  visit("sensors", "accelerometer_bias", sensors.accelerometer_bias);
   visit("sensors", "odometry_step_noise", sensors.odometry_step_noise);
   visit("sensors", "odometry_scale", sensors.odometry_scale);
   visit("sensors", "height_noise", sensors.height_noise);
