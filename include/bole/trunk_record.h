@@ -23,20 +23,7 @@ enum class TrunkStatus
 };
 
 /// As trunks.csv writes it.
-inline const char *toString(TrunkStatus status)
-{
-  switch (status) {
-  case TrunkStatus::candidate:
-    return "candidate";
-  case TrunkStatus::confirmed:
-    return "confirmed";
-  case TrunkStatus::lost:
-    return "lost";
-  case TrunkStatus::merged:
-    return "merged";
-  }
-  return "unknown";
-}
+const char *toString(TrunkStatus status);
 
 /// Why what was found is no trunk of the map.
 enum class TrunkFate
@@ -52,28 +39,7 @@ enum class TrunkFate
 };
 
 /// As hypotheses.csv writes it.
-inline const char *toString(TrunkFate fate)
-{
-  switch (fate) {
-  case TrunkFate::none:
-    return "none";
-  case TrunkFate::undecided:
-    return "undecided";
-  case TrunkFate::unseen:
-    return "unseen";
-  case TrunkFate::missed:
-    return "missed";
-  case TrunkFate::doubted:
-    return "doubted";
-  case TrunkFate::outdone:
-    return "outdone";
-  case TrunkFate::duplicate:
-    return "duplicate";
-  case TrunkFate::unranged:
-    return "unranged";
-  }
-  return "unknown";
-}
+const char *toString(TrunkFate fate);
 
 /// A trunk in the world frame. Position and radius are those at breast height, where forest inventories measure (and
 /// the ground truth of the rendered flights is given): the axis at kBreastHeight above the ground. For an upright trunk

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "ardrone/bytes.h"
+#include "geometry/names.h"
 
 #include <cmath>
 #include <numeric>
@@ -95,21 +96,8 @@ std::vector<std::uint8_t> encodePhysical(const Navdata::Physical &physical)
 
 const char *toString(NavdataError error)
 {
-  switch (error) {
-  case NavdataError::none:
-    return "none";
-  case NavdataError::too_short:
-    return "too short";
-  case NavdataError::header:
-    return "not a navdata header";
-  case NavdataError::option_size:
-    return "an option runs past the end";
-  case NavdataError::no_checksum:
-    return "no checksum";
-  case NavdataError::checksum:
-    return "wrong checksum";
-  }
-  return "unknown";
+  return nameOf(error, {"none", "too short", "not a navdata header", "an option runs past the end", "no checksum",
+                        "wrong checksum"});
 }
 
 NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata)

@@ -3,6 +3,7 @@
 
 #include "geometry/constants.h"
 
+#include "geometry/names.h"
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 
@@ -23,17 +24,7 @@ double rms(double sum_of_squares, std::size_t count)
 
 const char *toString(Alignment alignment)
 {
-  switch (alignment) {
-  case Alignment::none:
-    return "none";
-  case Alignment::first_pose:
-    return "first_pose";
-  case Alignment::xy_yaw:
-    return "xy_yaw";
-  case Alignment::xy_yaw_scale:
-    return "xy_yaw_scale";
-  }
-  return "unknown";
+  return nameOf(alignment, {"none", "first_pose", "xy_yaw", "xy_yaw_scale"});
 }
 
 Eigen::Matrix2d PlanarTransform::linear() const

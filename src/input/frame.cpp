@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/frame.h>
 
+#include "geometry/names.h"
+
 namespace bole
 {
 const char *toString(FrameStatus status)
 {
-  switch (status) {
-  case FrameStatus::ok:
-    return "ok";
-  case FrameStatus::stale:
-    return "stale";
-  case FrameStatus::corrupt:
-    return "corrupt";
-  case FrameStatus::missing:
-    return "missing";
-  case FrameStatus::resized:
-    return "resized";
-  case FrameStatus::doubtful:
-    return "doubtful";
-  }
-  return "unknown";
+  return nameOf(status, {"ok", "stale", "corrupt", "missing", "resized", "doubtful"});
 }
 } // namespace bole

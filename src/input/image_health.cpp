@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/image_health.h"
 #include "geometry/median.h"
+#include "geometry/names.h"
 #include "input/gyro_agreement.h"
 #include "input/image_measures.h"
 
@@ -107,39 +108,8 @@ Suspicion otherwise(const cv::Mat &before, const cv::Mat &now, const ImageMatch 
 
 const char *toString(ImageFault fault)
 {
-  switch (fault) {
-  case ImageFault::none:
-    return "none";
-  case ImageFault::wrong_size:
-    return "wrong size";
-  case ImageFault::black:
-    return "black";
-  case ImageFault::saturated:
-    return "saturated";
-  case ImageFault::noise:
-    return "noise";
-  case ImageFault::blurred:
-    return "blurred";
-  case ImageFault::smeared:
-    return "smeared";
-  case ImageFault::frozen:
-    return "frozen";
-  case ImageFault::mirrored:
-    return "mirrored";
-  case ImageFault::upside_down:
-    return "upside down";
-  case ImageFault::negative:
-    return "negative";
-  case ImageFault::cropped:
-    return "cropped";
-  case ImageFault::torn:
-    return "torn";
-  case ImageFault::out_of_order:
-    return "out of order";
-  case ImageFault::late:
-    return "late";
-  }
-  return "?";
+  return nameOf(fault, {"none", "wrong size", "black", "saturated", "noise", "blurred", "smeared", "frozen", "mirrored",
+                        "upside down", "negative", "cropped", "torn", "out of order", "late"});
 }
 
 struct ImageHealth::State

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The ViSP side of vpMbTrunkTracker. Its estimation is PoseEstimator; its display is in vpMbTrunkTrackerDisplay.cpp.
+#include "geometry/names.h"
 #include "mbt/trunk_tracker_impl.h"
 
 #include "geometry/visp_matrix.h"
@@ -29,23 +30,8 @@ namespace
 
 const char *vpMbTrunkTracker::toString(Status status)
 {
-  switch (status) {
-  case Status::not_initialised:
-    return "not initialised";
-  case Status::tracked:
-    return "tracked";
-  case Status::partly_on_prior:
-    return "partly on the prior";
-  case Status::uncertain:
-    return "uncertain";
-  case Status::no_trunk:
-    return "no trunk in view";
-  case Status::lost:
-    return "lost";
-  case Status::bad_image:
-    return "bad image";
-  }
-  return "?";
+  return bole::nameOf(status, {"not initialised", "tracked", "partly on the prior", "uncertain", "no trunk in view",
+                               "lost", "bad image"});
 }
 
 vpMbTrunkTracker::vpMbTrunkTracker() : vpMbTrunkTracker(Options()) {}

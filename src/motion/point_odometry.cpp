@@ -4,6 +4,7 @@
 #include "geometry/median.h"
 
 #include "geometry/constants.h"
+#include "geometry/names.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
 #include <Eigen/Dense>
@@ -89,20 +90,7 @@ struct PointOdometry::State
   double typicalInverseDepth() const;
 };
 
-const char *toString(PointOdometryStatus status)
-{
-  switch (status) {
-  case PointOdometryStatus::starting:
-    return "starting";
-  case PointOdometryStatus::ok:
-    return "ok";
-  case PointOdometryStatus::rotation_only:
-    return "rotation_only";
-  case PointOdometryStatus::lost:
-    return "lost";
-  }
-  return "?";
-}
+const char *toString(PointOdometryStatus status) { return nameOf(status, {"starting", "ok", "rotation_only", "lost"}); }
 
 PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options) : m_state(new State)
 {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/relative_pose.h"
 
+#include "geometry/names.h"
 #include "motion/epipolar.h"
 
 #include <Eigen/Dense>
@@ -88,19 +89,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 
 const char *toString(RelativePoseStatus status)
 {
-  switch (status) {
-  case RelativePoseStatus::ok:
-    return "ok";
-  case RelativePoseStatus::too_few_points:
-    return "too_few_points";
-  case RelativePoseStatus::no_parallax:
-    return "no_parallax";
-  case RelativePoseStatus::ambiguous:
-    return "ambiguous";
-  case RelativePoseStatus::inconsistent:
-    return "inconsistent";
-  }
-  return "?";
+  return nameOf(status, {"ok", "too_few_points", "no_parallax", "ambiguous", "inconsistent"});
 }
 
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/flight_trace.h"
 
+#include "geometry/names.h"
 #include "input/csv_reader.h"
 #include "output/atomic_file.h"
 #include "output/trajectory_writer.h"
@@ -28,9 +29,8 @@ std::string oneField(std::string text)
 
 FrameStatus statusOf(const CsvReader &csv, std::size_t column)
 {
-  for (int i = 0; i <= static_cast<int>(FrameStatus::doubtful); ++i)
-    if (csv.text(column) == toString(static_cast<FrameStatus>(i)))
-      return static_cast<FrameStatus>(i);
+  if (const auto status = valueNamed(csv.text(column), FrameStatus::doubtful))
+    return *status;
   csv.fail(fmt::format("status = \"{}\", is not known", csv.text(column)));
 }
 } // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/summary_json.h"
 #include "geometry/median.h"
+#include "geometry/names.h"
 #include "output/atomic_file.h"
 #include "output/verdict.h"
 #include "output/versions.h"
@@ -146,13 +147,12 @@ std::string toJson(const RunSummary &summary)
 
 namespace
 {
-template <typename Source> Source sourceOf(const std::string &path, const Json &json, const char *key, int count)
+template <typename Source> Source sourceOf(const std::string &path, const Json &json, const char *key, Source last)
 {
   if (!json.contains(key)) // of an earlier version
     return static_cast<Source>(0);
-  for (int i = 0; i < count; ++i)
-    if (json.value(key, "") == toString(static_cast<Source>(i)))
-      return static_cast<Source>(i);
+  if (const auto source = valueNamed(json.value(key, ""), last))
+    return *source;
   throw vpException(vpException::badValue, "%s: %s = \"%s\", is no known source", path.c_str(), key,
                     json.value(key, "").c_str());
 }
@@ -176,9 +176,9 @@ WorldReference readReference(const std::string &path)
 {
   const Json json = readObject(path);
   WorldReference reference;
-  reference.scale = sourceOf<ScaleSource>(path, json, "scale", 3);
+  reference.scale = sourceOf(path, json, "scale", ScaleSource::prior);
   reference.scale_sigma = numberOrZero(json, "scale_sigma");
-  reference.gravity = sourceOf<GravitySource>(path, json, "gravity", 3);
+  reference.gravity = sourceOf(path, json, "gravity", GravitySource::assumed);
   reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
   reference.has_ranges = json.value("ranges", true);
   return reference;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/trunks_csv.h"
+#include "geometry/names.h"
 #include "input/csv_reader.h"
 #include "output/atomic_file.h"
 
@@ -54,17 +55,15 @@ void addRow(std::string &text, const TrunkRecord &trunk)
 
 TrunkStatus readStatus(const CsvReader &csv, std::size_t column)
 {
-  for (const auto status : {TrunkStatus::candidate, TrunkStatus::confirmed, TrunkStatus::lost, TrunkStatus::merged})
-    if (csv.text(column) == toString(status))
-      return status;
+  if (const auto status = valueNamed(csv.text(column), TrunkStatus::merged))
+    return *status;
   csv.fail(fmt::format("status = \"{}\", must be candidate, confirmed, lost or merged", csv.text(column)));
 }
 
 TrunkFate readFate(const CsvReader &csv, std::size_t column)
 {
-  for (int i = 0; i <= static_cast<int>(TrunkFate::unranged); ++i)
-    if (csv.text(column) == toString(static_cast<TrunkFate>(i)))
-      return static_cast<TrunkFate>(i);
+  if (const auto fate = valueNamed(csv.text(column), TrunkFate::unranged))
+    return *fate;
   csv.fail(fmt::format("fate = \"{}\", is not known", csv.text(column)));
 }
 

@@ -1,36 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/world_reference.h>
 
+#include "geometry/names.h"
+
 #include <cmath>
 #include <fmt/format.h>
 
 namespace bole
 {
-const char *toString(ScaleSource source)
-{
-  switch (source) {
-  case ScaleSource::odometry:
-    return "odometry";
-  case ScaleSource::height:
-    return "height";
-  case ScaleSource::prior:
-    return "prior";
-  }
-  return "unknown";
-}
+const char *toString(ScaleSource source) { return nameOf(source, {"odometry", "height", "prior"}); }
 
-const char *toString(GravitySource source)
-{
-  switch (source) {
-  case GravitySource::odometry:
-    return "odometry";
-  case GravitySource::trunks:
-    return "trunks";
-  case GravitySource::assumed:
-    return "assumed";
-  }
-  return "unknown";
-}
+const char *toString(GravitySource source) { return nameOf(source, {"odometry", "trunks", "assumed"}); }
 
 std::string describe(const WorldReference &reference)
 {

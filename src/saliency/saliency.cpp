@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/saliency.h"
+#include "geometry/names.h"
 #include "geometry/so3.h"
 #include "saliency/label_loops.h"
 
@@ -81,21 +82,7 @@ double meanDeviation(const Eigen::Matrix3d &covariance) { return std::sqrt(std::
 
 const char *toString(SaliencyStatus status)
 {
-  switch (status) {
-  case SaliencyStatus::first_frame:
-    return "first frame";
-  case SaliencyStatus::with_gyro:
-    return "with gyro";
-  case SaliencyStatus::without_gyro:
-    return "without gyro";
-  case SaliencyStatus::no_texture:
-    return "no texture";
-  case SaliencyStatus::stale:
-    return "stale";
-  case SaliencyStatus::not_converged:
-    return "not converged";
-  }
-  return "unknown";
+  return nameOf(status, {"first frame", "with gyro", "without gyro", "no texture", "stale", "not converged"});
 }
 
 SaliencyEstimator::SaliencyEstimator(const PinholeCamera &camera, const SaliencyOptions &options)

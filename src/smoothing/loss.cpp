@@ -1,29 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/factors.h>
 
+#include "geometry/names.h"
+
 #include <cmath>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
-const char *toString(LossKind kind)
-{
-  switch (kind) {
-  case LossKind::quadratic:
-    return "quadratic";
-  case LossKind::huber:
-    return "huber";
-  case LossKind::cauchy:
-    return "cauchy";
-  }
-  return "unknown";
-}
+const char *toString(LossKind kind) { return nameOf(kind, {"quadratic", "huber", "cauchy"}); }
 
 LossKind lossKindFromString(const std::string &name)
 {
-  for (const LossKind kind : {LossKind::quadratic, LossKind::huber, LossKind::cauchy})
-    if (name == toString(kind))
-      return kind;
+  if (const auto kind = valueNamed(name, LossKind::cauchy))
+    return *kind;
   throw vpException(vpException::badValue, "loss = %s, must be quadratic, huber or cauchy", name.c_str());
 }
 

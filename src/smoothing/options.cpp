@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/smoother.h>
 
+#include "geometry/names.h"
+
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
-const char *toString(UpdateStatus status)
-{
-  switch (status) {
-  case UpdateStatus::ok:
-    return "ok";
-  case UpdateStatus::iteration_limit:
-    return "iteration limit";
-  case UpdateStatus::degenerate:
-    return "degenerate";
-  }
-  return "unknown";
-}
+const char *toString(UpdateStatus status) { return nameOf(status, {"ok", "iteration limit", "degenerate"}); }
 
 Pose SmootherOptions::forwardCamera()
 {

@@ -1,25 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "summary/square_root.h"
+#include "geometry/names.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Eigenvalues>
 
 namespace bole
 {
-const char *toString(SummaryStatus status)
-{
-  switch (status) {
-  case SummaryStatus::ok:
-    return "ok";
-  case SummaryStatus::projected:
-    return "projected";
-  case SummaryStatus::indefinite:
-    return "indefinite";
-  case SummaryStatus::not_finite:
-    return "not finite";
-  }
-  return "unknown";
-}
+const char *toString(SummaryStatus status) { return nameOf(status, {"ok", "projected", "indefinite", "not finite"}); }
 
 Vector4d SquareRootSummary::residual(const RelativeTrunk &relative, Matrix4d *J) const
 {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/trunk_tracker.h"
 
+#include "geometry/names.h"
 #include "geometry/require_range.h"
 
 #include <Eigen/LU>
@@ -179,23 +180,8 @@ void TrackingOptions::validate() const
 
 const char *toString(TrackingStatus status)
 {
-  switch (status) {
-  case TrackingStatus::tracked:
-    return "tracked";
-  case TrackingStatus::not_visible:
-    return "not visible";
-  case TrackingStatus::occluded:
-    return "occluded";
-  case TrackingStatus::no_border:
-    return "no border";
-  case TrackingStatus::diverged:
-    return "diverged";
-  case TrackingStatus::negative_curvature:
-    return "negative curvature";
-  case TrackingStatus::sign_changed:
-    return "sign changed";
-  }
-  return "unknown";
+  return nameOf(status,
+                {"tracked", "not visible", "occluded", "no border", "diverged", "negative curvature", "sign changed"});
 }
 
 TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera, const TrackingPrediction &prediction,

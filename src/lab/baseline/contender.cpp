@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/contender.h"
+#include "geometry/names.h"
 #include <bole/vpMbTrunkTracker.h>
 
 #include <ctime>
@@ -41,33 +42,11 @@ double threadTime_ms()
 
 const char *toString(TrackerKind kind)
 {
-  switch (kind) {
-  case TrackerKind::visp_edge:
-    return "vpMbEdgeTracker";
-  case TrackerKind::visp_generic_edge:
-    return "vpMbGenericTracker EDGE";
-  case TrackerKind::visp_generic_edge_klt:
-    return "vpMbGenericTracker EDGE+KLT";
-  case TrackerKind::trunk:
-    return "vpMbTrunkTracker";
-  }
-  return "?";
+  return nameOf(kind,
+                {"vpMbEdgeTracker", "vpMbGenericTracker EDGE", "vpMbGenericTracker EDGE+KLT", "vpMbTrunkTracker"});
 }
 
-const char *toString(Help help)
-{
-  switch (help) {
-  case Help::alone:
-    return "alone";
-  case Help::prior:
-    return "prior";
-  case Help::reinitialised:
-    return "re-initialised";
-  case Help::truth:
-    return "true pose";
-  }
-  return "?";
-}
+const char *toString(Help help) { return nameOf(help, {"alone", "prior", "re-initialised", "true pose"}); }
 
 std::string EdgeSettings::text() const
 {

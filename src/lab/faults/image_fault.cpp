@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/faults/image_fault.h"
 
+#include "geometry/names.h"
+
 #include <algorithm>
 #include <random>
 #include <visp3/core/vpException.h>
@@ -9,9 +11,6 @@ namespace bole
 {
 namespace
 {
-constexpr FaultKind kKinds[] = {FaultKind::none,  FaultKind::black,  FaultKind::noise,
-                                FaultKind::smear, FaultKind::freeze, FaultKind::wrong_size};
-
 vpImage<unsigned char> halved(const vpImage<unsigned char> &image)
 {
   vpImage<unsigned char> small(image.getHeight() / 2, image.getWidth() / 2);
@@ -24,28 +23,13 @@ vpImage<unsigned char> halved(const vpImage<unsigned char> &image)
 
 const char *toString(FaultKind kind)
 {
-  switch (kind) {
-  case FaultKind::none:
-    return "none";
-  case FaultKind::black:
-    return "black";
-  case FaultKind::noise:
-    return "noise";
-  case FaultKind::smear:
-    return "smear";
-  case FaultKind::freeze:
-    return "freeze";
-  case FaultKind::wrong_size:
-    return "wrong size";
-  }
-  return "?";
+  return nameOf(kind, {"none", "black", "noise", "smear", "freeze", "wrong size"});
 }
 
 FaultKind faultKindFromString(const std::string &word)
 {
-  for (const FaultKind kind : kKinds)
-    if (word == toString(kind))
-      return kind;
+  if (const auto kind = valueNamed(word, FaultKind::wrong_size))
+    return *kind;
   throw vpException(vpException::badValue, "fault = %s, must be none, black, noise, smear, freeze or wrong size",
                     word.c_str());
 }

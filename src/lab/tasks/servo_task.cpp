@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/servo_task.h"
 
+#include "geometry/names.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -17,20 +19,7 @@ constexpr double kLargestTurn = 0.6; ///< [rad/s]
 constexpr double kGuarded = 4;       ///< surfaces farther are no danger yet [m]
 } // namespace
 
-const char *toString(TaskPhase phase)
-{
-  switch (phase) {
-  case TaskPhase::searching:
-    return "searching";
-  case TaskPhase::servoing:
-    return "servoing";
-  case TaskPhase::done:
-    return "done";
-  case TaskPhase::failed:
-    return "failed";
-  }
-  return "?";
-}
+const char *toString(TaskPhase phase) { return nameOf(phase, {"searching", "servoing", "done", "failed"}); }
 
 ServoTask::ServoTask(const SafetyOptions &safety, const ResponseOptions &response)
     : m_safety(safety), m_response(response)

@@ -1,36 +1,20 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/injected_fault.h"
 
+#include "geometry/names.h"
 #include "geometry/require_range.h"
 
 namespace bole
 {
 const char *toString(SensorFault fault)
 {
-  switch (fault) {
-  case SensorFault::none:
-    return "none";
-  case SensorFault::odometry_freeze:
-    return "odometry-freeze";
-  case SensorFault::odometry_jump:
-    return "odometry-jump";
-  case SensorFault::odometry_gone:
-    return "odometry-gone";
-  case SensorFault::gyro_gone:
-    return "gyro-gone";
-  case SensorFault::gyro_bias:
-    return "gyro-bias";
-  }
-  return "?";
+  return nameOf(fault, {"none", "odometry-freeze", "odometry-jump", "odometry-gone", "gyro-gone", "gyro-bias"});
 }
 
 FaultOptions faultFromString(const std::string &word)
 {
   FaultOptions options;
-  for (const SensorFault fault : {SensorFault::odometry_freeze, SensorFault::odometry_jump, SensorFault::odometry_gone,
-                                  SensorFault::gyro_gone, SensorFault::gyro_bias})
-    if (word == toString(fault))
-      options.sensor = fault;
+  options.sensor = valueNamed(word, SensorFault::gyro_bias).value_or(SensorFault::none);
   if (options.sensor == SensorFault::none)
     options.kind = faultKindFromString(word);
   return options;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/perception.h"
 
+#include "geometry/names.h"
 #include "geometry/yaw.h"
 #include "input/frame_health.h"
 #include <bole/pipeline.h>
@@ -157,24 +158,12 @@ private:
 };
 } // namespace
 
-const char *toString(PerceptionKind kind)
-{
-  switch (kind) {
-  case PerceptionKind::truth:
-    return "truth";
-  case PerceptionKind::truth_map:
-    return "truth-map";
-  case PerceptionKind::real:
-    return "real";
-  }
-  return "?";
-}
+const char *toString(PerceptionKind kind) { return nameOf(kind, {"truth", "truth-map", "real"}); }
 
 PerceptionKind perceptionFromString(const std::string &word)
 {
-  for (const PerceptionKind kind : {PerceptionKind::truth, PerceptionKind::truth_map, PerceptionKind::real})
-    if (word == toString(kind))
-      return kind;
+  if (const auto kind = valueNamed(word, PerceptionKind::real))
+    return *kind;
   throw vpException(vpException::badValue, "perception = %s, must be truth, truth-map or real", word.c_str());
 }
 

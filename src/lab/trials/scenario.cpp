@@ -2,6 +2,7 @@
 #include "lab/trials/scenario.h"
 
 #include "geometry/constants.h"
+#include "geometry/names.h"
 #include "geometry/require_range.h"
 #include "lab/simulation/random.h"
 
@@ -106,20 +107,7 @@ Scenario stand(const ScenarioOptions &options, ForestOptions forest)
 }
 } // namespace
 
-const char *toString(ServoKind kind)
-{
-  switch (kind) {
-  case ServoKind::hold:
-    return "hold";
-  case ServoKind::circle:
-    return "circle";
-  case ServoKind::gap:
-    return "gap";
-  case ServoKind::slalom:
-    return "slalom";
-  }
-  return "?";
-}
+const char *toString(ServoKind kind) { return nameOf(kind, {"hold", "circle", "gap", "slalom"}); }
 
 void ScenarioOptions::validate() const
 {
