@@ -13,7 +13,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {

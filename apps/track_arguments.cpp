@@ -2,8 +2,6 @@
 #include "track_arguments.h"
 #include "data_files.h"
 
-#include <algorithm>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {

@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <fmt/format.h>
 #include <memory>
-#include <numeric>
 
 namespace bole::apps
 {

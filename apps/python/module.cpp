@@ -6,7 +6,6 @@
 #include <bole/pipeline.h>
 
 #include <Eigen/Geometry>
-#include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>

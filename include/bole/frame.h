@@ -8,7 +8,6 @@
 
 #include <bole/visp.h>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>

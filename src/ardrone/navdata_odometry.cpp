@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {

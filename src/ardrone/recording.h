@@ -6,7 +6,6 @@
 #include "ardrone/drone_link.h"
 
 #include <cstdint>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <netinet/in.h>
-#include <optional>
 #include <string>
 
 namespace bole

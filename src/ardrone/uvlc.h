@@ -34,7 +34,6 @@
 #include <bole/visp.h>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -10,7 +10,6 @@
 
 #include <filesystem>
 #include <fmt/format.h>
-#include <optional>
 #include <visp3/core/vpException.h>
 
 namespace bole

@@ -9,9 +9,7 @@
 #include "output/trunks_csv.h"
 #include <bole/graph.h>
 
-#include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <visp3/core/vpException.h>
 
 namespace bole

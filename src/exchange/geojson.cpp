@@ -2,7 +2,6 @@
 #include "exchange/exchange.h"
 
 #include <cmath>
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <visp3/core/vpException.h>

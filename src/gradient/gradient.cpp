@@ -2,7 +2,6 @@
 #include "gradient/gradient.h"
 
 #include <opencv2/imgproc.hpp>
-#include <string>
 
 namespace bole
 {

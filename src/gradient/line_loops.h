@@ -2,7 +2,6 @@
 #pragma once
 // Private to the stage: sums of a gradient image along a line, a sample a row.
 
-#include <cstddef>
 
 namespace bole
 {

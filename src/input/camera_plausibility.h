@@ -6,7 +6,6 @@
 #include <bole/open_source.h>
 
 #include <string>
-#include <vector>
 
 namespace bole
 {

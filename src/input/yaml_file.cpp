@@ -2,7 +2,6 @@
 #include "input/yaml_file.h"
 
 #include <bole/visp.h>
-#include <cstdint>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>

@@ -16,7 +16,6 @@
 
 #include <bole/vpMbTrunkTracker.h>
 
-#include <map>
 #include <optional>
 #include <string>
 

@@ -7,7 +7,6 @@
 #include "output/versions.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <visp3/core/vpException.h>

@@ -4,10 +4,8 @@
 #include "geometry/median.h"
 #include "output/atomic_file.h"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <iterator>
-#include <limits>
 
 namespace bole
 {

@@ -7,7 +7,6 @@
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>

@@ -2,8 +2,8 @@
 // Cost of a frame, and area under the ROC curve of "nearer than 6 m" on the rendered flights (as counters): flySaliency
 // for what may be known of the motion, ablateSaliency for the parts of the default, one taken away at a time.
 #include "support/forest_flight.h"
+#include "support/roc.h"
 
-#include "saliency/roc.h"
 #include "saliency/saliency.h"
 
 #include <benchmark/benchmark.h>
@@ -31,7 +31,7 @@ void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOpt
     return;
   }
   const support::ForestFlight flight = support::readForestFlight(name, 0, 110);
-  RocCurve roc, known_roc;
+  support::RocCurve roc, known_roc;
   double turn_error = 0, frames = 0;
   for (auto _ : state) {
     SaliencyEstimator estimator(flight.camera, options);
@@ -49,7 +49,7 @@ void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOpt
         const Eigen::Matrix3d truth = (flight.wMc_truth(i - 1).inverse() * flight.wMc_truth(i)).R;
         turn_error += logSo3(truth.transpose() * saliency.pRc).norm() * 180 / M_PI;
         ++frames;
-        const auto mask = texturedAboveHorizon(flight.images[i], flight.camera, flight.wMc_truth(i).R);
+        const auto mask = support::texturedAboveHorizon(flight.images[i], flight.camera, flight.wMc_truth(i).R);
         for (unsigned p = 0; p < mask.getSize(); ++p) {
           if (!mask.bitmap[p])
             continue;

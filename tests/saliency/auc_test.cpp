@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/forest_flight.h"
+#include "support/roc.h"
 
-#include "saliency/roc.h"
 #include "saliency/saliency.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
     GTEST_SKIP() << "the rendered flights are not here: " << BOLE_SHARED_DATA_DIR;
   const support::ForestFlight flight = support::readForestFlight("park-forward", 0, 110);
   SaliencyEstimator estimator(flight.camera);
-  RocCurve roc;
+  support::RocCurve roc;
   double worst_turn = 0;
   for (std::size_t i = 0; i < flight.size(); ++i) {
     const std::size_t before = i > 0 ? i - 1 : 0;
@@ -28,7 +28,7 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
       continue;
     const Eigen::Matrix3d pRc = (flight.wMc_truth(before).inverse() * flight.wMc_truth(i)).R;
     worst_turn = std::max(worst_turn, logSo3(pRc.transpose() * saliency.pRc).norm());
-    const auto mask = texturedAboveHorizon(flight.images[i], flight.camera, flight.wMc_truth(i).R);
+    const auto mask = support::texturedAboveHorizon(flight.images[i], flight.camera, flight.wMc_truth(i).R);
     for (unsigned p = 0; p < mask.getSize(); ++p)
       if (mask.bitmap[p])
         roc.add(1 - saliency.p_background.bitmap[p], flight.depths_m[i].bitmap[p] < 6);

@@ -3,7 +3,6 @@
 #include "output/figure.h"
 
 #include <fmt/format.h>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 namespace bole

@@ -6,7 +6,6 @@
 #include "lab/simulation/forest.h"
 #include <bole/pose.h>
 
-#include <string>
 #include <vector>
 
 namespace bole

@@ -5,8 +5,6 @@
 
 #include "geometry/so3.h"
 
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {

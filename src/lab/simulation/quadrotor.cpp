@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {

@@ -2,7 +2,6 @@
 #include "lab/simulation/ray_scene.h"
 
 #include <cstring>
-#include <limits>
 #include <visp3/core/vpException.h>
 
 namespace bole

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {

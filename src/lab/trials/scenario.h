@@ -5,7 +5,6 @@
 
 #include "lab/simulation/forest.h"
 
-#include <string>
 
 namespace bole
 {
