@@ -25,8 +25,8 @@ void printStatistics(const Graph &graph)
   fmt::print("summaries  {}", graph.observations.size());
   if (!views.empty())
     fmt::print(", {} to {} a trunk, median {}", views.front(), views.back(), views[views.size() / 2]);
-  fmt::print("\nodometry   {}\ndirections {}\nheights    {}\npriors     {}\n", graph.odometry.size(),
-             graph.relative_poses.size(), graph.heights.size(), graph.pose_priors.size());
+  fmt::print("\nodometry   {}\ndirections {}\npriors     {}\n", graph.odometry.size(), graph.relative_poses.size(),
+             graph.pose_priors.size());
   fmt::print("cost       {:.9g}\n", cost(graph));
 }
 } // namespace

@@ -40,13 +40,6 @@ struct RelativePoseMeasurement
 };
 constexpr double kMinBaseline = 1e-4; ///< [m]
 
-/// Height of the body over the world's z = 0, as a sonar gives it.
-struct Height
-{
-  double z = 0;     ///< [m]
-  double sigma = 1; ///< [m]
-};
-
 /// Independent normal priors on a trunk: with a weak one on x and y a trunk that nobody has seen
 /// twice is still well defined, and its covariance says how little is known of it.
 struct TrunkPrior

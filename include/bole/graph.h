@@ -50,12 +50,6 @@ struct Graph
     std::size_t b = 0;                   ///< indices into Graph::poses
     RelativePoseMeasurement measurement; ///< with its covariance
   };
-  /// A measured height.
-  struct HeightEdge
-  {
-    std::size_t pose = 0; ///< index into Graph::poses
-    Height height;        ///< over the world's z = 0
-  };
   /// One view of a trunk, as its summary factor.
   struct ObservationEdge
   {
@@ -72,7 +66,6 @@ struct Graph
   std::vector<PosePriorEdge> pose_priors;       ///< absolute measurements of poses
   std::vector<OdometryEdge> odometry;           ///< steps of the pose filter
   std::vector<RelativePoseEdge> relative_poses; ///< steps of the point features
-  std::vector<HeightEdge> heights;              ///< of poses
   std::vector<ObservationEdge> observations;    ///< views of trunks
 };
 
@@ -91,7 +84,7 @@ void validate(const Graph &graph);
 
 /// \p graph with every length multiplied by \p factor (> 0) about the origin of the world, as seen
 /// from the camera (the lever arm bMc keeps its length): what a flight of unknown scale becomes when
-/// its metre is found. Heights and the priors on radii stay: they are what knows the metre.
+/// its metre is found. The priors on radii stay: they are what knows the metre.
 ///
 /// Laws (each a test): no residual but theirs changes; scaled(scaled(g, f), 1 / f) is g.
 Graph scaled(const Graph &graph, double factor);
@@ -111,7 +104,6 @@ Graph scaled(const Graph &graph, double factor);
 ///   d log s) |
 /// | EDGE_DIRECTION | a b, quaternion of caRcb, direction (3), covariance (15), see
 ///   RelativePoseMeasurement |
-/// | EDGE_HEIGHT | pose, z, sigma |
 /// | PARAMS_SE3OFFSET | id, t (3), quaternion: bMc, the camera in the body |
 /// | LOSS | summary or direction, quadratic, huber or cauchy, width |
 ///

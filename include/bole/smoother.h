@@ -164,8 +164,6 @@ public:
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
   /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one is marginalised.
   void addOdometry(std::size_t a, std::size_t b, const Odometry &odometry);
-  /// A measured height of the body over the world's z = 0 [m].
-  void addHeight(std::size_t pose, double z, double sigma);
   /// An absolute measurement of a pose.
   void addPosePrior(std::size_t pose, const PosePrior &prior);
 

@@ -98,8 +98,6 @@ void Smoother::State::reopenTrunk(int trunk)
 int rowCount(FactorKind kind)
 {
   switch (kind) {
-  case FactorKind::height:
-    return 1;
   case FactorKind::observation:
   case FactorKind::image:
     return 4;

@@ -48,9 +48,6 @@ void Smoother::State::assemble(const Factor &factor)
   case FactorKind::pose_prior:
     addUnary<6, 6>(factor.linear, F, ld, position[factor.a]);
     break;
-  case FactorKind::height:
-    addUnary<1, 6>(factor.linear, F, ld, position[factor.a]);
-    break;
   case FactorKind::odometry:
     addBinary<6, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
     break;

@@ -39,9 +39,6 @@ Graph Smoother::State::graph() const
     case FactorKind::relative_pose:
       graph.relative_poses.push_back({a, b, relative_poses[factor.data].factor});
       break;
-    case FactorKind::height:
-      graph.heights.push_back({a, heights[factor.data]});
-      break;
     case FactorKind::observation:
       graph.observations.push_back({a, b, observations[factor.data].factor});
       break;
@@ -58,8 +55,7 @@ std::size_t Smoother::State::memoryBytes() const
   std::size_t bytes = store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
                       poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
                       observations.size() * sizeof(ObservationData) + odometry.size() * sizeof(OdometryData) +
-                      relative_poses.size() * sizeof(RelativePoseData) + pose_priors.size() * sizeof(PosePriorData) +
-                      heights.size() * sizeof(Height);
+                      relative_poses.size() * sizeof(RelativePoseData) + pose_priors.size() * sizeof(PosePriorData);
   for (const Variable &v : variables)
     bytes +=
         (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) +

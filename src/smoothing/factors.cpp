@@ -115,15 +115,6 @@ Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S,
   return S * e;
 }
 
-double residual(const Height &height, const Pose &wMb, Matrix16d *J)
-{
-  if (J) {
-    J->leftCols<3>() = wMb.R.row(2) / height.sigma;
-    J->rightCols<3>().setZero();
-  }
-  return (wMb.t.z() - height.z) / height.sigma;
-}
-
 Vector5d residual(const TrunkPrior &prior, const Trunk &trunk)
 {
   return trunk.minus(prior.mean).cwiseQuotient(prior.sigma);

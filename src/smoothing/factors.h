@@ -14,10 +14,7 @@
 
 namespace bole
 {
-using Matrix65d = Eigen::Matrix<double, 6, 5>;
 using Matrix56d = Eigen::Matrix<double, 5, 6>;
-using Vector1d = Eigen::Matrix<double, 1, 1>;
-using Matrix16d = Eigen::Matrix<double, 1, 6>;
 
 /// Square roots S of information matrices, S^T S = covariance^-1. Throws vpException(badValue)
 /// naming \p name when \p covariance is not finite, symmetric and positive definite.
@@ -30,7 +27,6 @@ Vector6d residual(const Odometry &odometry, const Matrix6d &S, const Pose &wMa, 
                   Matrix6d *J_b);
 Vector5d residual(const RelativePoseMeasurement &measurement, const Matrix5d &S, const Pose &bMc, const Pose &wMa,
                   const Pose &wMb, Matrix56d *J_a, Matrix56d *J_b);
-double residual(const Height &height, const Pose &wMb, Matrix16d *J);
 Vector5d residual(const TrunkPrior &prior, const Trunk &trunk);
 /// Zero residual and Jacobians where the camera stands in the axis: such a view says nothing
 /// usable.

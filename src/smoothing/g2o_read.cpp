@@ -153,8 +153,6 @@ private:
       readSummary();
     else if (tag == "EDGE_DIRECTION")
       readDirection();
-    else if (tag == "EDGE_HEIGHT")
-      readHeight();
     else if (tag == "PARAMS_SE3OFFSET")
       id(), m_graph.bMc = pose();
     else if (tag == "LOSS")
@@ -253,17 +251,6 @@ private:
       m_graph.relative_poses[i].a = find(m_pose_of, a, "pose");
       m_graph.relative_poses[i].b = find(m_pose_of, b, "pose");
     });
-  }
-  void readHeight()
-  {
-    Graph::HeightEdge edge;
-    const std::int64_t a = id();
-    edge.height.z = number();
-    edge.height.sigma = number();
-    if (!(edge.height.sigma > 0))
-      fail("EDGE_HEIGHT: sigma, must be above 0");
-    m_graph.heights.push_back(edge);
-    later([this, a, i = m_graph.heights.size() - 1] { m_graph.heights[i].pose = find(m_pose_of, a, "pose"); });
   }
   void readLoss()
   {

@@ -95,8 +95,6 @@ void writeG2o(std::ostream &out, const Graph &graph)
     putUpper<5>(out, edge.measurement.covariance);
     out << '\n';
   }
-  for (const Graph::HeightEdge &edge : graph.heights)
-    out << fmt::format("EDGE_HEIGHT {} {:.17g} {:.17g}\n", pose(edge.pose), edge.height.z, edge.height.sigma);
   for (const Graph::ObservationEdge &edge : graph.observations) {
     out << "EDGE_TRUNK_SUMMARY " << pose(edge.pose) << ' ' << graph.trunks[edge.trunk].id;
     put(out, edge.summary.optimum.cRt);

@@ -24,10 +24,6 @@ double cost(const Graph &graph)
     const Vector5d r = residual(edge.measurement, S, graph.bMc, pose(edge.a), pose(edge.b), nullptr, nullptr);
     sum += 0.5 * graph.direction_loss.rho(r.squaredNorm());
   }
-  for (const Graph::HeightEdge &edge : graph.heights) {
-    const double r = residual(edge.height, pose(edge.pose), nullptr);
-    sum += 0.5 * r * r;
-  }
   for (const Graph::ObservationEdge &edge : graph.observations) {
     SquareRootSummary root;
     const SummaryStatus status = squareRoot(edge.summary, root);
@@ -120,13 +116,6 @@ void validate(const Graph &graph)
     if (!edge.measurement.caRcb.allFinite() || !(std::abs(edge.measurement.direction.norm() - 1) < 1e-6))
       fail("relative pose", i, "must be finite with a direction of length 1");
     squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
-  }
-  for (std::size_t i = 0; i < graph.heights.size(); ++i) {
-    const Graph::HeightEdge &edge = graph.heights[i];
-    if (edge.pose >= n)
-      fail("height", i, "must name a pose");
-    if (!std::isfinite(edge.height.z) || !(edge.height.sigma > 0))
-      fail("height", i, "must be finite with a sigma above 0");
   }
   for (std::size_t i = 0; i < graph.observations.size(); ++i) {
     const Graph::ObservationEdge &edge = graph.observations[i];

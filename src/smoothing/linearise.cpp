@@ -67,12 +67,6 @@ void Smoother::State::linearise(Factor &factor)
     factor.cost = store2<5, 6, 6>(options.direction_loss, J_a, J_b, r, factor.linear);
     break;
   }
-  case FactorKind::height: {
-    Matrix16d J;
-    const Vector1d r(residual(heights[factor.data], pose(factor.a), &J));
-    factor.cost = store1<1, 6>(J, r, factor.linear);
-    break;
-  }
   case FactorKind::observation: {
     Matrix46d J_pose;
     Matrix45d J_trunk;
@@ -130,10 +124,6 @@ double Smoother::State::costAtEstimate(const Factor &factor) const
     const RelativePoseData &data = relative_poses[factor.data];
     const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), nullptr, nullptr);
     return 0.5 * options.direction_loss.rho(r.squaredNorm());
-  }
-  case FactorKind::height: {
-    const double r = residual(heights[factor.data], pose(factor.a), nullptr);
-    return 0.5 * r * r;
   }
   case FactorKind::observation: {
     const Vector4d r = residual(observations[factor.data].root, options.bMc, pose(factor.a),

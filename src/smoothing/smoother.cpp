@@ -40,8 +40,6 @@ Smoother::Smoother(const Graph &graph, const SmootherOptions &options) : Smoothe
     addOdometry(edge.a, edge.b, edge.odometry);
   for (const Graph::RelativePoseEdge &edge : graph.relative_poses)
     addRelativePose(edge.a, edge.b, edge.measurement);
-  for (const Graph::HeightEdge &edge : graph.heights)
-    addHeight(edge.pose, edge.height.z, edge.height.sigma);
   for (const Graph::ObservationEdge &edge : graph.observations)
     addObservation(edge.pose, edge.trunk, edge.summary);
 }
@@ -150,15 +148,6 @@ void Smoother::addOdometry(std::size_t a, std::size_t b, const Odometry &odometr
   m_state->checkPose(b);
   require(a != b, "odometry, must be between two poses");
   m_state->addOdometryFactor(static_cast<int>(a), static_cast<int>(b), odometry);
-}
-
-void Smoother::addHeight(std::size_t pose, double z, double sigma)
-{
-  m_state->checkPose(pose);
-  require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
-  require(std::isfinite(z) && std::isfinite(sigma) && sigma > 0, "height, must be finite with a sigma above 0");
-  const int data = m_state->placeData(m_state->heights, FactorKind::height, {z, sigma});
-  m_state->newFactor(FactorKind::height, data, m_state->poses[pose].variable, -1);
 }
 
 void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)

@@ -73,7 +73,6 @@ enum class FactorKind : unsigned char
   pose_prior,
   odometry,
   relative_pose,
-  height,
   observation,
   marginal,
   image
@@ -161,7 +160,6 @@ public:
   std::deque<PosePriorData> pose_priors;
   std::deque<OdometryData> odometry;
   std::deque<RelativePoseData> relative_poses;
-  std::deque<Height> heights;
   std::deque<ObservationData> observations;
   std::deque<MarginalData> marginals;
   std::deque<ImageData> images;

@@ -69,20 +69,13 @@ TEST(Factors, ARelativePoseEqualToThePredictionHasNoResidual)
   EXPECT_LT(residual(m, Matrix5d::Identity(), kMc, kA, kB, nullptr, nullptr).norm(), 1e-9);
 }
 
-TEST(Factors, PosePriorAndHeightJacobiansAgreeWithDifferences)
+TEST(Factors, PosePriorJacobianAgreesWithDifferences)
 {
   const PosePrior prior = {kA, Matrix6d::Identity()};
   const Matrix6d S = Matrix6d::Identity();
   Matrix6d J;
   residual(prior, S, kB, &J);
   expectDerivative([&](const VectorXd &d) { return residual(prior, S, kB.plus(d), nullptr); }, J);
-  Matrix16d J_height;
-  residual(Height{1, 0.1}, kB, &J_height);
-  expectDerivative(
-      [&](const VectorXd &d) {
-        return VectorXd::Constant(1, residual(Height{1, 0.1}, kB.plus(d), nullptr));
-      },
-      J_height);
 }
 
 TEST(Factors, SummaryJacobiansAgreeWithDifferences)

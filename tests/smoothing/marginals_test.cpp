@@ -156,7 +156,6 @@ TEST_F(OneTrunk, RefusesWhatTheCallerGotWrong)
   indefinite(0, 0) = -1;
   EXPECT_THROW(smoother.addPose(Pose(), indefinite), vpException);
   EXPECT_EQ(smoother.poseCount(), 1u);
-  EXPECT_THROW(smoother.addHeight(9, 1, 1), vpException);
   EXPECT_THROW(smoother.addFirstPose(Pose(), Matrix6d::Identity()), vpException);
   SmootherOptions wrong;
   wrong.fixed_lag = 1;

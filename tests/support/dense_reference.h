@@ -100,11 +100,6 @@ private:
       const Vector5d r = residual(e.measurement, S, m_graph.bMc, pose(e.a), pose(e.b), &J_a, &J_b);
       add2<5, 6, 6>(m_graph.direction_loss.weight(r.squaredNorm()), poseRow(e.a), poseRow(e.b), J_a, J_b, r);
     }
-    for (const auto &e : m_graph.heights) {
-      Matrix16d J;
-      const Vector1d r(residual(e.height, pose(e.pose), &J));
-      add1<1, 6>(poseRow(e.pose), J, r);
-    }
     for (const auto &e : m_graph.observations) {
       SquareRootSummary root;
       squareRoot(e.summary, root);
