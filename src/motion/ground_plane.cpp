@@ -36,30 +36,35 @@ double weightedMean(const std::vector<Height> &heights, double centre, double ga
 } // namespace
 
 GroundHeight heightOverGround(const std::vector<PointDepth> &points, const PinholeCamera &camera,
-                              const Eigen::Vector3d &up, const GroundOptions &options)
+                              const Eigen::Vector3d &up)
 {
+  constexpr double kMinDepression = 8 * kDegree; // below the horizon: nearer to it heights are noise
+  constexpr double kUpSigma = 1 * kDegree;       // of the direction of up
+  constexpr double kMaxRelativeSigma = 0.15;     // of a point's depth
+  constexpr double kRoughness = 0.06;            // of the ground, in heights of the camera: bumps
+  constexpr int kMinPoints = 8;
   GroundHeight ground;
   std::vector<Height> heights;
-  const double sine = std::sin(options.min_depression_deg * kDegree);
+  const double sine = std::sin(kMinDepression);
   for (const PointDepth &point : points) {
     const Eigen::Vector3d ray = camera.ray(point.pixel);
     const double below = -up.dot(ray);
     if (below < sine * ray.norm() || point.inverse_depth <= 0 ||
-        point.sigma > options.max_relative_sigma * point.inverse_depth) {
+        point.sigma > kMaxRelativeSigma * point.inverse_depth) {
       continue;
     }
     const double h = below / point.inverse_depth;
     const double relative = point.sigma / point.inverse_depth;
-    const double tilt = options.up_sigma_deg * kDegree * ray.norm() / below; // moves the horizon
+    const double tilt = kUpSigma * ray.norm() / below; // moves the horizon
     heights.push_back({h, h * h * (relative * relative + tilt * tilt)});
   }
-  if (heights.size() < static_cast<std::size_t>(options.min_points)) {
+  if (heights.size() < static_cast<std::size_t>(kMinPoints)) {
     return ground;
   }
   // Bushes and trunks stand above the ground at all heights: the height with the most support wins.
   double best_support = 0, centre = 0;
   for (const Height &candidate : heights) {
-    const double roughness = options.roughness * candidate.value;
+    const double roughness = kRoughness * candidate.value;
     double support = 0;
     for (const Height &h : heights) {
       const double u2 =
@@ -73,10 +78,10 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
   }
   double variance = 0;
   for (int round = 0; round < 4; ++round) {
-    const double roughness = options.roughness * centre;
+    const double roughness = kRoughness * centre;
     centre = weightedMean(heights, centre, 2, roughness * roughness, variance, ground.points);
   }
-  ground.known = ground.points >= options.min_points;
+  ground.known = ground.points >= kMinPoints;
   ground.height = centre;
   // Neighbouring points share a bump: four of them count as one.
   ground.sigma = 2 * std::sqrt(variance);

@@ -15,15 +15,6 @@
 
 namespace bole
 {
-struct GroundOptions
-{
-  double min_depression_deg = 8;    ///< below the horizon, 1 .. 80: nearer to it heights are noise
-  double up_sigma_deg = 1;          ///< of the direction of up, > 0
-  double max_relative_sigma = 0.15; ///< of a point's depth, > 0
-  double roughness = 0.06;          ///< of the ground, in heights of the camera, > 0: bumps
-  int min_points = 8;               ///< >= 4
-};
-
 struct GroundHeight
 {
   bool known = false;
@@ -34,7 +25,7 @@ struct GroundHeight
 
 /// \param up unit vector in the camera frame of the points.
 GroundHeight heightOverGround(const std::vector<PointDepth> &points, const PinholeCamera &camera,
-                              const Eigen::Vector3d &up, const GroundOptions &options = {});
+                              const Eigen::Vector3d &up);
 
 /// Metres a unit from heights in units and in metres, over a flight: a robust mean of the logs.
 class ScaleFromHeight

@@ -15,23 +15,27 @@ namespace bole
 namespace
 {
 constexpr double kPriorSigma = 20 * kDegree;
+constexpr int kLeastEdges = 12; ///< patches
 constexpr double kChance = 0.2; ///< share of edges at random that agree with the best direction
 
 /// One straight edge a patch, where there is one: its centre and gradient direction from the
 /// moments of the gradients.
-std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, const Eigen::Vector3d &up,
-                                    const VerticalOptions &options)
+std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &camera, const Eigen::Vector3d &up)
 {
+  constexpr double kMaxTilt = 30 * kDegree; // of an edge from the expected vertical in the image
+  constexpr double kMinGradient = 0.03;     // per pixel, grey 0 .. 1
+  constexpr int kCell = 12;                 // side of the patches that vote [px]
+  constexpr double kMinCoherence = 0.6;     // of the gradients of a patch: 1 is one straight edge
   cv::Mat gx, gy;
   cv::Sobel(grey, gx, CV_32F, 1, 0, 3, 1.0 / 8 / 255);
   cv::Sobel(grey, gy, CV_32F, 0, 1, 3, 1.0 / 8 / 255);
   std::vector<VerticalEdge> edges;
-  for (int y0 = 2; y0 + options.cell_px < grey.rows - 2; y0 += options.cell_px) {
-    for (int x0 = 2; x0 + options.cell_px < grey.cols - 2; x0 += options.cell_px) {
+  for (int y0 = 2; y0 + kCell < grey.rows - 2; y0 += kCell) {
+    for (int x0 = 2; x0 + kCell < grey.cols - 2; x0 += kCell) {
       double xx = 0, xy = 0, yy = 0, mx = 0, my = 0;
-      for (int y = y0; y < y0 + options.cell_px; ++y) {
+      for (int y = y0; y < y0 + kCell; ++y) {
         const float *row_x = gx.ptr<float>(y), *row_y = gy.ptr<float>(y);
-        for (int x = x0; x < x0 + options.cell_px; ++x) {
+        for (int x = x0; x < x0 + kCell; ++x) {
           const double a = row_x[x], b = row_y[x], w = a * a + b * b;
           xx += a * a;
           xy += a * b;
@@ -42,8 +46,7 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
       }
       const double energy = xx + yy;
       const double coherence = std::hypot(xx - yy, 2 * xy) / std::max(1e-12, energy);
-      if (energy < options.cell_px * options.cell_px * options.min_gradient * options.min_gradient * 0.5 ||
-          coherence < options.min_coherence) {
+      if (energy < kCell * kCell * kMinGradient * kMinGradient * 0.5 || coherence < kMinCoherence) {
         continue;
       }
       const Eigen::Vector2d centre(mx / energy, my / energy);
@@ -53,7 +56,7 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
       const Eigen::Vector3d ray = camera.ray(centre);
       const Eigen::Vector2d zenith =
           Eigen::Vector2d(camera.fx * (up.x() - ray.x() * up.z()), camera.fy * (up.y() - ray.y() * up.z()));
-      if (std::abs(along.dot(zenith)) < std::cos(options.max_tilt_deg * kDegree) * zenith.norm()) {
+      if (std::abs(along.dot(zenith)) < std::cos(kMaxTilt) * zenith.norm()) {
         continue;
       }
       const Eigen::Vector3d far = camera.ray(centre + 20 * along);
@@ -64,17 +67,16 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
 }
 
 /// \p frames: that the edges come from; they share the lean of their trunks.
-VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vector3d &expected, int frames,
-                       const VerticalOptions &options)
+VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vector3d &expected, int frames)
 {
+  constexpr double kSigma = 1.5 * kDegree; // of the direction of a patch's edge: trunks lean, bark is rough
+  constexpr double kShared = 4;            // inflates the covariance: patches of one trunk share its lean
   VerticalEstimate estimate;
   estimate.up = expected;
   estimate.covariance = kPriorSigma * kPriorSigma * Eigen::Matrix2d::Identity();
-  if (edges.size() < static_cast<std::size_t>(options.min_edges)) {
+  if (edges.size() < static_cast<std::size_t>(kLeastEdges))
     return estimate;
-  }
-  const double inflation = options.inflation * frames;
-  const double sigma = options.sigma_deg * kDegree;
+  const double inflation = kShared * frames;
   constexpr double kPrior = 1 / (kPriorSigma * kPriorSigma);
   double best = 1e300;
   for (const double roll : {0.0, -0.25, 0.25, -0.12, 0.12}) {
@@ -86,9 +88,9 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
       H = kPrior * Eigen::Matrix2d::Identity();
       Eigen::Vector2d g = -kPrior * directionMinus(expected, up);
       for (const VerticalEdge &edge : edges) {
-        const double e = edge.off(up) / (sigma * width);
+        const double e = edge.off(up) / (kSigma * width);
         const Eigen::Vector2d J = B.transpose() * edge.normal / edge.across(up);
-        const double w = motion::weightOf(e, 1.5) / (sigma * sigma) / inflation;
+        const double w = motion::weightOf(e, 1.5) / (kSigma * kSigma) / inflation;
         H += w * J * J.transpose();
         g += w * J * edge.off(up);
       }
@@ -97,7 +99,7 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
     double cost = 0.5 * kPrior * directionMinus(expected, up).squaredNorm();
     int agreeing = 0;
     for (const VerticalEdge &edge : edges) {
-      const double e = edge.off(up) / sigma;
+      const double e = edge.off(up) / kSigma;
       cost += motion::costOf(e, 1.5) / inflation;
       agreeing += std::abs(e) < 2;
     }
@@ -110,28 +112,20 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
   }
   // edges at random agree too: those of a painted wall would put up anywhere
   const double beyond_chance = estimate.edges - kChance * static_cast<double>(edges.size());
-  if (estimate.edges >= options.min_edges && beyond_chance > 0.5 * estimate.edges)
+  if (estimate.edges >= kLeastEdges && beyond_chance > 0.5 * estimate.edges)
     estimate.status = VerticalStatus::ok;
   return estimate;
 }
 } // namespace
-
-VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                                      const std::optional<Eigen::Vector3d> &expected_up, const VerticalOptions &options)
-{
-  const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
-  return fitUp(findEdges(viewOf(image), camera, expected, options), expected, 1, options);
-}
 
 VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const PinholeCamera &camera,
                                       const Eigen::Matrix3d &wRc, const std::optional<Eigen::Vector3d> &expected_up)
 {
   constexpr std::size_t kMostFrames = 12; // beyond it the path may have turned otherwise than it says
   constexpr std::size_t kEnough = 3;      // times the least number: a trunk is in several of the frames
-  const VerticalOptions options;
-  const auto least = static_cast<std::size_t>(options.min_edges);
+  const auto least = static_cast<std::size_t>(kLeastEdges);
   const Eigen::Vector3d expected = expected_up ? expected_up->normalized() : Eigen::Vector3d(0, -1, 0);
-  std::vector<VerticalEdge> edges = findEdges(viewOf(image), camera, expected, options), in_w;
+  std::vector<VerticalEdge> edges = findEdges(viewOf(image), camera, expected), in_w;
   for (const VerticalEdge &edge : edges)
     in_w.push_back({wRc * edge.normal, wRc * edge.ray});
   int frames = 1;
@@ -143,7 +137,7 @@ VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const
   m_earlier.push_front(std::move(in_w));
   if (m_earlier.size() > kMostFrames)
     m_earlier.pop_back();
-  return fitUp(edges, expected, frames, options);
+  return fitUp(edges, expected, frames);
 }
 
 void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate)

@@ -29,17 +29,6 @@
 
 namespace bole
 {
-struct VerticalOptions
-{
-  double max_tilt_deg = 30;   ///< of an edge from the expected vertical in the image, 1 .. 60
-  double min_gradient = 0.03; ///< per pixel, grey 0 .. 1, > 0
-  int cell_px = 12;           ///< side of the patches that vote, 4 .. 64
-  double min_coherence = 0.6; ///< of the gradients of a patch, 0 .. 1: 1 is one straight edge
-  double sigma_deg = 1.5;     ///< of the direction of a patch's edge (trunks lean, bark is rough), > 0
-  int min_edges = 12;         ///< patches, >= 3
-  double inflation = 4;       ///< of the covariance, >= 1: patches of one trunk share its lean
-};
-
 enum class VerticalStatus
 {
   ok,
@@ -67,17 +56,12 @@ struct VerticalEdge
   double across(const Eigen::Vector3d &up) const { return std::max(0.05, ray.cross(up).norm()); }
 };
 
-/// \param expected_up where up was last, or nullopt: the image is then taken to be upright within
-/// max_tilt_deg and the pitch near zero (prior of 20 degrees).
-VerticalEstimate gravityFromVerticals(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                                      const std::optional<Eigen::Vector3d> &expected_up = std::nullopt,
-                                      const VerticalOptions &options = {});
-
-/// Up from the edges of an image and, where these are fewer than VerticalOptions::min_edges, of images shortly before.
+/// Up from the edges of an image and, where these are too few, of images shortly before.
 class VerticalFinder
 {
 public:
-  /// \p wRc: rotation of the camera of \p image on its path; the rest as gravityFromVerticals().
+  /// \p wRc: rotation of the camera of \p image on its path. \p expected_up: where up was last, in the camera;
+  /// without it the image is taken to be upright within 30 degrees and the pitch near zero (prior of 20 degrees).
   VerticalEstimate find(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
                         const std::optional<Eigen::Vector3d> &expected_up);
 

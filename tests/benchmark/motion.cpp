@@ -151,7 +151,7 @@ void comparePaths(const Flight &flight)
     const double t1 = threadTime();
     const auto placed = odometry.process(tracker, frame.stamp_ns);
     const double t2 = threadTime();
-    vertical.add(placed.wMc.R, gravityFromVerticals(frame.image, flight.camera));
+    vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, flight.camera, placed.wMc.R, std::nullopt));
     const double t3 = threadTime();
     track_ms += t1 - t0;
     place_ms += t2 - t1;
@@ -196,7 +196,7 @@ void plainVideo(const std::string &path)
     }
     tracker.track(frame.image);
     const auto placed = odometry.process(tracker, frame.stamp_ns);
-    vertical.add(placed.wMc.R, gravityFromVerticals(frame.image, source->camera()));
+    vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, source->camera(), placed.wMc.R, std::nullopt));
     ++statuses[toString(placed.status)];
     fmt::print("{:6.2f} s {:13} {:3} points, sigma {:.2f} px, at {:7.3f} {:7.3f} {:7.3f}, turned "
                "{:6.2f} deg\n",

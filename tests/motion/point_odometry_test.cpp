@@ -157,12 +157,19 @@ vpImage<unsigned char> drawTrunks(const PinholeCamera &camera, const Eigen::Vect
   return image;
 }
 
+/// Up from one image alone.
+VerticalEstimate upIn(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                      const std::optional<Eigen::Vector3d> &expected = std::nullopt)
+{
+  return VerticalFinder().find(image, camera, Eigen::Matrix3d::Identity(), expected);
+}
+
 TEST(Vertical, TrunksPointToTheZenith)
 {
   for (const Eigen::Vector3d &tilt :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.1, 0, -0.12), Eigen::Vector3d(-0.15, 0, 0.2)}) {
     const Eigen::Vector3d up = expSo3(tilt) * Eigen::Vector3d(0, -1, 0);
-    const auto estimate = gravityFromVerticals(drawTrunks(kCamera, up), kCamera);
+    const auto estimate = upIn(drawTrunks(kCamera, up), kCamera);
     EXPECT_EQ(estimate.status, VerticalStatus::ok);
     EXPECT_LT(directionMinus(up, estimate.up).norm(), 0.02) << tilt.transpose();
   }
@@ -183,7 +190,7 @@ TEST(Vertical, SmallPicturesTellTogetherWhatEachCannot)
   for (int k = 0; k < 8; ++k) {
     wRc = expSo3({0, 0.03 * k, 0.02 * k});
     const auto image = drawTrunks(small, wRc.transpose() * w_up);
-    EXPECT_EQ(gravityFromVerticals(image, small).status, VerticalStatus::too_few_edges);
+    EXPECT_EQ(upIn(image, small).status, VerticalStatus::too_few_edges);
     together = finder.find(image, small, wRc, std::nullopt);
   }
   EXPECT_EQ(together.status, VerticalStatus::ok);
@@ -196,7 +203,7 @@ TEST(Vertical, ANarrowFieldOfViewDoesNotTakeTheOpticalAxisForTheZenith)
   PinholeCamera narrow = kCamera;
   narrow.fx = narrow.fy = 1300;
   const Eigen::Vector3d up = expSo3({0.05, 0, -0.06}) * Eigen::Vector3d(0, -1, 0);
-  const auto estimate = gravityFromVerticals(drawTrunks(narrow, up), narrow);
+  const auto estimate = upIn(drawTrunks(narrow, up), narrow);
   EXPECT_LT(std::abs(std::atan2(estimate.up.x(), -estimate.up.y()) - std::atan2(up.x(), -up.y())), 0.02); // roll
   EXPECT_LT(std::abs(estimate.up.z()), 0.3);
 }
@@ -214,13 +221,13 @@ TEST(Vertical, EdgesAtRandomTellNothing)
   }
   vpImage<unsigned char> image(240, 320);
   std::copy(grey.datastart, grey.dataend, image.bitmap);
-  EXPECT_EQ(gravityFromVerticals(image, kCamera).status, VerticalStatus::too_few_edges);
+  EXPECT_EQ(upIn(image, kCamera).status, VerticalStatus::too_few_edges);
 }
 
 TEST(Vertical, AnImageWithoutEdgesKeepsWhatWasExpected)
 {
   const Eigen::Vector3d expected = Eigen::Vector3d(0.1, -1, 0.1).normalized();
-  const auto estimate = gravityFromVerticals(vpImage<unsigned char>(240, 320, 99), kCamera, expected);
+  const auto estimate = upIn(vpImage<unsigned char>(240, 320, 99), kCamera, expected);
   EXPECT_EQ(estimate.status, VerticalStatus::too_few_edges);
   EXPECT_LT((estimate.up - expected).norm(), 1e-12);
   EXPECT_GT(estimate.covariance(0, 0), 0.1);
