@@ -1,44 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "map/trunk_map.h"
 
-#include "geometry/require_range.h"
-
 #include <algorithm>
 #include <cmath>
 
 namespace bole
 {
-void MapOptions::validate() const
-{
-  requireRange("map.confirm_observations", confirm_observations, 2, 1000);
-  requireRange("map.confirm_predicted", confirm_predicted, 0, 1000);
-  requireRange("map.confirm_parallax", confirm_parallax, 0, 1);
-  requireRange("map.confirm_position_sigma", confirm_position_sigma, 0.01, 10);
-  requireRange("map.confirm_evidence", confirm_evidence, -20, 20);
-  requireRange("map.turning_evenness", turning_evenness, 0, 1);
-  requireRange("map.turning_contrast", turning_contrast, 0, 0.5);
-  requireRange("map.final_odds", final_odds, -20, 20);
-  requireRange("map.doubt_observations", doubt_observations, 3, 1000);
-  requireRange("map.doubt_candidate", doubt_candidate, -50, 0);
-  requireRange("map.doubt_confirmed", doubt_confirmed, -50, 0);
-  requireRange("map.doubt_rival", doubt_rival, 0, 50);
-  requireRange("map.near_range", near_range, 0, 100);
-  requireRange("map.through_range", through_range, 0, 100);
-  requireRange("map.innovation_unit_px", innovation_unit_px, 0.1, 20);
-  requireRange("map.usual_radius", usual_radius, 0.001, 10);
-  requireRange("map.lost_misses", lost_misses, 1, 1000);
-  requireRange("map.candidate_memory_s", candidate_memory_s, 0.1, 1e6);
-  requireRange("map.merge_distance", merge_distance, 0, 5);
-  requireRange("map.radius_min", radius_min, 0.001, 10);
-  requireRange("map.radius_max", radius_max, radius_min, 10);
-}
-
 TrunkMap::TrunkMap(const MapOptions &options) : TrunkMap(options, {}) {}
 
 TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
     : m_options(options), m_trunks(std::move(trunks))
 {
-  m_options.validate();
   for (std::size_t i = 0; i < m_trunks.size(); ++i)
     if (!m_trunks[i].removed && !m_trunks[i].inactive)
       m_active.push_back(i);

@@ -51,8 +51,6 @@ struct MapOptions
   double merge_distance = 0.30;    ///< two trunks with less than this between their bark are one [m], 0 to 5
   double radius_min = 0.05;        ///< thinner is no trunk [m]
   double radius_max = 0.60;        ///< thicker is no trunk [m]
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// Extremes of a bearing in the world.

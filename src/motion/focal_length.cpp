@@ -89,10 +89,8 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &cost
 
 FocalFinder::FocalFinder(const PinholeCamera &guess) : m_guess(guess)
 {
-  PointOdometryOptions options;
-  options.focal_known = false;
   for (int k = 0; k < kSteps; ++k)
-    m_odometry.emplace_back(withFocal(guess, std::exp(logFactor(k))), options);
+    m_odometry.emplace_back(withFocal(guess, std::exp(logFactor(k))), false);
 }
 
 void FocalFinder::add(const PointTracker &tracker, std::int64_t stamp_ns)

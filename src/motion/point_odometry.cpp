@@ -56,12 +56,23 @@ constexpr double kHeldSigma = 1.0; // of a translation that was not seen, in uni
 // points nearer and the unit of length drifted by 40 % over pine-arc, at ten times by 2 %.
 constexpr double kDepthPrior = 10;
 constexpr double kRestSigma = 1e-2;
+constexpr std::size_t kKeyFrames = 8;           // of the window
+constexpr int kHeldKeyFrames = 3;               // oldest of them, not moved any more
+constexpr double kKeyParallax = 1.2 * kDegree;  // median flow without rotation that makes a new key frame
+constexpr double kKeyShared = 0.5;              // share of the last one's tracks below which a new one is made
+constexpr double kStartParallax = 1 * kDegree;  // of the first baseline
+constexpr double kStartDirection = 3 * kDegree; // standard deviation of its direction, at most
+constexpr int kPlacingPoints = 12;              // of known depth that place a frame, at least
+constexpr int kPlacingIterations = 6;           // of the bundle adjustment a frame
+constexpr double kLeastNoise_px = 0.1;          // floor of the observation noise
+constexpr double kPlacingInflation = 3;         // as RelativePoseOptions::inflation
 } // namespace
 
 struct PointOdometry::State
 {
   PinholeCamera camera;
-  PointOdometryOptions options;
+  bool is_focal_known = true;
+  RelativePoseOptions relative_pose; ///< of the start
   std::deque<KeyFrame> window;
   std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
   std::unordered_map<std::uint64_t, Landmark> landmarks;
@@ -92,10 +103,10 @@ struct PointOdometry::State
 
 const char *toString(PointOdometryStatus status) { return nameOf(status, {"starting", "ok", "rotation_only", "lost"}); }
 
-PointOdometry::PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options) : m_state(new State)
+PointOdometry::PointOdometry(const PinholeCamera &camera, bool is_focal_known) : m_state(new State)
 {
   m_state->camera = camera;
-  m_state->options = options;
+  m_state->is_focal_known = is_focal_known;
 }
 PointOdometry::~PointOdometry() = default;
 PointOdometry::PointOdometry(PointOdometry &&) noexcept = default;
@@ -165,14 +176,14 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     prior.aRb = turned->R;
     prior.rotation_covariance = turned->covariance();
   }
-  const auto estimate = estimateRelativePose(matches, camera, prior, options.relative_pose);
-  const double wanted_px = options.start_parallax_deg * kDegree * focal();
+  const auto estimate = estimateRelativePose(matches, camera, prior, relative_pose);
+  const double wanted_px = kStartParallax * focal();
   const bool translates =
-      options.focal_known || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
+      is_focal_known || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
   if (!translates && matches.size() >= 6) {
     // What looks like a flight past a wall is taken for a pan.
     wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
-                                                       options.min_sigma_px / focal(), options.relative_pose)
+                                                       kLeastNoise_px / focal(), relative_pose)
                                        .aRb;
   }
   else if (estimate.hasRotation()) {
@@ -184,8 +195,8 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   result.covariance.bottomRightCorner<3, 3>() = estimate.covariance.topLeftCorner<3, 3>();
   result.sigma_px = estimate.sigma_px;
   const double direction_sigma = std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
-  if (translates && estimate.hasDirection() && direction_sigma < options.start_sigma_deg * kDegree &&
-      estimate.parallax_px > wanted_px && start(tracker, estimate, back)) {
+  if (translates && estimate.hasDirection() && direction_sigma < kStartDirection && estimate.parallax_px > wanted_px &&
+      start(tracker, estimate, back)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
     result.key_frame = true;
@@ -205,7 +216,7 @@ void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return;
   const Eigen::Matrix3d turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}),
-                                                   options.min_sigma_px / focal(), options.relative_pose)
+                                                   kLeastNoise_px / focal(), relative_pose)
                                    .aRb;
   if (logSo3(velocity.R.transpose() * turn).norm() > kSurprise)
     velocity.R = turn;
@@ -222,7 +233,7 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
     other.fy *= factor;
     const double pixel = 1 / (factor * focal());
     const auto fit =
-        motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel, options.relative_pose);
+        motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel, relative_pose);
     least = std::min(least, fit.sigma / pixel);
   }
   return least;
@@ -259,7 +270,7 @@ bool PointOdometry::State::start(const PointTracker &tracker, const RelativePose
   BundleOptions bundle;
   bundle.iterations = 20;
   bundle.sigma = std::max(sigma, 1.5 * first.sigma_px / focal());
-  bundle.min_sigma = options.min_sigma_px / focal();
+  bundle.min_sigma = kLeastNoise_px / focal();
   bundle.first_baseline = 1;
   const BundleResult solved = motion::solveBundle(frames, points, bundle);
   if (!solved.solved) {
@@ -308,7 +319,7 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vecto
                                     std::vector<std::uint64_t> &ids) const
 {
   std::map<std::size_t, int> index;
-  const int held = window.size() <= 3 ? 1 : std::min<int>(options.held_key_frames, int(window.size()) - 2);
+  const int held = window.size() <= 3 ? 1 : std::min<int>(kHeldKeyFrames, int(window.size()) - 2);
   for (const KeyFrame &key : window) {
     BundleFrame frame;
     frame.wMc = key.wMc;
@@ -395,7 +406,7 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     common += seen.count(id) > 0;
   }
   result.points = known();
-  if (common < options.min_points) {
+  if (common < kPlacingPoints) {
     // Nothing to hold on to: the map ends here and a new one begins, its unit the old one by the
     // held velocity.
     result.status = PointOdometryStatus::lost;
@@ -409,9 +420,9 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
   std::vector<std::uint64_t> ids;
   assemble(frames, points, ids);
   BundleOptions bundle;
-  bundle.iterations = options.iterations;
+  bundle.iterations = kPlacingIterations;
   bundle.sigma = sigma;
-  bundle.min_sigma = options.min_sigma_px / focal();
+  bundle.min_sigma = kLeastNoise_px / focal();
   if (window.size() <= 3) {
     bundle.first_baseline = (window[1].wMc.t - window[0].wMc.t).norm();
   }
@@ -421,8 +432,8 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     sigma = 0.9 * sigma + 0.1 * solved.sigma;
     disassemble(frames, points, ids);
     result.points = known();
-    result.status = result.points >= options.min_points ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
-    result.covariance = options.inflation * solved.last_covariance;
+    result.status = result.points >= kPlacingPoints ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
+    result.covariance = kPlacingInflation * solved.last_covariance;
     if (result.status == PointOdometryStatus::rotation_only) {
       result.covariance.topLeftCorner<3, 3>() += kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
     }
@@ -449,8 +460,7 @@ bool PointOdometry::State::wantsKeyFrame() const
       flow.push_back((xy - turned_ray.head<2>() / std::max(0.1, turned_ray.z())).norm());
     }
   }
-  return double(flow.size()) < options.key_shared * double(key.seen.size()) ||
-         medianOf(flow) > options.key_parallax_deg * kDegree;
+  return double(flow.size()) < kKeyShared * double(key.seen.size()) || medianOf(flow) > kKeyParallax;
 }
 
 void PointOdometry::State::addKeyFrame()
@@ -459,7 +469,7 @@ void PointOdometry::State::addKeyFrame()
   window.push_back({now, wMc, seen, turned});
   key_poses[now] = wMc;
   turned.reset();
-  if (static_cast<int>(window.size()) > options.key_frames) {
+  if (window.size() > kKeyFrames) {
     dropOldest();
   }
   addLandmarks();

@@ -27,25 +27,6 @@
 
 namespace bole
 {
-struct PointOdometryOptions
-{
-  int key_frames = 8;            ///< of the window, 3 .. 30
-  int held_key_frames = 3;       ///< oldest of them, not moved any more, 2 .. key_frames - 1
-  double key_parallax_deg = 1.2; ///< median flow without rotation that makes a new key frame, > 0
-  double key_shared = 0.5;       ///< share of the tracks of the last key frame below which a new one is made, 0 .. 1
-  double start_parallax_deg = 1; ///< of the first baseline, > 0
-  double start_sigma_deg = 3;    ///< the first baseline's direction must be known as well as this, > 0
-  /// False where the focal length is a guess: a pan past a wall then looks like a sideways flight,
-  /// so a start also needs flow that no rotation explains under any focal length from 0.7 to 3
-  /// times the guess.
-  bool focal_known = true;
-  int min_points = 12;               ///< seen with a known depth, to place a frame; >= 6
-  int iterations = 6;                ///< of the bundle adjustment a frame, 1 .. 100
-  double min_sigma_px = 0.1;         ///< floor of the observation noise, > 0
-  double inflation = 3;              ///< as RelativePoseOptions::inflation, >= 1
-  RelativePoseOptions relative_pose; ///< of the start
-};
-
 enum class PointOdometryStatus
 {
   starting, ///< no baseline yet: rotation only, no unit of length
@@ -87,7 +68,9 @@ struct PlacedFrame
 class PointOdometry
 {
 public:
-  explicit PointOdometry(const PinholeCamera &camera, const PointOdometryOptions &options = {});
+  /// \p is_focal_known: false where the focal length is a guess. A pan past a wall then looks like a sideways flight,
+  /// so a start also needs flow that no rotation explains under any focal length from 0.7 to 3 times the guess.
+  explicit PointOdometry(const PinholeCamera &camera, bool is_focal_known = true);
   ~PointOdometry();
   PointOdometry(PointOdometry &&) noexcept;
   PointOdometry &operator=(PointOdometry &&) noexcept;

@@ -31,7 +31,6 @@ private:
 
 StageOptions withCamera(StageOptions options, const Pose &bMc)
 {
-  options.validate();
   options.smoothing.bMc = bMc;
   return options;
 }

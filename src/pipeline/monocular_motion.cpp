@@ -2,7 +2,6 @@
 #include "pipeline/monocular_motion.h"
 
 #include "geometry/median.h"
-#include "geometry/require_range.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
@@ -14,28 +13,18 @@ namespace bole
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-void VisualOdometryOptions::validate() const
-{
-  requireRange("visual.camera_height", camera_height, 0, 100);
-  requireRange("visual.camera_height_sigma", camera_height_sigma, 1e-3, 1);
-  requireRange("visual.start_height", start_height, 0.1, 100);
-  requireRange("visual.start_depth", start_depth, 0.5, 1000);
-  requireRange("visual.start_sigma", start_sigma, 0.05, 5);
-  requireRange("visual.step_sigma", step_sigma, 1e-5, 1);
-  requireRange("visual.step_scale_sigma", step_scale_sigma, 0, 1);
-  requireRange("visual.turn_sigma", turn_sigma, 1e-6, 1);
-  requireRange("visual.still_sigma", still_sigma, 1e-4, 10);
-  requireRange("visual.max_iterations", max_iterations, 1, 100);
-}
-
 namespace
 {
-PointOdometryOptions withFocal(bool is_known)
-{
-  PointOdometryOptions options;
-  options.focal_known = is_known;
-  return options;
-}
+constexpr double kCameraHeightSigma = 0.1; ///< of a height that is known, in proportion
+constexpr double kStartHeight = 1.5;       ///< taken for the camera's until the trunks say better [m]
+constexpr double kStartDepth = 8;          ///< median depth of the points where no ground is seen at the start [m]
+constexpr double kStartSigma = 0.5;        ///< of the log of the scale that these two give
+constexpr double kStepSigma = 0.004;       ///< least noise of a step [m]
+constexpr double kStepScaleSigma = 0.02;   ///< error of a step in proportion to its length
+constexpr double kTurnSigma = 0.0004;      ///< least noise of a rotation [rad]
+constexpr double kStillSigma = 0.03;       ///< of a step before any parallax was seen [m]
+constexpr int kMostIterations = 2;         ///< of the smoother a frame: no pose filter holds the path, so what a false
+                                           ///< trunk pulls before it is given up is kept short
 
 /// \p wRb turned, as little as needed, to have \p bup pointing up.
 Matrix3d levelled(const Matrix3d &wRb, const Vector3d &bup)
@@ -61,14 +50,14 @@ MonocularMotion::MonocularMotion(const PinholeCamera &camera, const Pose &bMc, c
     : MotionSource(camera, bMc, options.points),
       m_camera(camera),
       m_bMc(bMc),
-      m_options(options.visual),
+      m_camera_height(options.camera_height),
+      m_is_focal_known(options.focal_known),
       m_model(options.motion, options.points.gyro),
-      m_odometry(camera, withFocal(options.visual.focal_known))
+      m_odometry(camera, options.focal_known)
 {
-  m_options.validate();
 }
 
-int MonocularMotion::iterations(int asked) const { return std::min(asked, m_options.max_iterations); }
+int MonocularMotion::iterations(int asked) const { return std::min(asked, kMostIterations); }
 
 PosePrior MonocularMotion::first(const Frame &frame)
 {
@@ -124,14 +113,14 @@ void MonocularMotion::chooseUnit()
   const std::vector<PointDepth> depths = m_odometry.depths();
   const GroundHeight ground = up() ? heightOverGround(depths, m_camera, *up()) : GroundHeight();
   if (ground.known) {
-    m_unit = (isHeightKnown() ? m_options.camera_height : m_options.start_height) / ground.height;
+    m_unit = (isHeightKnown() ? m_camera_height : kStartHeight) / ground.height;
     return;
   }
   std::vector<double> inverse;
   for (const PointDepth &point : depths)
     if (point.inverse_depth > 3 * point.sigma)
       inverse.push_back(point.inverse_depth);
-  m_unit = inverse.empty() ? 1 : m_options.start_depth * medianOf(inverse);
+  m_unit = inverse.empty() ? 1 : kStartDepth * medianOf(inverse);
 }
 
 void MonocularMotion::measureHeight()
@@ -143,8 +132,8 @@ void MonocularMotion::measureHeight()
   if (!ground.known)
     return;
   m_height_seen = ground.height * m_unit;
-  const double height = isHeightKnown() ? m_options.camera_height : m_options.start_height;
-  m_height_scale.add(ground, height, m_options.camera_height_sigma * height);
+  const double height = isHeightKnown() ? m_camera_height : kStartHeight;
+  m_height_scale.add(ground, height, kCameraHeightSigma * height);
 }
 
 /// The ground under the camera, smoothed: bumps and slopes of some metres stay.
@@ -161,8 +150,8 @@ ScaleEstimate MonocularMotion::scale() const
 {
   const ScaleSource source = isHeightKnown() ? ScaleSource::height : ScaleSource::prior;
   if (!m_height_scale.known())
-    return {0, m_options.start_sigma, source};
-  const double sigma = isHeightKnown() ? m_options.camera_height_sigma : m_options.start_sigma;
+    return {0, kStartSigma, source};
+  const double sigma = isHeightKnown() ? kCameraHeightSigma : kStartSigma;
   return {std::log(m_height_scale.metresPerUnit() / m_unit), std::hypot(m_height_scale.relativeSigma(), sigma), source};
 }
 
@@ -180,16 +169,16 @@ Odometry MonocularMotion::toBody(const Pose &caMcb, Matrix6d covariance, bool is
 {
   covariance.topRows<3>() *= m_unit;
   covariance.leftCols<3>() *= m_unit;
-  const double along = m_options.step_scale_sigma * m_unit * caMcb.t.norm();
-  const double least = is_held ? m_options.still_sigma : m_options.step_sigma;
+  const double along = kStepScaleSigma * m_unit * caMcb.t.norm();
+  const double least = is_held ? kStillSigma : kStepSigma;
   if (is_held) {
     covariance.topRows<3>().setZero();
     covariance.leftCols<3>().setZero();
   }
   covariance.topLeftCorner<3, 3>() += (least * least + along * along) * Matrix3d::Identity();
   constexpr double kFocalSigma = 0.15; // of log f where it is guessed: a rotation is wrong by as much of itself
-  const double guessed = m_options.focal_known ? 0 : kFocalSigma * logSo3(caMcb.R).norm();
-  const double rotation_variance = m_options.turn_sigma * m_options.turn_sigma + guessed * guessed;
+  const double guessed = m_is_focal_known ? 0 : kFocalSigma * logSo3(caMcb.R).norm();
+  const double rotation_variance = kTurnSigma * kTurnSigma + guessed * guessed;
   covariance.bottomRightCorner<3, 3>() += rotation_variance * Matrix3d::Identity();
   const Matrix6d to_body = adjoint(m_bMc);
   return {m_bMc * Pose(caMcb.R, m_unit * caMcb.t) * m_bMc.inverse(), to_body * covariance * to_body.transpose()};

@@ -8,7 +8,7 @@
 /// first guess of the metre, taken when the first parallax is seen, and is kept: scale() says how far it is off.
 ///
 /// Frames: w level with the first camera at its origin, a the body at the frame before, b the body now.
-/// A camera that only rotates gets its rotation; its place is held (`still_sigma`) until some parallax says otherwise.
+/// A camera that only rotates gets its rotation; its place is held until some parallax says otherwise.
 /// What is learnt of earlier frames only later (the first baseline, frames after a gap) comes as more odometry.
 
 #include "motion/ground_plane.h"
@@ -29,8 +29,7 @@ public:
   bool hasRanges() const override { return m_has_unit; }
   bool isTranslationMeasured() const override { return m_has_unit; }
   std::optional<double> groundZ() const override { return m_ground_z; }
-  /// By the height over the ground: camera_height where that is known, else start_height; start_sigma while no ground
-  /// was seen.
+  /// By the height over the ground: that of the options where it is known, else one that is usual.
   ScaleEstimate scale() const override;
   WorldReference reference() const override;
 
@@ -43,13 +42,14 @@ private:
   void learnGround(const Pose &wMb);
   Odometry toBody(const Pose &caMcb, Matrix6d covariance, bool is_held) const;
   void addBacklog(Motion &motion) const;
-  bool isHeightKnown() const { return m_options.camera_height > 0; }
+  bool isHeightKnown() const { return m_camera_height > 0; }
   std::optional<Eigen::Vector3d> up() const;
   double upSigma() const; ///< [rad]
 
   PinholeCamera m_camera;
   Pose m_bMc;
-  VisualOdometryOptions m_options;
+  double m_camera_height; ///< over the ground [m]; 0: unknown
+  bool m_is_focal_known;
   MotionModel m_model; ///< for the gyro, and for what the images do not show
   PointOdometry m_odometry;
   VerticalFinder m_verticals;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/motion_model.h"
 
-#include "geometry/require_range.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
@@ -11,20 +10,6 @@ namespace bole
 {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-void MotionModelOptions::validate() const
-{
-  requireRange("motion.step_sigma", step_sigma, 1e-4, 1);
-  requireRange("motion.step_scale_sigma", step_scale_sigma, 0, 1);
-  requireRange("motion.scale_sigma", scale_sigma, 0, 1);
-  requireRange("motion.step_sigma_vertical", step_sigma_vertical, 1e-4, 1);
-  requireRange("motion.height_sigma", height_sigma, 1e-3, 10);
-  requireRange("motion.tilt_sigma", tilt_sigma, 1e-4, 1);
-  requireRange("motion.turn_sigma", turn_sigma, 1e-5, 1);
-  requireRange("motion.gyro_turn_sigma", gyro_turn_sigma, 1e-6, 1);
-  requireRange("motion.free_step_sigma", free_step_sigma, 1e-3, 10);
-  requireRange("motion.free_turn_sigma", free_turn_sigma, 1e-4, 1);
-}
 
 namespace
 {
@@ -47,7 +32,6 @@ PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sig
 
 MotionModel::MotionModel(const MotionModelOptions &options, const GyroOptions &gyro) : m_options(options), m_gyro(gyro)
 {
-  m_options.validate();
 }
 
 PosePrior MotionModel::first(const Frame &frame) const

@@ -32,8 +32,6 @@ struct MotionModelOptions
   bool relative_alone = false;     ///< the filter's relative pose and nothing else: no gyro, no height, roll or pitch
   double free_step_sigma = 0.15;   ///< of a step that nothing measured (constant velocity) [m], 1e-3 to 10
   double free_turn_sigma = 0.02;   ///< of a turn that nothing measured [rad], 1e-4 to 1
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// One step: what the smoother is given for a new frame.

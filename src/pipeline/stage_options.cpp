@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/stage_options.h"
 
-#include "geometry/require_range.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -13,36 +11,7 @@ namespace
 /// What a corner is believed to at best in pictures that went through a lossy codec: where it leaves blocks standing,
 /// corners stand too, an error that many share and that their residuals do not show.
 constexpr double kCompressedSigma_px = 0.2;
-} // namespace
 
-void FlowOptions::validate() const
-{
-  requireRange("flow.adopt_most", adopt_most, 1, 100);
-  requireRange("flow.detect_every", detect_every, 1, 100);
-  requireRange("flow.view_spacing", view_spacing, 0, 1);
-  requireRange("flow.trunk_low", trunk_low, 0, 5);
-  requireRange("flow.trunk_high", trunk_high, trunk_low, 20);
-  requireRange("flow.track_range", track_range, 1, 100);
-  requireRange("flow.gate", gate, 1, 100);
-  requireRange("flow.contrast_noise", contrast_noise, 0, 0.5);
-  requireRange("flow.gate_sigma_px", gate_sigma_px, 0.1, 10);
-  requireRange("flow.search_px", search_px, 0, 5);
-  requireRange("flow.view_correlation", view_correlation, 0, 1);
-  requireRange("flow.turned_frames", turned_frames, 0, 1000);
-}
-
-void StageOptions::validate() const
-{
-  flow.validate();
-  motion.validate();
-  visual.validate();
-  tracking.validate();
-  smoothing.validate();
-  map.validate();
-}
-
-namespace
-{
 /// What the thresholds on the picture are held for.
 constexpr double kFocal_px = 200, kRate_hz = 10;
 
@@ -195,8 +164,8 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
                       options.map.policy != MapPolicy::paper;
   if (options.stages.servoing)
     setServoing(o);
-  o.visual.camera_height = options.camera.height;
-  o.visual.focal_known = options.camera.focal_known;
+  o.camera_height = options.camera.height;
+  o.focal_known = options.camera.focal_known;
   if (options.camera.compressed)
     o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
   scaleToRate(o, options.camera.rate / kRate_hz);
@@ -210,7 +179,6 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
     setPaper(o, options.paper);
   constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
   scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
-  o.validate();
   return o;
 }
 } // namespace bole

@@ -8,7 +8,6 @@
 #include "gradient/gradient.h"
 #include "map/trunk_map.h"
 #include "motion/point_motion.h"
-#include "pipeline/monocular_options.h"
 #include "pipeline/motion_model.h"
 #include "saliency/saliency_options.h"
 #include "tracking/trunk_tracker.h"
@@ -59,8 +58,6 @@ struct FlowOptions
   int turned_frames = 0; ///< borders whose contrast changed its sign are accepted after so many frames in a row at
                          ///< the predicted place: from its other side a bright trunk may be darker than the
                          ///< background; 0 (never) to 1000
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 struct StageOptions
@@ -68,7 +65,8 @@ struct StageOptions
   FlowOptions flow;
   MotionModelOptions motion;
   PointMotionOptions points = withoutOdometry();
-  VisualOdometryOptions visual;
+  double camera_height = 0; ///< over the ground, where it is known [m]; 0: unknown
+  bool focal_known = true;  ///< false: a guess, so a sideways flight needs better proof against a pan
   GradientOptions gradient;
   SaliencyOptions saliency;
   DetectorOptions detection;
@@ -76,8 +74,6 @@ struct StageOptions
   TrackingOptions tracking;
   SmootherOptions smoothing = closeToTheOptimum();
   MapOptions map;
-
-  void validate() const;
 };
 
 /// Upper quartiles over all lines of all pictures of a flight, as `bole reproduce --statistics` prints them.

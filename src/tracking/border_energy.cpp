@@ -3,21 +3,11 @@
 
 #include "tracking/border_energy.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
 namespace bole
 {
-void EnergyOptions::validate() const
-{
-  requireRange("energy.alpha", alpha, 0.01, 100);
-  requireRange("energy.paper_alpha", paper_alpha, 1e-3, 1e6);
-  requireRange("energy.contrast_floor", contrast_floor, 0.001, 0.5);
-  requireRange("energy.hessian_step_px", hessian_step_px, 0.1, 3);
-}
-
 TrunkEnergy::TrunkEnergy(const Gradient &gradient, const PinholeCamera &camera, const ElevationRange &range,
                          const BorderTarget &left, const BorderTarget &right, const EnergyOptions &options)
     : m_gradient(gradient), m_camera(camera), m_range(range), m_left(left), m_right(right), m_options(options)

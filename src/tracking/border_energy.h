@@ -35,8 +35,6 @@ struct EnergyOptions
   double paper_alpha = 1000;     ///< weight of Eq. 3 in the paper form, 1e-3 to 1e6; the paper's value
   double contrast_floor = 0.02;  ///< contrast below which a border weighs less [full scale/px], 0.001 to 0.5
   double hessian_step_px = 0.75; ///< of the central differences of the Hessian, 0.1 to 3
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// One border as it is looked for in one image.

@@ -2,7 +2,6 @@
 #include "tracking/trunk_tracker.h"
 
 #include "geometry/names.h"
-#include "geometry/require_range.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -165,18 +164,6 @@ double evennessOf(const Gradient &gradient, const PinholeCamera &camera, const T
   return sum / (result.left_used + result.right_used);
 }
 } // namespace
-
-void TrackingOptions::validate() const
-{
-  energy.validate();
-  requireRange("tracking.scan_min_px", scan_min_px, 0.5, 20);
-  requireRange("tracking.scan_max_px", scan_max_px, 1, 60);
-  requireRange("tracking.scan_sigmas", scan_sigmas, 1, 10);
-  requireRange("tracking.contrast_min", contrast_min, 0, 0.5);
-  requireRange("tracking.rows_min", rows_min, 4, 1000);
-  requireRange("tracking.tilt_sigma", tilt_sigma, 0.001, 0.5);
-  requireRange("tracking.polish_max_px", polish_max_px, 0.5, 20);
-}
 
 const char *toString(TrackingStatus status)
 {

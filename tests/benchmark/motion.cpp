@@ -185,9 +185,7 @@ void plainVideo(const std::string &path)
 {
   const auto source = openSource(path);
   PointTracker tracker(source->camera());
-  PointOdometryOptions options;
-  options.focal_known = false; // openSource() guesses it
-  PointOdometry odometry(source->camera(), options);
+  PointOdometry odometry(source->camera(), false); // openSource() guesses its focal length
   VerticalFilter vertical;
   std::map<std::string, int> statuses;
   for (Frame frame; source->next(frame);) {

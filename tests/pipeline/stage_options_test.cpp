@@ -82,7 +82,8 @@ TEST(StageOptions, TakeEveryValueThatARangeAllows)
           **policy = MapPolicy::paper;
         else
           ASSERT_TRUE(entry.assign(fmt::format("{}", is_high ? entry.high.value : entry.low.value)));
-        EXPECT_NO_THROW(stageOptions(options, cameraWith(f))) << entry.key << " = " << entry.text() << ", f = " << f;
+        const StageOptions made = stageOptions(options, cameraWith(f));
+        EXPECT_NO_THROW(Smoother(made.smoothing)) << entry.key << " = " << entry.text() << ", f = " << f;
       }
     }
 }
