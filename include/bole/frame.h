@@ -54,13 +54,9 @@ struct Frame
   std::string message;                  ///< why the status is not ok
   vpImage<unsigned char> image;         ///< grey, rectified: the pinhole of FrameSource::camera() applies
   std::optional<Pose> wMb_odometry;     ///< pose filter at this frame, where there is one
-  /// Covariance of the motion since the frame before, in the tangent (rho, phi) of wMb_odometry,
-  /// where the source knows it.
-  std::optional<Matrix6d> odometry_covariance;
   /// [ns] of the host's steady clock when the last byte of the frame came; 0 for recordings.
   std::int64_t arrival_ns = 0;
   std::vector<GyroSample> gyro;  ///< samples since the frame before, oldest first
-  std::optional<double> height;  ///< of the body over the ground [m] (sonar), where there is one
   std::optional<Pose> wMb_truth; ///< ground truth, for pictures and evaluation only: no stage may read it
 };
 

@@ -109,12 +109,8 @@ struct ArDroneSource::State
     frame.stamp_ns = std::max(live.stamp_ns, last_stamp_ns + 1);
     last_stamp_ns = frame.stamp_ns;
     frame.gyro = live.gyro;
-    frame.odometry_covariance = live.odometry_covariance;
-    if (live.body) {
+    if (live.body)
       frame.wMb_odometry = live.body->wMb;
-      if (live.body->height > 0)
-        frame.height = live.body->height;
-    }
     if (live.status == FrameStatus::ok || live.status == FrameStatus::stale)
       frame.image = image;
     health->judge(frame);

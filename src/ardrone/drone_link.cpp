@@ -185,8 +185,6 @@ struct DroneLink::State
     frame.gyro = odometry.gyro(before_ns, exposed_ns);
     for (GyroSample &sample : frame.gyro)
       sample.stamp_ns += shift_ns;
-    if (frame.body)
-      frame.odometry_covariance = odometry.stepCovariance(before_ns, exposed_ns);
   }
 };
 

@@ -26,7 +26,6 @@ struct LiveFrame
   std::optional<std::int64_t> unchanged_since_ns; ///< stamp of the picture from which this hardly differs
   std::optional<BodyState> body;                  ///< navdata interpolated at the exposure, stamp as above
   std::vector<GyroSample> gyro;                   ///< since the frame given out before, stamps as above
-  std::optional<Matrix6d> odometry_covariance;    ///< of the motion since the frame given out before
 };
 
 /// Talks to a drone as a listener: wakes the streams, asks for full navdata, keeps the

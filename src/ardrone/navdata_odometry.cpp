@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
 #include "geometry/constants.h"
-#include "geometry/require_range.h"
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 
@@ -13,7 +12,10 @@ namespace bole
 {
 namespace
 {
-constexpr double kCorrelation_s = 0.1;   // of the velocity's error
+constexpr double kGroundStep = 0.15;     // a faster change of the height is a step in the ground [m]
+constexpr double kLargestGap_s = 0.5;    // beyond it the velocity is not trusted to bridge
+constexpr double kExtrapolation_s = 0.1; // how far beyond the newest sample at() goes
+constexpr double kHistory_s = 10;
 constexpr double kMostPackets_Hz = 1000; // by the drone's clock, which sends 200: a flood fills no memory
 
 Eigen::Matrix3d turnedBy(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
@@ -52,19 +54,6 @@ BodyState interpolated(const BodyState &a, const BodyState &b, std::int64_t stam
 }
 } // namespace
 
-void NavdataOdometry::Options::validate() const
-{
-  requireRange("velocity_sigma", velocity_sigma, 1e-9, 5);
-  requireRange("scale_sigma", scale_sigma, 1e-9, 1);
-  requireRange("height_sigma", height_sigma, 1e-9, 1);
-  requireRange("tilt_sigma", tilt_sigma, 1e-9, 0.5);
-  requireRange("yaw_sigma", yaw_sigma, 1e-9, 0.5);
-  requireRange("ground_step", ground_step, 0.02, 5);
-  requireRange("largest_gap_s", largest_gap_s, 0.05, 10);
-  requireRange("extrapolation_s", extrapolation_s, 1e-9, 1);
-  requireRange("history_s", history_s, 1, 600);
-}
-
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw)
 {
   return (Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
@@ -78,9 +67,6 @@ Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb)
   const double pitch_up = std::asin(std::clamp(wRb(2, 0), -1.0, 1.0));
   return {roll, pitch_up, -yawOf(wRb)};
 }
-
-NavdataOdometry::NavdataOdometry() : NavdataOdometry(Options{}) {}
-NavdataOdometry::NavdataOdometry(const Options &options) : m_options(options) { m_options.validate(); }
 
 void NavdataOdometry::restart()
 {
@@ -104,21 +90,21 @@ void NavdataOdometry::add(std::int64_t stamp_ns, const Navdata &navdata)
   }
   else {
     const double elapsed = m_history.empty() ? 0 : static_cast<double>(stamp_ns - before->stamp_ns) * 1e-9;
-    const bool bridged = elapsed <= m_options.largest_gap_s;
+    const bool bridged = elapsed <= kLargestGap_s;
     const Eigen::Vector3d mean_velocity = 0.5 * (before->wMb.R * before->velocity + state.wMb.R * state.velocity);
     state.wMb.t = before->wMb.t + (bridged ? elapsed : 0.0) * mean_velocity;
     if (state.height > 0) {
       const double jump = m_ground + state.height - state.wMb.t.z();
       // The filter behind the height converges slowly: small differences belong to z, large ones to the ground.
-      if (std::abs(jump) > m_options.ground_step)
+      if (std::abs(jump) > kGroundStep)
         m_ground -= jump;
       else
         state.wMb.t.z() += jump;
     }
   }
   m_history.push_back(state);
-  const auto oldest = stamp_ns - static_cast<std::int64_t>(m_options.history_s * 1e9);
-  const auto most = static_cast<std::size_t>(m_options.history_s * kMostPackets_Hz);
+  const auto oldest = stamp_ns - static_cast<std::int64_t>(kHistory_s * 1e9);
+  const auto most = static_cast<std::size_t>(kHistory_s * kMostPackets_Hz);
   while (m_history.size() > 2 && (m_history.front().stamp_ns < oldest || m_history.size() > most))
     m_history.pop_front();
 }
@@ -138,7 +124,7 @@ std::optional<BodyState> NavdataOdometry::at(std::int64_t stamp_ns) const
   if (after == m_history.end()) {
     BodyState last = m_history.back();
     const double ahead = static_cast<double>(stamp_ns - last.stamp_ns) * 1e-9;
-    if (ahead > m_options.extrapolation_s)
+    if (ahead > kExtrapolation_s)
       return std::nullopt;
     last.stamp_ns = stamp_ns;
     last.wMb.t += ahead * (last.wMb.R * last.velocity);
@@ -149,7 +135,7 @@ std::optional<BodyState> NavdataOdometry::at(std::int64_t stamp_ns) const
   if (after == m_history.begin())
     return *after;
   const BodyState &before = *(after - 1);
-  if (static_cast<double>(after->stamp_ns - before.stamp_ns) * 1e-9 > m_options.largest_gap_s)
+  if (static_cast<double>(after->stamp_ns - before.stamp_ns) * 1e-9 > kLargestGap_s)
     return std::nullopt;
   return interpolated(before, *after, stamp_ns);
 }
@@ -161,28 +147,5 @@ std::vector<GyroSample> NavdataOdometry::gyro(std::int64_t from_ns, std::int64_t
     if (state.rate && state.stamp_ns > from_ns && state.stamp_ns <= to_ns)
       samples.push_back({state.stamp_ns, *state.rate, state.force});
   return samples;
-}
-
-Matrix6d NavdataOdometry::stepCovariance(std::int64_t from_ns, std::int64_t to_ns) const
-{
-  const double elapsed = std::max(1e-3, static_cast<double>(to_ns - from_ns) * 1e-9);
-  const auto end = at(to_ns);
-  const double speed = end ? end->velocity.norm() : 0;
-  const double horizontal = m_options.velocity_sigma * m_options.velocity_sigma * elapsed * kCorrelation_s +
-                            std::pow(m_options.scale_sigma * speed * elapsed, 2);
-  Eigen::Matrix3d position =
-      Eigen::Vector3d(horizontal, horizontal, 2 * std::pow(m_options.height_sigma, 2)).asDiagonal();
-  Eigen::Matrix3d rotation = Eigen::Vector3d(std::pow(m_options.tilt_sigma, 2), std::pow(m_options.tilt_sigma, 2),
-                                             std::pow(m_options.yaw_sigma, 2) * elapsed)
-                                 .asDiagonal();
-  if (end) { // world axes (up to the yaw) to the body's
-    const Eigen::Matrix3d bRw = end->wMb.R.transpose();
-    position = bRw * position * bRw.transpose();
-    rotation = bRw * rotation * bRw.transpose();
-  }
-  Matrix6d covariance = Matrix6d::Zero();
-  covariance.topLeftCorner<3, 3>() = position;
-  covariance.bottomRightCorner<3, 3>() = rotation;
-  return covariance;
 }
 } // namespace bole

@@ -31,30 +31,9 @@ inline Eigen::Vector3d flipDroneAxes(const Eigen::Vector3d &v) { return {v.x(), 
 /// report. Where the height jumps although the drone does not climb, the ground has a step (a bush, a wall): z goes on
 /// with the vertical velocity and the step is kept as an offset. The world stands on the ground below the first sample,
 /// z up; its x axis is where the drone's yaw is zero. After a reboot (restart()) the pose goes on where it was.
-///
-/// Noise (stepCovariance()): independent from step to step, growing with time, so that a step over
-/// t has the variance velocity_sigma^2 t tau + (scale_sigma |v| t)^2 per horizontal axis, tau = 0.1
-/// s; in the tangent (rho, phi) of the body at the end of the step.
 class NavdataOdometry
 {
 public:
-  struct Options
-  {
-    double velocity_sigma = 0.1;  ///< [m/s], (0, 5): the drone's optical flow; 1 cm a step at 10 Hz
-    double scale_sigma = 0.03;    ///< (0, 1): error of the drone's speed in proportion; from flights
-    double height_sigma = 0.01;   ///< [m], (0, 1): the sonar's steps are 1 cm
-    double tilt_sigma = 0.005;    ///< [rad], (0, 0.5): error of roll and pitch of a step
-    double yaw_sigma = 0.005;     ///< [rad per square root of s], (0, 0.5): drift of the yaw
-    double ground_step = 0.15;    ///< [m], (0.02, 5): a faster change of the height is a step in the ground
-    double largest_gap_s = 0.5;   ///< [s], (0.05, 10): beyond, the velocity is not trusted to bridge
-    double extrapolation_s = 0.1; ///< [s], (0, 1): how far beyond the newest sample at() goes
-    double history_s = 10;        ///< [s], (1, 600)
-    void validate() const;
-  };
-
-  NavdataOdometry();
-  explicit NavdataOdometry(const Options &options);
-
   /// Adds a packet with option "demo"; others, and stamps that do not rise, are ignored.
   void add(std::int64_t stamp_ns, const Navdata &navdata);
   /// The drone's clock and yaw start anew: the next sample takes on the last pose.
@@ -65,11 +44,8 @@ public:
   std::optional<BodyState> newest() const;
   /// Angular rates and specific forces in (from, to], oldest first.
   std::vector<GyroSample> gyro(std::int64_t from_ns, std::int64_t to_ns) const;
-  /// Covariance of the motion between two instants.
-  Matrix6d stepCovariance(std::int64_t from_ns, std::int64_t to_ns) const;
 
 private:
-  Options m_options;
   std::deque<BodyState> m_history;
   double m_ground = 0;     ///< height of the ground below in the world [m]
   double m_yaw_offset = 0; ///< ours minus the drone's, after a reboot [rad]

@@ -193,9 +193,7 @@ TEST(Hostile, NavdataThatNoDroneCanMeasureMoveNothing)
 
 TEST(Hostile, AFloodOfNavdataDoesNotFillTheMemory)
 {
-  NavdataOdometry::Options options;
-  options.history_s = 1;
-  NavdataOdometry odometry(options);
+  NavdataOdometry odometry;
   for (std::int64_t k = 0; k < 20000; ++k) // stamps a microsecond apart
     odometry.add(1000 * k, packet(static_cast<std::uint32_t>(k)));
   EXPECT_FALSE(odometry.at(0)); // forgotten though it is but 20 ms old

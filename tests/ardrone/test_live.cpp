@@ -72,7 +72,6 @@ TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
       continue;
     const Pose flown = test::MadeUpFlight::pose((numbers[i] - 1) * 0.05);
     EXPECT_EQ(frames[i].image.getWidth(), 160u);
-    EXPECT_TRUE(frames[i].height);
     if (!first_seen) {
       first_seen = frames[i].wMb_odometry;
       first_flown = flown;
@@ -263,7 +262,6 @@ TEST_P(Live, AStallOfTheVideoKeepsTheMotion)
     const double seconds = static_cast<double>(frame.stamp_ns - before.stamp_ns) * 1e-9;
     EXPECT_NEAR((frame.wMb_odometry->t - before.wMb_odometry->t).norm(), 1.05 * seconds, 0.1 + 0.1 * seconds);
     EXPECT_FALSE(frame.gyro.empty());
-    EXPECT_TRUE(frame.odometry_covariance);
     ++missing;
   }
   EXPECT_GT(missing, 0);

@@ -145,19 +145,6 @@ TEST(NavdataOdometry, GoesOnWhereItWasAfterAReboot)
   EXPECT_LT(logSo3(after.R.transpose() * before.R).norm(), 1e-6);
 }
 
-TEST(NavdataOdometry, StepCovarianceGrowsWithTimeAndSpeedAndTurnsWithTheBody)
-{
-  NavdataOdometry odometry;
-  for (int i = 0; i <= 300; ++i)
-    odometry.add(seconds(i * 0.01), packet({0, 0, 0}, {3000, 0, 0}));
-  const Matrix6d step = odometry.stepCovariance(seconds(1), seconds(1.1));
-  const Matrix6d longer = odometry.stepCovariance(seconds(1), seconds(2));
-  EXPECT_NEAR(step(0, 0), 0.1 * 0.1 * 0.1 * 0.1 + std::pow(0.03 * 3 * 0.1, 2), 1e-9);
-  EXPECT_GT(longer(0, 0), 5 * step(0, 0));
-  EXPECT_GT(longer(5, 5), 5 * step(5, 5));
-  EXPECT_GT(step.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0);
-}
-
 TEST(NavdataOdometry, ReadsTheSignsOfARealFlight)
 {
   // AR.Drone 1, a step of the forward command: nose down (negative pitch) makes the drone fly forward.
