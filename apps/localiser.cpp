@@ -29,10 +29,9 @@ std::vector<TrunkRecord> readKnownMap(const std::string &path)
 {
   std::vector<TrunkRecord> map;
   if (std::filesystem::is_directory(path)) {
-    for (const TrunkRecord &trunk : readTrunks(path + "/trunks.csv")) {
+    for (const TrunkRecord &trunk : readTrunks(path + "/trunks.csv"))
       if (trunk.status == TrunkStatus::confirmed)
         map.push_back(trunk);
-    }
   }
   else {
     for (const Cylinder &cylinder : readCao(path)) {
@@ -58,10 +57,9 @@ Localiser::Localiser(std::vector<TrunkRecord> map, const FrameSource &source, do
 void Localiser::ask()
 {
   std::vector<TrunkRecord> recent;
-  for (const TrunkRecord &trunk : m_pipeline.map()) {
+  for (const TrunkRecord &trunk : m_pipeline.map())
     if (trunk.status == TrunkStatus::confirmed && m_now_s - *m_first_s - trunk.last_seen_s < kMemory_s)
       recent.push_back(trunk);
-  }
   if (const auto found = placeOnMap(recent, m_map))
     m_placement = found;
 }

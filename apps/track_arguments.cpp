@@ -2,7 +2,6 @@
 #include "track_arguments.h"
 #include "data_files.h"
 
-
 namespace bole::apps
 {
 void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &arguments)

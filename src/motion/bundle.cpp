@@ -27,12 +27,10 @@ Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vect
       const Eigen::Matrix<double, 2, 3> turned = projection * bRa;
       *J_a << inverse_depth * turned, -turned * skew(ray);
     }
-    if (J_b != nullptr) {
+    if (J_b != nullptr)
       *J_b << -inverse_depth * projection, projection * skew(y);
-    }
-    if (J_q != nullptr) {
+    if (J_q != nullptr)
       *J_q = projection * step;
-    }
   }
   return at - xy_b;
 }
@@ -64,9 +62,8 @@ public:
   {
     double sum = 0;
     for (const BundlePoint &point : points) {
-      for (const BundleObservation &seen : point.seen) {
+      for (const BundleObservation &seen : point.seen)
         sum += costOf(residualOf(frames, point, seen).norm() / m_options.sigma, m_options.kernel);
-      }
       const double off = point.inverse_depth - point.prior;
       sum += 0.5 * point.prior_information * off * off;
     }
@@ -88,12 +85,10 @@ public:
     System system;
     system.H = Eigen::MatrixXd::Zero(m_size, m_size);
     system.g = Eigen::VectorXd::Zero(m_size);
-    for (BundlePoint &point : m_points) {
+    for (BundlePoint &point : m_points)
       addPoint(system, point);
-    }
-    for (std::size_t i = 1; i < m_frames.size(); ++i) {
+    for (std::size_t i = 1; i < m_frames.size(); ++i)
       addRotation(system, i);
-    }
     addBaseline(system);
     return system;
   }
@@ -104,11 +99,9 @@ public:
   {
     const auto [H, g] = reduced(system, damping);
     const Eigen::VectorXd delta = -H.ldlt().solve(g);
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (m_offset[i] >= 0) {
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      if (m_offset[i] >= 0)
         frames[i].wMc = frames[i].wMc.plus(delta.segment<6>(m_offset[i]));
-      }
-    }
     for (std::size_t k = 0; k < points.size(); ++k) {
       const double H_q = system.point_H[k] * (1 + damping) + 1e-12;
       points[k].inverse_depth -= (system.point_g[k] + system.cross[k].dot(delta)) / H_q;
@@ -188,9 +181,8 @@ private:
 
   void addRotation(System &system, std::size_t i) const
   {
-    if (!m_frames[i].previousRthis) {
+    if (!m_frames[i].previousRthis)
       return;
-    }
     const Eigen::Vector3d phi = rotationResidual(m_frames, i);
     const Eigen::Matrix3d J_b = inverseRightJacobianSo3(phi);
     const Eigen::Matrix3d J_a = -J_b * m_frames[i].wMc.R.transpose() * m_frames[i - 1].wMc.R;
@@ -213,9 +205,8 @@ private:
 
   void addBaseline(System &system) const
   {
-    if (!m_options.first_baseline || m_offset[1] < 0) {
+    if (!m_options.first_baseline || m_offset[1] < 0)
       return;
-    }
     // The first frame is fixed wherever the baseline is asked for.
     const Eigen::Vector3d between = m_frames[1].wMc.t - m_frames[0].wMc.t;
     const Eigen::Vector3d J =
@@ -272,9 +263,8 @@ BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoi
     cost = tried;
     damping = std::max(1e-7, 0.2 * damping);
     system = bundle.linearize();
-    if (gain < 1e-3 * cost) {
+    if (gain < 1e-3 * cost)
       break;
-    }
   }
   double good = 0, all = 0;
   for (const BundlePoint &point : points) {

@@ -17,9 +17,8 @@ double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, c
                        const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J)
 {
   const motion::Epipolar epipolar({aRb, direction});
-  if (J == nullptr) {
+  if (J == nullptr)
     return epipolar.residual(x_a, x_b);
-  }
   Vector5d gradient;
   const double residual = epipolar.residual(x_a, x_b, gradient);
   *J = gradient.transpose();
@@ -32,9 +31,8 @@ namespace bole::motion
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
 {
   reserve(matches.size());
-  for (const PointMatch &match : matches) {
+  for (const PointMatch &match : matches)
     add(camera.ray(match.a_px), camera.ray(match.b_px));
-  }
 }
 
 void Rays::reserve(std::size_t n)
@@ -98,12 +96,10 @@ MotionPrior::MotionPrior(const RelativePosePrior &prior)
 
 double bulkSigma(std::vector<double> residuals)
 {
-  if (residuals.empty()) {
+  if (residuals.empty())
     return 0;
-  }
-  for (double &r : residuals) {
+  for (double &r : residuals)
     r = std::abs(r);
-  }
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::nth_element(residuals.begin(), middle, residuals.end());
   double sigma = 1.4826 * *middle;
@@ -116,9 +112,8 @@ double bulkSigma(std::vector<double> residuals)
         ++n;
       }
     }
-    if (n > 0) {
+    if (n > 0)
       sigma = std::sqrt(sum / n) / 0.9546; // a normal distribution cut at 2.5 sigma
-    }
   }
   return sigma;
 }
@@ -144,9 +139,8 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
     g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
     const Eigen::Vector3d step = -solveDefinite<3>(fit.information + 1e-9 * Eigen::Matrix3d::Identity(), g);
     fit.aRb = orthonormalized(fit.aRb * expSo3(step));
-    if (step.norm() < 1e-7) {
+    if (step.norm() < 1e-7)
       break;
-    }
   }
   return fit;
 }
@@ -186,11 +180,9 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, double kern
 {
   const EpipolarSums sums = sumsOfMatches(rays.columns, Epipolar(motion).terms(sigma, kernel));
   const double *entry = sums.H;
-  for (int i = 0; i < 5; ++i) {
-    for (int j = i; j < 5; ++j) {
+  for (int i = 0; i < 5; ++i)
+    for (int j = i; j < 5; ++j)
       H(i, j) = H(j, i) = *entry++;
-    }
-  }
   g = Vector5d::Map(sums.g);
 }
 
@@ -218,9 +210,8 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
       Matrix5d damped = H;
       damped.diagonal() += damping * H.diagonal() + Vector5d::Constant(1e-9);
       step = -solveDefinite(damped, g);
-      if (step.tail<2>().norm() > 0.5) {
+      if (step.tail<2>().norm() > 0.5)
         step *= 0.5 / step.tail<2>().norm();
-      }
       const Motion tried = moved(fit.motion, step);
       const double cost = costOf(rays, tried, prior, fit.sigma, options);
       better = cost <= fit.cost;
@@ -231,9 +222,8 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
       }
     }
     // What a further step could still gain, in units of the cost.
-    if (!better || -g.dot(step) < 1e-3) {
+    if (!better || -g.dot(step) < 1e-3)
       break;
-    }
   }
 }
 } // namespace
@@ -250,9 +240,8 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
     residualsOfMatches(rays.columns, Epipolar(fit.motion).terms(fit.sigma, kKernel), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
-    if (std::abs(fit.sigma - before) < 0.02 * before) {
+    if (std::abs(fit.sigma - before) < 0.02 * before)
       break;
-    }
   }
   fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
   Vector5d g;
@@ -291,9 +280,8 @@ std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i
 {
   const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]), normal_j = rays.a[j].cross(aRb * rays.b[j]);
   const Eigen::Vector3d d = normal_i.cross(normal_j);
-  if (d.norm() < 1e-12) {
+  if (d.norm() < 1e-12)
     return std::nullopt;
-  }
   return d.normalized();
 }
 
@@ -325,9 +313,8 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
   sample.reserve(kSample);
   for (int hypothesis = 0; hypothesis < (rotation_known ? (kHypotheses + 1) / 2 : kHypotheses); ++hypothesis) {
     Motion motion{aRb, prior.direction};
-    if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb)) {
+    if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb))
       motion.direction = *d;
-    }
     if (!rotation_known) {
       JointFit fit;
       fit.motion = motion;
@@ -338,21 +325,18 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
     }
     scored.emplace_back(costOf(rays, motion, free, sigma, options), motion);
   }
-  if (prior.has_direction) {
+  if (prior.has_direction)
     scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
-  }
   std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
   std::vector<Motion> starts;
   for (const auto &[cost, motion] : scored) {
     const bool seen = std::any_of(starts.begin(), starts.end(), [&motion = motion](const Motion &other) {
       return std::abs(other.direction.dot(motion.direction)) > 0.95;
     });
-    if (!seen) {
+    if (!seen)
       starts.push_back(motion);
-    }
-    if (starts.size() == (rotation_known ? 2u : 5u)) {
+    if (starts.size() == (rotation_known ? 2u : 5u))
       break;
-    }
   }
   return starts;
 }

@@ -49,18 +49,15 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
   for (const PointDepth &point : points) {
     const Eigen::Vector3d ray = camera.ray(point.pixel);
     const double below = -up.dot(ray);
-    if (below < sine * ray.norm() || point.inverse_depth <= 0 ||
-        point.sigma > kMaxRelativeSigma * point.inverse_depth) {
+    if (below < sine * ray.norm() || point.inverse_depth <= 0 || point.sigma > kMaxRelativeSigma * point.inverse_depth)
       continue;
-    }
     const double h = below / point.inverse_depth;
     const double relative = point.sigma / point.inverse_depth;
     const double tilt = kUpSigma * ray.norm() / below; // moves the horizon
     heights.push_back({h, h * h * (relative * relative + tilt * tilt)});
   }
-  if (heights.size() < static_cast<std::size_t>(kMinPoints)) {
+  if (heights.size() < static_cast<std::size_t>(kMinPoints))
     return ground;
-  }
   // Bushes and trunks stand above the ground at all heights: the height with the most support wins.
   double best_support = 0, centre = 0;
   for (const Height &candidate : heights) {
@@ -90,9 +87,8 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
 
 void ScaleFromHeight::add(const GroundHeight &seen, double height_m, double sigma_m)
 {
-  if (!seen.known || !(height_m > 0) || !(seen.height > 0)) {
+  if (!seen.known || !(height_m > 0) || !(seen.height > 0))
     return;
-  }
   const double relative_seen = seen.sigma / seen.height, relative_m = sigma_m / height_m;
   m_logs.push_back(std::log(height_m / seen.height));
   m_variances.push_back(relative_seen * relative_seen + relative_m * relative_m + 1e-6);
@@ -100,9 +96,8 @@ void ScaleFromHeight::add(const GroundHeight &seen, double height_m, double sigm
 
 double ScaleFromHeight::metresPerUnit() const
 {
-  if (m_logs.empty()) {
+  if (m_logs.empty())
     return 1;
-  }
   double centre = medianOf(m_logs);
   for (int round = 0; round < 5; ++round) {
     double sum = 0, weights = 0;
@@ -125,9 +120,8 @@ double ScaleFromHeight::relativeSigma() const
     weights += 1 / m_variances[i];
     spread += (m_logs[i] - centre) * (m_logs[i] - centre) / m_variances[i];
   }
-  if (m_logs.empty()) {
+  if (m_logs.empty())
     return 1;
-  }
   const double excess = std::max(1.0, spread / double(m_logs.size()));
   constexpr double kShared = 0.07;
   return std::sqrt(std::min<double>(10, double(m_logs.size())) * excess / weights + kShared * kShared);

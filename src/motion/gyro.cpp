@@ -17,16 +17,13 @@ constexpr double kRateWalk = 0.3;
 /// Rate at a stamp: linear between the samples around it, held before the first and after the last.
 Eigen::Vector3d rateAt(const std::vector<GyroSample> &samples, std::size_t next, std::int64_t stamp_ns)
 {
-  if (next == 0) {
+  if (next == 0)
     return samples.front().rate;
-  }
-  if (next == samples.size()) {
+  if (next == samples.size())
     return samples.back().rate;
-  }
   const GyroSample &a = samples[next - 1], &b = samples[next];
-  if (b.stamp_ns <= a.stamp_ns) {
+  if (b.stamp_ns <= a.stamp_ns)
     return b.rate;
-  }
   const double along = double(stamp_ns - a.stamp_ns) / double(b.stamp_ns - a.stamp_ns);
   return a.rate + along * (b.rate - a.rate);
 }
@@ -92,13 +89,11 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   const double open = samples.empty() ? kRateSigma * kRateSigma * dt_all * dt_all : gaps.variance;
   result.white = (options.noise_density * options.noise_density * dt_all + open) * Eigen::Matrix3d::Identity();
   result.bias = bias.covariance * dt_all * dt_all;
-  if (samples.empty()) {
+  if (samples.empty())
     return result;
-  }
   std::size_t next = 0;
-  while (next < samples.size() && samples[next].stamp_ns <= from_ns) {
+  while (next < samples.size() && samples[next].stamp_ns <= from_ns)
     ++next;
-  }
   std::int64_t stamp = from_ns;
   while (stamp < to_ns) {
     const std::int64_t end = next < samples.size() ? std::min(samples[next].stamp_ns, to_ns) : to_ns;

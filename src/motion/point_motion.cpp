@@ -19,41 +19,34 @@ void PointMotion::track(const Frame &frame)
 {
   const std::size_t number = m_frames++;
   m_fault.clear();
-  if (m_options.use_gyro) {
+  if (m_options.use_gyro)
     m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
-  }
-  if (frame.status != FrameStatus::ok) {
+  if (frame.status != FrameStatus::ok)
     return;
-  }
   Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
   m_turned = m_seen.empty() ? std::nullopt : gyroSince(m_seen.back().stamp_ns, frame.stamp_ns);
   if (m_turned)
     expected = m_bMc.R.transpose() * m_turned->R * m_bMc.R;
   m_tracker.track(frame.image, expected);
   m_seen.push_back({frame.stamp_ns, number, frame.wMb_odometry});
-  if (m_seen.size() > static_cast<std::size_t>(PointTracker::kHistory)) {
+  if (m_seen.size() > static_cast<std::size_t>(PointTracker::kHistory))
     m_seen.pop_front();
-  }
   const auto recent = std::find_if(m_gyro.begin(), m_gyro.end(), [this](const GyroSample &sample) {
     return sample.stamp_ns >= m_seen.front().stamp_ns;
   });
-  if (recent - m_gyro.begin() > 1) { // one sample before the oldest frame helps its rate
+  if (recent - m_gyro.begin() > 1) // one sample before the oldest frame helps its rate
     m_gyro.erase(m_gyro.begin(), recent - 1);
-  }
 }
 
 std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
 {
   track(frame);
   std::vector<RelativeMotion> motions;
-  if (frame.status != FrameStatus::ok) {
+  if (frame.status != FrameStatus::ok)
     return motions;
-  }
-  for (int back : m_options.frames_back) {
-    if (static_cast<std::size_t>(back) < m_seen.size()) {
+  for (int back : m_options.frames_back)
+    if (static_cast<std::size_t>(back) < m_seen.size())
       motions.push_back(relativeTo(back));
-    }
-  }
   judgeShear(motions);
   if (!m_fault.empty())
     motions.clear();
@@ -62,9 +55,8 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
 
 std::optional<GyroRotation> PointMotion::gyroSince(std::int64_t from_ns, std::int64_t to_ns) const
 {
-  if (m_gyro.empty() || m_gyro.back().stamp_ns <= from_ns) {
+  if (m_gyro.empty() || m_gyro.back().stamp_ns <= from_ns)
     return std::nullopt;
-  }
   return integrateGyro(m_gyro, from_ns, to_ns, m_bias, m_options.gyro);
 }
 
@@ -163,9 +155,8 @@ void PointMotion::learn(const std::vector<RelativeMotion> &motions)
   const RelativeMotion &step =
       *std::max_element(motions.begin(), motions.end(),
                         [](const RelativeMotion &x, const RelativeMotion &y) { return x.frames_back < y.frames_back; });
-  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns) {
+  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns)
     return;
-  }
   m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
                       m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(), m_options.gyro);
   m_bias_until_ns = step.b_ns;

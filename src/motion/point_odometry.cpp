@@ -118,30 +118,24 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int
   State &state = *m_state;
   const Pose before = state.wMc;
   state.seen.clear();
-  for (const PointTrack &track : tracker.tracks()) {
+  for (const PointTrack &track : tracker.tracks())
     state.seen[track.id] = state.camera.ray(track.current()).head<2>();
-  }
-  if (turned && (state.turned || state.records.empty() || state.window.back().frame + 1 == state.records.size())) {
+  if (turned && (state.turned || state.records.empty() || state.window.back().frame + 1 == state.records.size()))
     state.turned = state.turned ? state.turned->then(*turned) : *turned;
-  }
-  else {
+  else
     state.turned.reset();
-  }
   Record record;
   record.stamp_ns = stamp_ns;
   state.records.push_back(record);
-  if (turned) {
+  if (turned)
     state.velocity.R = turned->R;
-  }
-  else if (state.started) {
+  else if (state.started)
     state.expectTurn(tracker.matches(1));
-  }
   PointOdometryResult result = state.started ? state.place(turned.has_value()) : state.begin(tracker);
   result.wMc = state.wMc;
   result.previousMc = before.inverse() * state.wMc;
-  if (state.started && result.status == PointOdometryStatus::ok) {
+  if (state.started && result.status == PointOdometryStatus::ok)
     state.velocity = result.previousMc;
-  }
   Record &last = state.records.back();
   last.status = result.status;
   if (state.started) {
@@ -203,9 +197,8 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     return result;
   }
   // Too little is left of what the first key frame saw: go on from here.
-  if (matches.size() < std::max<std::size_t>(2 * RelativePoseEstimate::kLeastMatches, 30)) {
+  if (matches.size() < std::max<std::size_t>(2 * RelativePoseEstimate::kLeastMatches, 30))
     restart();
-  }
   return result;
 }
 
@@ -247,9 +240,8 @@ bool PointOdometry::State::start(const PointTracker &tracker, const RelativePose
   // Inverse depths from the two frames, then both and the frames between in one adjustment.
   for (const auto &[id, xy_a] : origin.seen) {
     const auto found = seen.find(id);
-    if (found == seen.end()) {
+    if (found == seen.end())
       continue;
-    }
     double q = 0.05;
     for (int iteration = 0; iteration < 5; ++iteration) {
       Eigen::Vector2d J;
@@ -350,18 +342,15 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vecto
     point.prior = typical;
     point.prior_information = 1 / (kDepthPrior * kDepthPrior * typical * typical + kRestSigma * kRestSigma);
     for (std::size_t k = 0; k < window.size(); ++k) {
-      if (static_cast<int>(k) == point.anchor) {
+      if (static_cast<int>(k) == point.anchor)
         continue;
-      }
       const auto found = window[k].seen.find(id);
-      if (found != window[k].seen.end()) {
+      if (found != window[k].seen.end())
         point.seen.push_back({static_cast<int>(k), found->second, 1});
-      }
     }
     const auto found = seen.find(id);
-    if (current && found != seen.end()) {
+    if (current && found != seen.end())
       point.seen.push_back({static_cast<int>(frames.size()) - 1, found->second, 1});
-    }
     if (!point.seen.empty()) {
       points.push_back(point);
       ids.push_back(id);
@@ -376,24 +365,21 @@ void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames, c
     window[k].wMc = frames[k].wMc;
     key_poses[window[k].frame] = frames[k].wMc;
   }
-  if (frames.size() > window.size()) {
+  if (frames.size() > window.size())
     wMc = frames.back().wMc;
-  }
   for (std::size_t k = 0; k < points.size(); ++k) {
     Landmark &landmark = landmarks[ids[k]];
     landmark.inverse_depth = points[k].inverse_depth;
     landmark.information = points[k].information;
     double good = 0;
-    for (const auto &observation : points[k].seen) {
+    for (const auto &observation : points[k].seen)
       good += observation.weight > 0.4;
-    }
     const bool bad =
         good < 0.5 * double(points[k].seen.size()) || points[k].inverse_depth * std::sqrt(points[k].information) < -4;
     landmark.misses = bad ? landmark.misses + 1 : 0;
   }
-  for (auto landmark = landmarks.begin(); landmark != landmarks.end();) {
+  for (auto landmark = landmarks.begin(); landmark != landmarks.end();)
     landmark = landmark->second.misses > 2 ? landmarks.erase(landmark) : std::next(landmark);
-  }
 }
 
 PointOdometryResult PointOdometry::State::place(bool turned_known)
@@ -402,9 +388,8 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
   Pose step = velocity;
   wMc = wMc * step;
   int common = 0;
-  for (const auto &[id, landmark] : landmarks) {
+  for (const auto &[id, landmark] : landmarks)
     common += seen.count(id) > 0;
-  }
   result.points = known();
   if (common < kPlacingPoints) {
     // Nothing to hold on to: the map ends here and a new one begins, its unit the old one by the
@@ -423,9 +408,8 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
   bundle.iterations = kPlacingIterations;
   bundle.sigma = sigma;
   bundle.min_sigma = kLeastNoise_px / focal();
-  if (window.size() <= 3) {
+  if (window.size() <= 3)
     bundle.first_baseline = (window[1].wMc.t - window[0].wMc.t).norm();
-  }
   const BundleResult solved = motion::solveBundle(frames, points, bundle);
   result.sigma_px = solved.sigma * focal();
   if (solved.solved && solved.inliers > 0.3) {
@@ -434,9 +418,8 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     result.points = known();
     result.status = result.points >= kPlacingPoints ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
     result.covariance = kPlacingInflation * solved.last_covariance;
-    if (result.status == PointOdometryStatus::rotation_only) {
+    if (result.status == PointOdometryStatus::rotation_only)
       result.covariance.topLeftCorner<3, 3>() += kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
-    }
   }
   else {
     result.status = PointOdometryStatus::lost;
@@ -469,9 +452,8 @@ void PointOdometry::State::addKeyFrame()
   window.push_back({now, wMc, seen, turned});
   key_poses[now] = wMc;
   turned.reset();
-  if (window.size() > kKeyFrames) {
+  if (window.size() > kKeyFrames)
     dropOldest();
-  }
   addLandmarks();
 }
 
@@ -508,30 +490,25 @@ void PointOdometry::State::dropOldest()
 void PointOdometry::State::addLandmarks()
 {
   const double typical = typicalInverseDepth();
-  for (const auto &[id, xy] : window.back().seen) {
-    if (landmarks.count(id) == 0) {
+  for (const auto &[id, xy] : window.back().seen)
+    if (landmarks.count(id) == 0)
       landmarks[id] = {window.back().frame, xy, typical, 0, 0};
-    }
-  }
 }
 
 int PointOdometry::State::known() const
 {
   int n = 0;
-  for (const auto &[id, landmark] : landmarks) {
+  for (const auto &[id, landmark] : landmarks)
     n += seen.count(id) > 0 && landmark.information > 0 && landmark.inverse_depth * std::sqrt(landmark.information) > 4;
-  }
   return n;
 }
 
 double PointOdometry::State::typicalInverseDepth() const
 {
   std::vector<double> depths;
-  for (const auto &[id, landmark] : landmarks) {
-    if (landmark.information > 0 && landmark.inverse_depth * std::sqrt(landmark.information) > 3) {
+  for (const auto &[id, landmark] : landmarks)
+    if (landmark.information > 0 && landmark.inverse_depth * std::sqrt(landmark.information) > 3)
       depths.push_back(landmark.inverse_depth);
-    }
-  }
   return depths.size() < 5 ? 0.05 : medianOf(depths);
 }
 
@@ -553,19 +530,16 @@ std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
   for (const auto &[id, landmark] : m_state->landmarks) {
     const auto seen = m_state->seen.find(id);
     const auto anchor = m_state->key_poses.find(landmark.anchor);
-    if (seen == m_state->seen.end() || anchor == m_state->key_poses.end() || landmark.information <= 0) {
+    if (seen == m_state->seen.end() || anchor == m_state->key_poses.end() || landmark.information <= 0)
       continue;
-    }
     const Pose cMa = m_state->wMc.inverse() * anchor->second;
     const Eigen::Vector3d y = cMa.R * landmark.xy.homogeneous() + landmark.inverse_depth * cMa.t;
-    if (y.z() < 0.05) {
+    if (y.z() < 0.05)
       continue;
-    }
     const double sigma = 1 / std::sqrt(landmark.information) / y.z();
     const double inverse_depth = landmark.inverse_depth / y.z();
-    if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma) {
+    if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma)
       depths.push_back({m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
-    }
   }
   std::sort(depths.begin(), depths.end(), [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });
   return depths;

@@ -99,9 +99,8 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
                                   m_state->camera.width, m_state->camera.height));
   }
   buildPyramid(current, kLevels, m_state->next);
-  if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
+  if (!m_state->pyramid.empty() && !m_state->tracks.empty())
     m_state->follow(aRb);
-  }
   m_state->replenish(current);
   m_state->pyramid.swap(m_state->next);
   ++m_state->frames;
@@ -121,9 +120,8 @@ PointTracker::State::search(const Start &start) const
     const cv::Point2f from = toCv(tracks[i].current());
     cv::Point2f to = start(tracks[i].current()), again = from;
     if (!followWindow(pyramid, next, from, to, there) || !camera.contains(toEigen(to), kMargin_px) ||
-        !followWindow(next, pyramid, to, again, back) || cv::norm(again - from) > kMostBackward_px) {
+        !followWindow(next, pyramid, to, again, back) || cv::norm(again - from) > kMostBackward_px)
       continue;
-    }
     places[i] = toEigen(to);
     ++found;
   }
@@ -148,9 +146,8 @@ void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
     PointTrack &track = tracks[i];
     if (!places[i])
       continue;
-    if (track.positions_px.size() >= static_cast<std::size_t>(PointTracker::kHistory)) {
+    if (track.positions_px.size() >= static_cast<std::size_t>(PointTracker::kHistory))
       track.positions_px.erase(track.positions_px.begin());
-    }
     track.positions_px.push_back(*places[i]);
     kept.push_back(std::move(track));
   }
@@ -160,9 +157,8 @@ void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
 void PointTracker::State::replenish(const cv::Mat &image)
 {
   int missing = kMostPoints - static_cast<int>(tracks.size());
-  if (missing <= kMostPoints / 6) {
+  if (missing <= kMostPoints / 6)
     return;
-  }
   response.create(image.size(), CV_32F);
   const double strongest = cornerResponse(image.ptr(), image.cols, image.rows, scratch, response.ptr<float>());
   const float threshold = float(std::max(kQuality * strongest, kLeastResponse));
@@ -196,9 +192,8 @@ void PointTracker::State::replenish(const cv::Mat &image)
       corners[cellOf(x, y)].push_back({r[x], {x, y}});
     }
   }
-  for (auto &cell : corners) {
+  for (auto &cell : corners)
     std::sort(cell.begin(), cell.end(), [](const Corner &a, const Corner &b) { return a.response < b.response; });
-  }
   // Fill the emptiest cells first, one corner a cell and round.
   for (int level = 0; missing > 0; ++level) {
     bool any_left = false;
@@ -207,9 +202,8 @@ void PointTracker::State::replenish(const cv::Mat &image)
       while (held[cell] <= level && !corners[cell].empty()) {
         const Corner corner = corners[cell].back();
         corners[cell].pop_back();
-        if (occupied.taken(corner.at) || roundness(next.front(), corner.at) < kLeastRoundness) {
+        if (occupied.taken(corner.at) || roundness(next.front(), corner.at) < kLeastRoundness)
           continue;
-        }
         PointTrack track;
         track.id = next_id++;
         track.response = corner.response;
@@ -221,9 +215,8 @@ void PointTracker::State::replenish(const cv::Mat &image)
         break;
       }
     }
-    if (!any_left) {
+    if (!any_left)
       break;
-    }
   }
 }
 
@@ -232,11 +225,9 @@ const std::vector<PointTrack> &PointTracker::tracks() const { return m_state->tr
 std::vector<PointMatch> PointTracker::matches(int frames_back) const
 {
   std::vector<PointMatch> matches;
-  for (const PointTrack &track : m_state->tracks) {
-    if (frames_back >= 1 && track.age() >= frames_back) {
+  for (const PointTrack &track : m_state->tracks)
+    if (frames_back >= 1 && track.age() >= frames_back)
       matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current(), track.id});
-    }
-  }
   return matches;
 }
 

@@ -67,9 +67,8 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
-    if (motion::parallaxOf(rays, start, sigma, motion::kKernel).score < 0) {
+    if (motion::parallaxOf(rays, start, sigma, motion::kKernel).score < 0)
       start.direction = -start.direction;
-    }
     fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
   }
   // Costs count in sigmas of the best fit's noise.
@@ -99,9 +98,8 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const MotionPrior prior(given);
   takePrior(estimate, given, prior);
   estimate.weights.assign(matches.size(), 0);
-  if (matches.size() < RelativePoseEstimate::kLeastMatches) {
+  if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return estimate;
-  }
   const double focal = std::sqrt(camera.fx * camera.fy);
   const double min_sigma = options.min_sigma_px / focal;
   const Rays rays(matches, camera);

@@ -46,9 +46,8 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
       }
       const double energy = xx + yy;
       const double coherence = std::hypot(xx - yy, 2 * xy) / std::max(1e-12, energy);
-      if (energy < kCell * kCell * kMinGradient * kMinGradient * 0.5 || coherence < kMinCoherence) {
+      if (energy < kCell * kCell * kMinGradient * kMinGradient * 0.5 || coherence < kMinCoherence)
         continue;
-      }
       const Eigen::Vector2d centre(mx / energy, my / energy);
       const double angle = 0.5 * std::atan2(2 * xy, xx - yy); // of the gradient: across the edge
       const Eigen::Vector2d along(-std::sin(angle), std::cos(angle));
@@ -56,9 +55,8 @@ std::vector<VerticalEdge> findEdges(const cv::Mat &grey, const PinholeCamera &ca
       const Eigen::Vector3d ray = camera.ray(centre);
       const Eigen::Vector2d zenith =
           Eigen::Vector2d(camera.fx * (up.x() - ray.x() * up.z()), camera.fy * (up.y() - ray.y() * up.z()));
-      if (std::abs(along.dot(zenith)) < std::cos(kMaxTilt) * zenith.norm()) {
+      if (std::abs(along.dot(zenith)) < std::cos(kMaxTilt) * zenith.norm())
         continue;
-      }
       const Eigen::Vector3d far = camera.ray(centre + 20 * along);
       edges.push_back({ray.cross(far).normalized(), ray.normalized()});
     }
@@ -142,9 +140,8 @@ VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const
 
 void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate)
 {
-  if (estimate.status != VerticalStatus::ok) {
+  if (estimate.status != VerticalStatus::ok)
     return;
-  }
   const Matrix32d B = wRc * directionBasis(estimate.up);
   const Eigen::Matrix3d information = B * estimate.covariance.inverse() * B.transpose();
   const Eigen::Vector3d seen = wRc * estimate.up;
