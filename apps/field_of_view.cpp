@@ -20,7 +20,7 @@ FieldOfView fieldOfView(const std::string &input, const SourceOptions &options, 
     if (frame.status != FrameStatus::ok)
       continue;
     tracker.track(frame.image);
-    focal.add(tracker, frame.stamp_ns);
+    focal.add(tracker);
   }
   const FocalEstimate estimate = focal.estimate();
   if (!estimate.known)

@@ -172,14 +172,6 @@ public:
 
 private:
   static double headingOf(const Pose &wMc) { return std::atan2(wMc.R(1, 2), wMc.R(0, 2)); }
-  /// Of twists (t, rotation): what aMb does to one of b, given in a.
-  static Matrix6d adjoint(const Pose &aMb)
-  {
-    Matrix6d A = Matrix6d::Zero();
-    A.topLeftCorner<3, 3>() = A.bottomRightCorner<3, 3>() = aMb.R;
-    A.topRightCorner<3, 3>() = skew(aMb.t) * aMb.R;
-    return A;
-  }
 
   const FollowArguments &m_arguments;
   vpMbTrunkTracker m_tracker;

@@ -22,7 +22,6 @@ public:
   /// Reads on to the next frame that can be used; false at the end.
   bool next()
   {
-    previous_image = frame.image;
     while (m_source.next(frame)) {
       if (frame.status != FrameStatus::ok) {
         m_estimator.reset();
@@ -39,7 +38,6 @@ public:
 
   Frame frame;
   Saliency saliency;
-  vpImage<unsigned char> previous_image;
 
 private:
   static constexpr double kGyroSigma = 6e-4;         // [rad] a frame and axis

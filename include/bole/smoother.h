@@ -188,10 +188,8 @@ public:
   Pose pose(std::size_t pose) const;
   /// Estimate of a trunk, in the world.
   Trunk trunk(std::size_t trunk) const;
-  bool hasTrunk(std::size_t trunk) const; ///< false once removed or merged away
   /// Poses added so far, closed ones included.
   std::size_t poseCount() const;
-  std::size_t trunkCount() const;       ///< ids handed out, removed ones included
   std::size_t observationCount() const; ///< summary factors in the graph
   /// Views of a trunk.
   std::size_t observationCount(std::size_t trunk) const;

@@ -79,7 +79,6 @@ void FlightFolder::write(const LiveFrame &frame)
     if (!(std::ofstream(part, std::ios::binary) << encodePng(image)).flush())
       throw vpException(vpException::ioError, part + ": cannot be written");
     fs::rename(part, fs::path(m_cam0) / "data" / name);
-    ++m_images;
   }
   append(m_images_csv, fmt::format("{},{}\n", stamp_ns, name));
 }

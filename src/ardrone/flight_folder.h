@@ -24,7 +24,6 @@ public:
   FlightFolder &operator=(const FlightFolder &) = delete;
 
   void write(const LiveFrame &frame);
-  std::size_t images() const { return m_images; }
 
 private:
   void append(int descriptor, const std::string &line);
@@ -33,6 +32,5 @@ private:
   int m_images_csv = -1, m_gyro_csv = -1, m_odometry_csv = -1;
   std::int64_t m_last_stamp_ns = -1, m_last_gyro_ns = -1;
   std::int64_t m_first_stamp_ns = -1;
-  std::size_t m_images = 0;
 };
 } // namespace bole

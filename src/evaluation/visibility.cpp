@@ -64,9 +64,12 @@ double hiddenShare(const std::vector<View> &views, std::size_t at)
 } // namespace
 
 std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
-                                             const Pose &bMc, const PinholeCamera &camera,
-                                             const VisibilityOptions &options)
+                                             const Pose &bMc, const PinholeCamera &camera)
 {
+  constexpr double kMaxRange = 8;         // [m], horizontal, from the camera to the axis
+  constexpr double kMaxHidden = 0.5;      // share of the trunk's width that nearer trunks may hide
+  constexpr std::size_t kMinFrames = 8;   // in which all of this holds
+  constexpr double kMinBearingChange = 3; // over those frames, in the world [degrees]
   struct Range
   {
     double first = 0, least = 0, most = 0;
@@ -80,7 +83,7 @@ std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trun
                    [&](const TruthTrunk &trunk) { return viewOf(trunk, wMc, camera); });
     for (std::size_t i = 0; i < trunks.size(); ++i) {
       const View &view = views[i];
-      if (!view.is_in_image || view.range > options.max_range || hiddenShare(views, i) >= options.max_hidden)
+      if (!view.is_in_image || view.range > kMaxRange || hiddenShare(views, i) >= kMaxHidden)
         continue;
       TrunkVisibility &seen = result[i];
       Range &range = bearings[i];
@@ -96,8 +99,7 @@ std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trun
   }
   for (std::size_t i = 0; i < trunks.size(); ++i) {
     result[i].bearing_change = (bearings[i].most - bearings[i].least) * 180 / M_PI;
-    result[i].is_expected =
-        result[i].frames >= options.min_frames && result[i].bearing_change >= options.min_bearing_change;
+    result[i].is_expected = result[i].frames >= kMinFrames && result[i].bearing_change >= kMinBearingChange;
   }
   return result;
 }

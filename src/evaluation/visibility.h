@@ -12,21 +12,14 @@
 
 namespace bole
 {
-/// When a trunk counts as a fair chance.
-struct VisibilityOptions
-{
-  double max_range = 8;          ///< [m], horizontal, from the camera to the axis
-  double max_hidden = 0.5;       ///< share of the trunk's width that nearer trunks may hide
-  std::size_t min_frames = 8;    ///< frames in which all of this holds
-  double min_bearing_change = 3; ///< [degrees], over those frames, in the world
-};
-
+/// What a fair chance is: a trunk stands within 8 m of the camera, at most half of its width is hidden by nearer
+/// trunks, in 8 frames or more over which its bearing changes by 3 degrees or more.
+///
 /// Sees every trunk of \p trunks from the true poses \p wMb of the frames.
 ///
 /// A trunk is inside the image when both of its borders are at the height of the camera; it is
 /// hidden as far as the bearings between its borders are covered by those of nearer trunks. Trunks
 /// without radius (far ones) neither hide nor are expected.
 std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
-                                             const Pose &bMc, const PinholeCamera &camera,
-                                             const VisibilityOptions &options = {});
+                                             const Pose &bMc, const PinholeCamera &camera);
 } // namespace bole

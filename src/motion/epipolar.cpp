@@ -11,21 +11,6 @@
 #include <cmath>
 #include <random>
 
-namespace bole
-{
-double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
-                       const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J)
-{
-  const motion::Epipolar epipolar({aRb, direction});
-  if (J == nullptr)
-    return epipolar.residual(x_a, x_b);
-  Vector5d gradient;
-  const double residual = epipolar.residual(x_a, x_b, gradient);
-  *J = gradient.transpose();
-  return residual;
-}
-} // namespace bole
-
 namespace bole::motion
 {
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)

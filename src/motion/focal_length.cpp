@@ -93,11 +93,11 @@ FocalFinder::FocalFinder(const PinholeCamera &guess) : m_guess(guess)
     m_odometry.emplace_back(withFocal(guess, std::exp(logFactor(k))), false);
 }
 
-void FocalFinder::add(const PointTracker &tracker, std::int64_t stamp_ns)
+void FocalFinder::add(const PointTracker &tracker)
 {
   std::vector<PointOdometryResult> placed;
   for (PointOdometry &odometry : m_odometry)
-    placed.push_back(odometry.process(tracker, stamp_ns));
+    placed.push_back(odometry.process(tracker));
   std::vector<double> costs = costsOf(placed);
   if (!costs.empty())
     m_flown.push_back(std::move(costs));

@@ -33,7 +33,7 @@ public:
   explicit FocalFinder(const PinholeCamera &guess);
 
   /// Takes in the current frame of \p tracker.
-  void add(const PointTracker &tracker, std::int64_t stamp_ns);
+  void add(const PointTracker &tracker);
   FocalEstimate estimate() const;
 
 private:

@@ -45,7 +45,6 @@ struct Landmark
 /// A frame as it hangs on its key frame.
 struct Record
 {
-  std::int64_t stamp_ns = 0;
   std::size_t key = 0; ///< frame index of the key frame
   Pose keyMc;
   PointOdometryStatus status = PointOdometryStatus::starting;
@@ -112,8 +111,7 @@ PointOdometry::~PointOdometry() = default;
 PointOdometry::PointOdometry(PointOdometry &&) noexcept = default;
 PointOdometry &PointOdometry::operator=(PointOdometry &&) noexcept = default;
 
-PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int64_t stamp_ns,
-                                           const std::optional<GyroRotation> &turned)
+PointOdometryResult PointOdometry::process(const PointTracker &tracker, const std::optional<GyroRotation> &turned)
 {
   State &state = *m_state;
   const Pose before = state.wMc;
@@ -124,9 +122,7 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, std::int
     state.turned = state.turned ? state.turned->then(*turned) : *turned;
   else
     state.turned.reset();
-  Record record;
-  record.stamp_ns = stamp_ns;
-  state.records.push_back(record);
+  state.records.emplace_back();
   if (turned)
     state.velocity.R = turned->R;
   else if (state.started)
@@ -519,7 +515,7 @@ std::vector<PlacedFrame> PointOdometry::trajectory() const
   for (const Record &record : m_state->records) {
     const auto key = m_state->key_poses.find(record.key);
     const Pose wMk = key == m_state->key_poses.end() ? Pose() : key->second;
-    placed.push_back({record.stamp_ns, wMk * record.keyMc, record.status});
+    placed.push_back({wMk * record.keyMc, record.status});
   }
   return placed;
 }

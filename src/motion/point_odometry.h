@@ -60,7 +60,6 @@ struct PointOdometryResult
 /// Where a frame was, after all that was learnt later.
 struct PlacedFrame
 {
-  std::int64_t stamp_ns = 0;
   Pose wMc;
   PointOdometryStatus status = PointOdometryStatus::starting;
 };
@@ -77,8 +76,7 @@ public:
 
   /// Places the current frame of \p tracker. \p turned: rotation of the *camera* since the frame
   /// before (gyro), where there is one.
-  PointOdometryResult process(const PointTracker &tracker, std::int64_t stamp_ns,
-                              const std::optional<GyroRotation> &turned = std::nullopt);
+  PointOdometryResult process(const PointTracker &tracker, const std::optional<GyroRotation> &turned = std::nullopt);
 
   /// All frames so far; those before the start are placed once the first baseline is known.
   std::vector<PlacedFrame> trajectory() const;

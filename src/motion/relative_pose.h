@@ -18,7 +18,7 @@
 /// [rad] in the tangent plane of the direction: directionPlus(direction, tau) in the basis
 /// directionBasis(direction).
 ///
-/// Laws (each a test): the Jacobian of sampsonResidual() agrees with central differences; exact
+/// Laws (each a test): the Jacobian of Sampson's distance agrees with central differences; exact
 /// matches give the exact motion; swapping a and b inverts it; a camera that only turns gets the
 /// rotation and the status no_parallax.
 ///
@@ -79,11 +79,6 @@ struct RelativePoseEstimate
   bool hasRotation() const { return status == RelativePoseStatus::ok || status == RelativePoseStatus::no_parallax; }
   bool hasDirection() const { return status == RelativePoseStatus::ok; }
 };
-
-/// Sampson's distance [normalised image units] of the match (x_a, x_b), both (x, y, 1), from the
-/// epipolar geometry of (aRb, direction). \p J 1x5 by (phi, tau), or nullptr.
-double sampsonResidual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, const Eigen::Matrix3d &aRb,
-                       const Eigen::Vector3d &direction, Eigen::Matrix<double, 1, 5> *J = nullptr);
 
 /// The motion between the frames of \p matches. Never throws on data; see the status.
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,

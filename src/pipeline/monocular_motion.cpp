@@ -82,7 +82,7 @@ PosePrior MonocularMotion::first(const Frame &frame)
 /// Places the frame by its points, and asks it for the direction of gravity and for its height.
 PointOdometryResult MonocularMotion::place(const Frame &frame, const std::optional<GyroRotation> &rotated)
 {
-  const PointOdometryResult placed = m_odometry.process(m_points.tracker(), frame.stamp_ns, rotated);
+  const PointOdometryResult placed = m_odometry.process(m_points.tracker(), rotated);
   m_pointsMc = placed.wMc;
   m_placed.push_back(m_frame);
   const VerticalEstimate vertical = m_verticals.find(frame.image, m_camera, placed.wMc.R, up());

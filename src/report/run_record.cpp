@@ -40,14 +40,12 @@ void readSummaryInto(RunRecord &run, const std::string &path)
     run.input = textOf(json["input"], "source");
     run.sha256 = textOf(json["input"], "sha256");
     run.note = textOf(json["input"], "note");
-    run.preset = textOf(json, "preset");
     run.working_folder = textOf(json, "working_folder");
     run.command = json.value("command", run.command);
     run.facts = json.value("facts", run.facts);
     run.doubts = json.value("doubts", run.doubts);
     run.versions = json.value("versions", run.versions);
     run.is_trusted = json.value("trusted", true);
-    run.is_complete = json.value("complete", true);
     run.has_ranges = json.value("ranges", true);
     for (const Json &sensor : json.value("sensors", Json::array()))
       run.sensors.push_back(

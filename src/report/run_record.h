@@ -19,11 +19,11 @@ namespace bole
 {
 struct RunRecord
 {
-  std::string folder, input, working_folder, note, sha256, preset;
+  std::string folder, input, working_folder, note, sha256;
   std::vector<std::string> command, facts, doubts;
   std::map<std::string, std::string> versions;
   std::vector<SensorVerdict> sensors;
-  bool is_trusted = true, is_complete = true, has_ranges = true, has_video = false;
+  bool is_trusted = true, has_ranges = true, has_video = false;
   std::string map_svg;             ///< the picture of a run without ranges
   std::vector<TrunkRecord> trunks; ///< and hypotheses
   std::map<int, std::string> views_jpeg;

@@ -20,10 +20,4 @@ FlowMatrix translationFlowMatrix(const PinholeCamera &camera, const Eigen::Vecto
   A << -camera.fx, 0, camera.fx * ray.x(), 0, -camera.fy, camera.fy * ray.y();
   return A;
 }
-
-Eigen::Vector2d previousPixel(const PinholeCamera &camera, const Pose &pMc, const Eigen::Vector2d &u_px,
-                              double inverse_depth)
-{
-  return camera.project(pMc.R * camera.ray(u_px) + inverse_depth * pMc.t);
-}
 } // namespace bole

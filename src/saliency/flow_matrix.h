@@ -8,12 +8,11 @@
 /// order. The camera's turn is pRc = Exp(omega), p the previous and c the current camera.
 ///
 /// Laws (each a test): V == f times the rotational block of vpFeaturePoint::interaction(), A / Z == f times its
-/// translational block; V and A are the derivatives of previousPixel() at no motion, with the sign turned.
+/// translational block; V and A are the derivatives of the exact warp at no motion, with the sign turned.
 ///
 /// Deviation: Eq. 14 has one focal length; V here has fx and fy and is Eq. 14 where they are equal.
 
 #include <bole/camera.h>
-#include <bole/pose.h>
 
 namespace bole
 {
@@ -24,9 +23,4 @@ FlowMatrix flowMatrix(const PinholeCamera &camera, const Eigen::Vector2d &u_px);
 
 /// A [px]: flow A t / Z of a translation of the camera t at depth Z.
 FlowMatrix translationFlowMatrix(const PinholeCamera &camera, const Eigen::Vector2d &u_px);
-
-/// Where the point that is now at pixel \p u_px with inverse depth \p inverse_depth [1/m] was in the previous image;
-/// exact for any rotation. \p pMc is the current camera in the previous one.
-Eigen::Vector2d previousPixel(const PinholeCamera &camera, const Pose &pMc, const Eigen::Vector2d &u_px,
-                              double inverse_depth);
 } // namespace bole

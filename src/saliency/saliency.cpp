@@ -214,7 +214,6 @@ SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByRange(const ImagePyram
   m_evidence.predict(m_views[1].vMc.inverse() * m_views[0].vMc);
   for (std::size_t apart = 1; apart < m_views.size(); ++apart) {
     const Pose oMc = m_views[apart].vMc.inverse() * m_views[0].vMc;
-    result.frames_apart = static_cast<int>(apart);
     result.parallax_px = medianParallax(m_camera, oMc, m_options.near_range);
     if (result.parallax_px < kEnoughParallax_px && apart + 1 < m_views.size())
       continue;

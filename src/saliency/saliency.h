@@ -55,7 +55,6 @@ struct Saliency
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< right perturbation of pRc [rad^2]
   bool asks_for_range = false; ///< labels mean "nearer than near_range"; else "moves unlike the background"
   double parallax_px = 0;      ///< of the pair of frames used, at near_range
-  int frames_apart = 0;        ///< of the pair of frames used
   int iterations = 0;
   double unknown_share = 1; ///< of the pixels
   float unknown_below = 0;  ///< confidence under which a pixel is unknown

@@ -193,13 +193,7 @@ Trunk Smoother::trunk(std::size_t trunk) const
   return m_state->estimate(m_state->trunks[trunk]);
 }
 
-bool Smoother::hasTrunk(std::size_t trunk) const
-{
-  return trunk < m_state->trunks.size() && !m_state->trunks[trunk].removed;
-}
-
 std::size_t Smoother::poseCount() const { return m_state->poses.size(); }
-std::size_t Smoother::trunkCount() const { return m_state->trunks.size(); }
 std::size_t Smoother::observationCount() const { return m_state->live_observations; }
 
 std::size_t Smoother::observationCount(std::size_t trunk) const

@@ -149,7 +149,7 @@ void comparePaths(const Flight &flight)
     const double t0 = threadTime();
     tracker.track(frame.image);
     const double t1 = threadTime();
-    const auto placed = odometry.process(tracker, frame.stamp_ns);
+    const auto placed = odometry.process(tracker);
     const double t2 = threadTime();
     vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, flight.camera, placed.wMc.R, std::nullopt));
     const double t3 = threadTime();
@@ -193,7 +193,7 @@ void plainVideo(const std::string &path)
       continue;
     }
     tracker.track(frame.image);
-    const auto placed = odometry.process(tracker, frame.stamp_ns);
+    const auto placed = odometry.process(tracker);
     vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, source->camera(), placed.wMc.R, std::nullopt));
     ++statuses[toString(placed.status)];
     fmt::print("{:6.2f} s {:13} {:3} points, sigma {:.2f} px, at {:7.3f} {:7.3f} {:7.3f}, turned "

@@ -28,7 +28,7 @@ template <typename PoseOf> FocalEstimate estimateOf(double off, PoseOf poseOf)
   FocalFinder focal(guess);
   for (int k = 0; k < 40; ++k) {
     tracker.track(drawWalls(camera, poseOf(k)));
-    focal.add(tracker, k * 100000000LL);
+    focal.add(tracker);
   }
   return focal.estimate();
 }
@@ -53,7 +53,7 @@ TEST(FocalLength, AFlightThroughAWoodTellsItFromAGuessThatIsOffByAThird)
     FocalFinder focal(guess);
     for (Frame frame; source->next(frame);) {
       tracker.track(frame.image);
-      focal.add(tracker, frame.stamp_ns);
+      focal.add(tracker);
     }
     const FocalEstimate estimate = focal.estimate();
     ASSERT_TRUE(estimate.known) << off;

@@ -30,7 +30,7 @@ TEST(PointOdometry, KeepsItsUnitOfLengthAlongThePath)
   for (int k = 0; k < 24; ++k) {
     truth.push_back({expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0.1 * std::sin(0.3 * k), 0.04 * k}});
     tracker.track(drawWalls(kCamera, truth.back()));
-    odometry.process(tracker, k * 100000000LL);
+    odometry.process(tracker);
   }
   const auto path = odometry.trajectory();
   ASSERT_EQ(path.size(), truth.size());
@@ -62,7 +62,7 @@ TEST(PointOdometry, ASwingOfTheCameraCostsItNoUnit)
     const double turned = k < 12 || k >= 20 ? 0 : yaw[k - 12];
     truth = {expSo3({0, turned, 0}), {0.1 * k, 0, 0.04 * k}};
     tracker.track(drawWalls(kCamera, truth));
-    const auto result = odometry.process(tracker, k * 100000000LL);
+    const auto result = odometry.process(tracker);
     EXPECT_LT(logSo3(result.wMc.R.transpose() * truth.R).norm(), 0.02) << k;
   }
   const auto path = odometry.trajectory();
@@ -77,7 +77,7 @@ TEST(PointOdometry, ACameraThatOnlyTurnsNeverGetsAUnitOfLength)
   for (int k = 0; k < 15; ++k) {
     const Pose pose{expSo3({0, 0.01 * k, 0.002 * k}), {0, 0, 0}};
     tracker.track(drawWalls(kCamera, pose));
-    const auto result = odometry.process(tracker, k * 100000000LL);
+    const auto result = odometry.process(tracker);
     EXPECT_EQ(result.status, PointOdometryStatus::starting) << k;
     EXPECT_LT(logSo3(result.wMc.R.transpose() * pose.R).norm(), 2e-3) << k;
     EXPECT_EQ(result.wMc.t.norm(), 0) << k;
@@ -94,13 +94,13 @@ TEST(PointOdometry, LosesItsPointsWithoutMakingAnythingUp)
   PointOdometryResult result;
   for (int k = 0; k < 10; ++k) {
     tracker.track(drawWalls(kCamera, {Eigen::Matrix3d::Identity(), {0.1 * k, 0, 0}}));
-    result = odometry.process(tracker, k * 100000000LL);
+    result = odometry.process(tracker);
   }
   EXPECT_EQ(result.status, PointOdometryStatus::ok);
   const vpImage<unsigned char> white(240, 320, 250);
   for (int k = 10; k < 25; ++k) {
     tracker.track(white);
-    result = odometry.process(tracker, k * 100000000LL);
+    result = odometry.process(tracker);
     EXPECT_EQ(result.status, PointOdometryStatus::lost);
     EXPECT_TRUE(result.wMc.isFinite());
     EXPECT_GE(result.covariance(0, 0), 1);
@@ -121,7 +121,7 @@ TEST(PointOdometry, PlacesTheRenderedFlightsWithinTwoPercentOfTheirPath)
   double length = 0;
   while (source.next(frame)) {
     tracker.track(frame.image);
-    odometry.process(tracker, frame.stamp_ns);
+    odometry.process(tracker);
     truth.push_back((*frame.wMb_truth * source.bMc()).t);
     length += truth.size() > 1 ? (truth.back() - truth[truth.size() - 2]).norm() : 0;
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "synthetic.h"
 
+#include "motion/epipolar.h"
+
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
@@ -16,14 +18,14 @@ double jacobianError(double step)
 {
   const Pose aMb = typicalMotion();
   const Eigen::Vector3d d = aMb.t.normalized(), x_a = kCamera.ray({200, 80}), x_b = kCamera.ray({190, 85});
-  Eigen::Matrix<double, 1, 5> J;
-  sampsonResidual(x_a, x_b, aMb.R, d, &J);
+  Vector5d J;
+  motion::Epipolar({aMb.R, d}).residual(x_a, x_b, J);
   double worst = 0;
   for (int i = 0; i < 5; ++i) {
     Vector5d xi = Vector5d::Zero();
     xi[i] = step;
     const auto at = [&](const Vector5d &x) {
-      return sampsonResidual(x_a, x_b, aMb.R * expSo3(x.head<3>()), directionPlus(d, x.tail<2>()));
+      return motion::Epipolar({aMb.R * expSo3(x.head<3>()), directionPlus(d, x.tail<2>())}).residual(x_a, x_b);
     };
     worst = std::max(worst, std::abs((at(xi) - at(-xi)) / (2 * step) - J[i]));
   }
@@ -43,10 +45,11 @@ TEST(SampsonResidual, IsTheNoiseOfOneImageCoordinate)
   options.points = 4000;
   options.noise_px = 0.2;
   const Pose aMb = typicalMotion();
+  const motion::Epipolar epipolar({aMb.R, aMb.t.normalized()});
   double sum = 0;
   const auto matches = cloudMatches(kCamera, aMb, options);
   for (const auto &match : matches) {
-    const double r = sampsonResidual(kCamera.ray(match.a_px), kCamera.ray(match.b_px), aMb.R, aMb.t.normalized());
+    const double r = epipolar.residual(kCamera.ray(match.a_px), kCamera.ray(match.b_px));
     sum += r * r;
   }
   EXPECT_NEAR(std::sqrt(sum / double(matches.size())) * kCamera.fx, 0.2, 0.01);

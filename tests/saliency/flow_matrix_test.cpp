@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
 #include "saliency/flow_matrix.h"
+#include <bole/pose.h>
 
 #include <gtest/gtest.h>
 #include <visp3/visual_features/vpFeaturePoint.h>
@@ -37,6 +38,12 @@ TEST(FlowMatrix, IsEquation14InPixelsFromTheCentre)
   EXPECT_LT((V - printed / f).norm(), 1e-9);
 }
 
+/// Where the point that is now at pixel \p u with inverse depth \p rho was in the image of the camera p.
+Eigen::Vector2d previousPixel(const Pose &pMc, const Eigen::Vector2d &u, double rho)
+{
+  return kCamera.project(pMc.R * kCamera.ray(u) + rho * pMc.t);
+}
+
 TEST(FlowMatrix, IsTheDerivativeOfTheWarpWithTheSignTurned)
 {
   const Eigen::Vector2d u(250, 60);
@@ -47,10 +54,10 @@ TEST(FlowMatrix, IsTheDerivativeOfTheWarpWithTheSignTurned)
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(k);
       const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-      V.col(k) = -(previousPixel(kCamera, Pose(expSo3(d), {0, 0, 0}), u, rho) -
-                   previousPixel(kCamera, Pose(expSo3(-d), {0, 0, 0}), u, rho)) /
-                 (2 * h);
-      A.col(k) = -(previousPixel(kCamera, Pose(I, d), u, rho) - previousPixel(kCamera, Pose(I, -d), u, rho)) / (2 * h);
+      V.col(k) =
+          -(previousPixel(Pose(expSo3(d), {0, 0, 0}), u, rho) - previousPixel(Pose(expSo3(-d), {0, 0, 0}), u, rho)) /
+          (2 * h);
+      A.col(k) = -(previousPixel(Pose(I, d), u, rho) - previousPixel(Pose(I, -d), u, rho)) / (2 * h);
     }
     const double error = (V - flowMatrix(kCamera, u)).norm() + (A - rho * translationFlowMatrix(kCamera, u)).norm();
     EXPECT_LT(error, 1e-2);

@@ -254,8 +254,7 @@ struct ArDroneEmulator::State
     count(counter);
     if (options.loss > 0 && chance() < options.loss)
       return count(&Counters::lost);
-    const bool may = port == Port::video ? options.corrupt_video : options.corrupt_navdata;
-    if (may && options.corrupt > 0 && chance() < options.corrupt) {
+    if (options.corrupt > 0 && chance() < options.corrupt) {
       const int changes = std::uniform_int_distribution<int>(1, 4)(random);
       for (int i = 0; i < changes; ++i)
         bytes[std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(random)] ^=

@@ -75,10 +75,9 @@ public:
     double bit_rate = 1.3e6; ///< [bit/s], [1e4, 1e8]: of a captured stream of an AR.Drone 2; its most is 4e6
     int key_interval = 15;   ///< frames, [1, 300]; 15 on the drone
     // Faults.
-    double loss = 0;     ///< share of datagrams and TCP frames that are not sent, [0, 1)
-    double jitter_s = 0; ///< [s], [0, 1]: random extra delay of each packet; datagrams overtake
-    double corrupt = 0;  ///< share of packets with one to four bytes changed, [0, 1)
-    bool corrupt_navdata = true, corrupt_video = true;
+    double loss = 0;         ///< share of datagrams and TCP frames that are not sent, [0, 1)
+    double jitter_s = 0;     ///< [s], [0, 1]: random extra delay of each packet; datagrams overtake
+    double corrupt = 0;      ///< share of packets with one to four bytes changed, [0, 1)
     double reboot_at_s = -1; ///< flight time of a reboot: silence, then clocks and numbers from zero; < 0: none
     double reboot_for_s = 1; ///< [s] of silence
     double freeze_at_s = -1; ///< flight time from which the camera sends the same picture; < 0: never
