@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "data_files.h"
-#include "suggestion.h"
+
+#include "input/suggestion.h"
 
 #include <algorithm>
 #include <bole/visp.h>
@@ -64,7 +65,7 @@ std::string findPreset(const std::string &name)
     if (entry.path().extension() == ".yaml")
       names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
-  const std::string meant = nearest(fs::path(name).stem().string(), names);
+  const std::string meant = nearestWord(fs::path(name).stem().string(), names);
   throw vpException(vpException::ioError,
                     fmt::format("--config {}: no such file, and no preset of that name{}; presets: {}", name,
                                 meant.empty() ? "" : fmt::format(" (did you mean {}?)", meant),

@@ -2,8 +2,8 @@
 // The command `bole`: one subcommand a file, see commands.h.
 #include "command_module.h"
 #include "commands.h"
-#include "suggestion.h"
 
+#include "input/suggestion.h"
 #include "output/versions.h"
 
 #include <algorithm>
@@ -73,7 +73,7 @@ std::vector<std::string> optionsOf(const CLI::App &command)
 
 void sayUnknown(const std::string &word, const char *kind, const std::vector<std::string> &known)
 {
-  const std::string name = word.substr(0, word.find('=')), meant = nearest(name, known);
+  const std::string name = word.substr(0, word.find('=')), meant = nearestWord(name, known);
   std::fprintf(stderr, "bole: %s: no such %s%s\n", name.c_str(), kind,
                meant.empty() ? "" : (", did you mean " + meant + "?").c_str());
 }

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/config.h>
 
+#include "input/suggestion.h"
 #include "input/yaml_file.h"
 #include "pipeline/option_table.h"
 
 #include <algorithm>
 #include <bole/visp.h>
 #include <fmt/format.h>
-#include <numeric>
 #include <set>
-#include <utility>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -18,33 +17,10 @@ namespace
 {
 [[noreturn]] void fail(const std::string &message) { throw vpException(vpException::badValue, "%s", message.c_str()); }
 
-/// Letters to insert, delete or replace to make \p b of \p a (Levenshtein).
-std::size_t editDistance(const std::string &a, const std::string &b)
-{
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t(0));
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
-
 /// "; did you mean ...?" with the nearest of \p names, or where to look where none is near.
 std::string suggestion(const std::string &wrong, const std::set<std::string> &names)
 {
-  constexpr std::size_t kLongest = 60; // no name is longer
-  std::string nearest;
-  std::size_t least = std::max<std::size_t>(2, wrong.size() / 3) + 1;
-  for (const std::string &name : names)
-    if (const std::size_t distance = editDistance(wrong.substr(0, kLongest), name); distance < least) {
-      least = distance;
-      nearest = name;
-    }
+  const std::string nearest = nearestWord(wrong, {names.begin(), names.end()});
   return nearest.empty() ? "; bole options lists them" : fmt::format("; did you mean {}?", nearest);
 }
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "suggestion.h"
+#include "input/suggestion.h"
 
 #include <algorithm>
 
-namespace bole::apps
+namespace bole
 {
+namespace
+{
+/// Insertions, deletions, replacements and swaps of neighbours that lead from \p a to \p b.
 std::size_t editDistance(const std::string &a, const std::string &b)
 {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
@@ -20,16 +23,19 @@ std::size_t editDistance(const std::string &a, const std::string &b)
     }
   return d[a.size()][b.size()];
 }
+} // namespace
 
-std::string nearest(const std::string &word, const std::vector<std::string> &known)
+std::string nearestWord(const std::string &word, const std::vector<std::string> &known)
 {
+  constexpr std::size_t kLongest = 60; // none of ours is longer
+  const std::string start = word.substr(0, kLongest);
   std::string best;
   std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string &candidate : known)
-    if (const std::size_t distance = editDistance(word, candidate); distance < least) {
+    if (const std::size_t distance = editDistance(start, candidate); distance < least) {
       least = distance;
       best = candidate;
     }
   return best;
 }
-} // namespace bole::apps
+} // namespace bole
