@@ -5,7 +5,6 @@
 #include "output/palette.h"
 #include "output/svg.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -107,17 +106,6 @@ void drawGrid(SvgDrawing &drawing, const Sheet &sheet)
   }
 }
 
-std::string ellipse(const Sheet &sheet, const TrunkRecord &trunk)
-{
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(trunk.covarianceXy());
-  const Eigen::Vector2d axes = 2 * eigen.eigenvalues().cwiseMax(0).cwiseSqrt() * kPixelsPerMetre;
-  const Eigen::Vector2d major = eigen.eigenvectors().col(1);
-  return fmt::format("<ellipse cx=\"0\" cy=\"0\" rx=\"{0:.1f}\" ry=\"{1:.1f}\" transform=\"translate({2:.1f} {3:.1f}) "
-                     "rotate({4:.1f})\" fill=\"{5}\" fill-opacity=\".15\" stroke=\"{5}\" stroke-opacity=\".6\"/>\n",
-                     axes(1), axes(0), sheet.x(trunk.xy.x()), sheet.y(trunk.xy.y()),
-                     -std::atan2(major.y(), major.x()) * 180 / M_PI, palette::kVermilion);
-}
-
 void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &record)
 {
   const double x = sheet.x(record.xy.x()), y = sheet.y(record.xy.y()), r = record.radius * kPixelsPerMetre;
@@ -125,7 +113,7 @@ void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &recor
     drawing.circle(x, y, r, "none", fmt::format("stroke=\"{}\"", palette::kOrange));
   if (record.status != TrunkStatus::confirmed)
     return;
-  drawing.add(ellipse(sheet, record));
+  drawing.add(sigmaEllipse(x, y, record.covarianceXy(), kPixelsPerMetre, palette::kVermilion));
   drawing.circle(x, y, r, palette::kVermilion, "fill-opacity=\".75\"");
 }
 

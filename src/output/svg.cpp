@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/svg.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -86,6 +87,16 @@ SvgPoints SvgAxes::operator()(const SvgPoints &values) const
   for (const auto &[u, v] : values)
     points.emplace_back(x(u), y(v));
   return points;
+}
+
+std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, double scale, const char *colour)
+{
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
+  const Eigen::Vector2d axes = 2 * scale * eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector2d major = eigen.eigenvectors().col(1);
+  return fmt::format("<ellipse rx=\"{0:.1f}\" ry=\"{1:.1f}\" transform=\"translate({2:.1f} {3:.1f}) rotate({4:.1f})\" "
+                     "fill=\"{5}\" fill-opacity=\".15\" stroke=\"{5}\" stroke-opacity=\".6\"/>\n",
+                     axes(1), axes(0), x, y, -std::atan2(major.y(), major.x()) * 180 / M_PI, colour);
 }
 
 std::vector<double> ticksBetween(double low, double high)

@@ -3,6 +3,8 @@
 /// \file
 /// Drawings and charts as SVG text: the one hand that all plots are drawn by.
 
+#include <Eigen/Core>
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,6 +50,10 @@ struct SvgAxes
   void draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,
             const std::string &x_unit = {}) const;
 };
+
+/// Two sigma of \p covariance round the point (\p x, \p y) of the drawing, \p scale px for one of its units; its second
+/// axis points up.
+std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, double scale, const char *colour);
 
 /// Values of ticks between \p low and \p high, about five.
 std::vector<double> ticksBetween(double low, double high);

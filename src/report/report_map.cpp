@@ -4,7 +4,6 @@
 #include "output/palette.h"
 #include "output/svg.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -42,16 +41,9 @@ std::string polyline(const Trajectory &trajectory, const char *colour, const cha
   return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" {}/>\n", points, colour, style);
 }
 
-/// Two sigma.
 std::string ellipse(const Eigen::Vector2d &at, const Eigen::Matrix2d &covariance, const char *colour)
 {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
-  const Eigen::Vector2d axes = 2 * kUnits * eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
-  const Eigen::Vector2d major = eigen.eigenvectors().col(1);
-  return fmt::format("<ellipse rx=\"{:.1f}\" ry=\"{:.1f}\" transform=\"translate({:.1f} {:.1f}) rotate({:.1f})\" "
-                     "fill=\"{}\" fill-opacity=\".15\" stroke=\"{}\" stroke-opacity=\".6\"/>\n",
-                     axes(1), axes(0), kUnits * at.x(), -kUnits * at.y(),
-                     -std::atan2(major.y(), major.x()) * 180 / M_PI, colour, colour);
+  return sigmaEllipse(kUnits * at.x(), -kUnits * at.y(), covariance, kUnits, colour);
 }
 
 std::string circle(const Eigen::Vector2d &at, double radius, const std::string &style)

@@ -4,7 +4,7 @@
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 #include "input/asl_source.h"
-#include "input/csv_reader.h"
+#include "input/truth.h"
 
 #include <Eigen/Dense>
 
@@ -22,7 +22,6 @@ using Eigen::Vector3d;
 
 namespace
 {
-
 Eigen::Matrix3d turned(double yaw) { return expSo3({0, 0, yaw}); }
 
 /// Attitude of a body that looks forward along the camera's axis with its z up in a level camera.
@@ -33,19 +32,18 @@ Eigen::Matrix3d forwardBody()
   return bRc;
 }
 
-std::vector<Cylinder> readTrees(const std::string &path, double height_m)
+/// Upright cylinders from 0.1 to 4 m over the ground; far trunks, whose radius is not known, are none.
+std::vector<Cylinder> readTrees(const std::string &folder)
 {
   std::vector<Cylinder> trunks;
-  CsvReader csv(path, {5, ',', "id,x [m],y [m],radius [m],lean [deg]"});
-  while (csv.next()) {
+  for (const TruthTrunk &truth : readTruthTrunks(folder)) {
+    if (truth.radius <= 0)
+      continue;
     Cylinder trunk;
-    trunk.name = "tree " + std::string(csv.text(0));
-    const double x = csv.number(1, "x"), y = csv.number(2, "y");
-    trunk.foot = {x, y, 0.1};
-    trunk.top = {x, y, height_m};
-    trunk.radius = csv.number(3, "radius");
-    if (!(trunk.radius > 0))
-      csv.fail("radius must be above 0");
+    trunk.name = fmt::format("tree {}", truth.id);
+    trunk.foot = {truth.xy.x(), truth.xy.y(), 0.1};
+    trunk.top = {truth.xy.x(), truth.xy.y(), 4};
+    trunk.radius = truth.radius;
     trunks.push_back(trunk);
   }
   return trunks;
@@ -95,13 +93,13 @@ Matrix6d TestFlight::predictedCovariance(const Pose &predicted, const Pose &cMo_
   return ((carry * before * carry.transpose() + step).inverse() + known).inverse();
 }
 
-TestFlight readAslFlight(const std::string &folder, double height_m)
+TestFlight readAslFlight(const std::string &folder)
 {
   AslSource source(folder);
   TestFlight flight;
   flight.name = source.name();
   flight.camera = source.camera();
-  flight.trunks = readTrees((fs::path(folder) / "trees.csv").string(), height_m);
+  flight.trunks = readTrees(folder);
   const Pose bMc = source.bMc();
   // the pose filter of the rendered flights: drifts by 1.2 cm a frame in the plane and slowly in yaw; its height
   // (1.9 cm) and attitude (0.23 degrees) are noisy but do not drift

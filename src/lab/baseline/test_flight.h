@@ -51,9 +51,9 @@ struct TestFlight
 };
 
 /// Reads an ASL folder with truth and `trees.csv` (id, x, y, radius at 1.3 m, lean). Trunks are upright
-/// cylinders from 0.1 m to \p height_m over the ground.
+/// cylinders from 0.1 m to 4 m over the ground.
 /// \throw vpException naming file and line.
-TestFlight readAslFlight(const std::string &folder, double height_m = 4);
+TestFlight readAslFlight(const std::string &folder);
 
 /// ViSP's real cube-and-cylinder sequence (visp-images-data, `mbt/cube`): the object frame is the cube's, the
 /// true pose that of ViSP's tracker on the *cube*, the odometry the same motion with added noise (seeded), the
