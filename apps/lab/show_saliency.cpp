@@ -2,9 +2,10 @@
 // bole show-saliency: the basis flows (Fig. 5 of the paper) and saliency beside its images (Fig. 8).
 #include "basis_flows.h"
 #include "commands.h"
-#include "saliency_run.h"
 
 #include "output/atomic_file.h"
+#include <bole/open_source.h>
+#include <bole/pipeline.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -24,7 +25,7 @@ struct ShowArguments
 };
 
 /// Image left, saliency right: white is near, black far, grey unknown.
-vpImage<unsigned char> beside(const vpImage<unsigned char> &image, const Saliency &saliency)
+vpImage<unsigned char> beside(const vpImage<unsigned char> &image, const SaliencyField &saliency)
 {
   vpImage<unsigned char> both(image.getHeight(), 2 * image.getWidth());
   for (unsigned v = 0; v < image.getHeight(); ++v)
@@ -41,19 +42,20 @@ void show(const ShowArguments &arguments)
   const auto source = openSource(arguments.sequence);
   std::filesystem::create_directories(arguments.output);
   writeAtomically(arguments.output + "/basis-flows.svg", basisFlowsSvg(source->camera()));
-  SaliencyRun run(*source, {});
+  Options options;
+  options.camera.compressed = source->isCompressed();
+  options.stages.final_pass = false;
+  Pipeline pipeline(source->camera(), source->bMc(), options);
   int pictures = 0;
-  while (run.next()) {
-    const int index = static_cast<int>(run.frame.index);
-    if (index < arguments.first || (index - arguments.first) % arguments.every != 0)
+  for (Frame frame; source->next(frame);) {
+    const FrameReport report = pipeline.process(frame);
+    const int index = static_cast<int>(frame.index);
+    if (!report.saliency || index < arguments.first || (index - arguments.first) % arguments.every != 0)
       continue;
-    const std::string path = fmt::format("{}/saliency-{:05d}.png", arguments.output, index);
-    const std::string part = fmt::format("{}/.part-{:05d}.png", arguments.output, index);
-    vpImageIo::write(beside(run.frame.image, run.saliency), part);
-    std::filesystem::rename(part, path);
-    std::printf("%s: %s, %s, %.0f %% unknown\n", path.c_str(), toString(run.saliency.status),
-                run.saliency.asks_for_range ? "nearer than 6 m" : "moves unlike the background",
-                100 * run.saliency.unknown_share);
+    AtomicFile file(fmt::format("{}/saliency-{:05d}.png", arguments.output, index));
+    vpImageIo::write(beside(frame.image, *report.saliency), file.temporaryPath());
+    file.commit();
+    std::printf("%s\n", file.path().c_str());
     ++pictures;
   }
   std::printf("%d pictures and basis-flows.svg in %s\n", pictures, arguments.output.c_str());
