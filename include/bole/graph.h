@@ -83,8 +83,8 @@ std::optional<std::size_t> untiedPose(const Graph &graph);
 void validate(const Graph &graph);
 
 /// \p graph with every length multiplied by \p factor (> 0) about the origin of the world, as seen
-/// from the camera (the lever arm bMc keeps its length): what a flight of unknown scale becomes when
-/// its metre is found. The priors on radii stay: they are what knows the metre.
+/// from the camera (the lever arm bMc keeps its length): what a flight of unknown scale becomes
+/// when its scale is found. The priors on radii stay: they are in metres already.
 ///
 /// Laws (each a test): no residual but theirs changes; scaled(scaled(g, f), 1 / f) is g.
 Graph scaled(const Graph &graph, double factor);

@@ -8,11 +8,10 @@
 /// order of the flight, each trunk right after the last pose that saw it. What every elimination
 /// leaves to its later neighbours is kept, so a new frame eliminates again only the variables it
 /// touches and those after them; the change then runs back down the elimination tree until it is
-/// too small to matter; far back it waits for one of the passes that go deeper, each twice as deep
-/// as those before and four times as rare. A variable whose estimate left the point of its linearisation takes its
-/// factors, not the images, to the new point: nothing but the image is linearised for ever. Points
-/// that reach far back move the seldomer the farther. A loop that comes back to old trunks
-/// eliminates the part of the flight between again, once a returning trunk.
+/// too small to matter. Far back in the flight it waits for a deeper pass; each is twice as deep as the one before and
+/// a quarter as frequent. A variable whose estimate has left its point of linearisation gets a new point, and its
+/// factors are linearised there; only the images stay as they were summarised. The older a variable, the less often it
+/// gets a new point. When a trunk of long ago is seen again, the part of the flight between is eliminated again.
 ///
 /// Frames: poses wMb, camera at wMb * bMc. Tangents (and the rows of covariances): Pose (rho [m],
 /// phi [rad]), Trunk (x [m], y [m], log r, lean x, lean y), RelativeTrunk (phi_x, phi_y, phi_z
@@ -38,9 +37,11 @@
 /// std::size_t pose = smoother.addFirstPose(bole::Pose(), 1e-6 * bole::Matrix6d::Identity());
 /// std::size_t trunk = smoother.addTrunk(bole::trunkFromRelative(wMc, summary.optimum, 0.15));
 /// smoother.addObservation(pose, trunk, summary);
-/// pose = smoother.addPose(aMb, covariance);                       // odometry since the pose
-/// before smoother.addObservation(pose, trunk, next_summary); smoother.update(); bole::Pose wMb =
-/// smoother.pose(pose); \endcode
+/// pose = smoother.addPose(aMb, covariance);                       // odometry since the pose before
+/// smoother.addObservation(pose, trunk, next_summary);
+/// smoother.update();
+/// bole::Pose wMb = smoother.pose(pose);
+/// \endcode
 
 #include <bole/graph.h>
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Where the metre and the vertical of a map come from, and how far each may be off.
+/// Where the scale and the direction of gravity of a map come from, and how far each may be off.
 
 #include <string>
 
 namespace bole
 {
-/// Where the metre of the map comes from.
+/// Where the scale of the map comes from.
 enum class ScaleSource
 {
   odometry, ///< the pose filter
@@ -17,7 +17,7 @@ enum class ScaleSource
 /// As summary.json writes it.
 const char *toString(ScaleSource source);
 
-/// Where up comes from.
+/// Where the direction of gravity comes from.
 enum class GravitySource
 {
   odometry, ///< the pose filter
@@ -27,12 +27,12 @@ enum class GravitySource
 /// As summary.json writes it.
 const char *toString(GravitySource source);
 
-/// Where the metre and the vertical of a map come from.
+/// Where the scale and the direction of gravity of a map come from.
 struct WorldReference
 {
-  ScaleSource scale = ScaleSource::odometry; ///< source of the metre
+  ScaleSource scale = ScaleSource::odometry; ///< source of the scale
   double scale_sigma = 0; ///< relative standard deviation of all lengths together, 0 where the source does not say
-  GravitySource gravity = GravitySource::odometry; ///< source of the vertical
+  GravitySource gravity = GravitySource::odometry; ///< source of the direction of gravity
   double gravity_sigma = 0;                        ///< of up [rad], 0 where the source does not say
   /// False: the camera only turned, so that trunks have a bearing and a width; their ranges are those of the prior on
   /// the radius.

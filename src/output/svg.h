@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Drawings and charts as SVG text: the one hand that all plots are drawn by.
+/// Drawings and charts as SVG text, for all plots.
 
 #include <Eigen/Core>
 

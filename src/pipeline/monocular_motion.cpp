@@ -106,7 +106,7 @@ std::optional<Vector3d> MonocularMotion::up() const
 
 double MonocularMotion::upSigma() const { return std::sqrt(0.5 * m_vertical.covariance().trace()); }
 
-/// The first guess of the metre: a height over the ground, or else how deep a forest usually looks.
+/// The first guess of the scale: by the height over the ground, or else by the usual depth of a forest.
 void MonocularMotion::chooseUnit()
 {
   m_has_unit = true;

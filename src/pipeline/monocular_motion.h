@@ -5,7 +5,7 @@
 ///
 /// Idea: PointOdometry places every frame in a unit of length of its own, the edges of the trunks tell the direction of
 /// gravity, and points of the ground tell how many units the camera is over the ground. The unit of this motion is a
-/// first guess of the metre, taken when the first parallax is seen, and is kept: scale() says how far it is off.
+/// first guess of a metre, made when the first parallax is seen, and is kept: scale() estimates its error.
 ///
 /// Frames: w level with the first camera at its origin, a the body at the frame before, b the body now.
 /// A camera that only rotates gets its rotation; its place is held until some parallax says otherwise.

@@ -169,9 +169,9 @@ void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &res
   ++result.resolved;
 }
 
-/// How deep below what was eliminated again this pass goes: now and then twice as far as the passes
-/// between, and so on, so that what lies far back is brought up to date, less often the farther. In
-/// one go: where a pass ends, views are bent until a deeper one comes by.
+/// How deep below what was eliminated again this pass goes. Every kPassesBetween-th pass goes twice as deep, of those
+/// again every kPassesBetween-th, and so on: variables far back are brought up to date too, but less often. Each pass
+/// is made in one go, since its end leaves an inconsistency that stays until a deeper pass.
 int Smoother::State::reach()
 {
   if (options.propagation_threshold == 0)
@@ -235,8 +235,8 @@ int Smoother::State::movableAge() const
   return age;
 }
 
-/// How many poses behind the newest those stand that are eliminated again when \p variable is linearised again. What a
-/// closed variable left behind lies at the far end of all that is open.
+/// How many poses behind the newest those stand that are eliminated again when \p variable is linearised again. What
+/// marginalised variables have left lies at the far end of all that is open.
 int Smoother::State::reachBack(const Variable &variable) const
 {
   const int newest = static_cast<int>(poses.size()) - 1;

@@ -37,7 +37,7 @@ struct WayGoal
 {
   double x_end = 0;             ///< the way ends where x is reached [m]
   double y_low = 0, y_high = 0; ///< the field is as wide [m]
-  /// Time lost by a second spent at the place, 0 or more: how dear it is to be off a line.
+  /// Cost of a second spent at the place, in seconds, 0 or more: it grows with the distance from a line.
   std::function<double(double x, double y)> detour = {};
   std::function<bool(double x, double y)> is_wall = {}; ///< never crossed: what is beside a gap
 };
