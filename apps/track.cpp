@@ -2,13 +2,13 @@
 // bole track: from a flight through trees to a map of trunks and a trajectory.
 #include "commands.h"
 #include "data_files.h"
-#include "field_of_view.h"
 #include "interrupt.h"
 #include "overlay_window.h"
 #include "track_arguments.h"
 #include "track_output.h"
 
 #include "input/live_video.h"
+#include "motion/focal_length.h"
 #include "motion/sensor_calibration.h"
 #include "output/progress.h"
 #include "report/report_page.h"
@@ -31,6 +31,34 @@ namespace bole::apps
 {
 namespace
 {
+struct FieldOfView
+{
+  double degrees = 0, sigma_degrees = 0; ///< horizontal; 0 where the video does not tell
+};
+
+/// Of a video that came without a camera file, where the camera turns or flies a curve in its first frames.
+FieldOfView fieldOfView(const std::string &input, const SourceOptions &options)
+{
+  constexpr int kFrames = 200;
+  const auto source = openSource(input, options);
+  const PinholeCamera camera = source->camera();
+  PointTracker tracker(camera);
+  FocalFinder focal(camera);
+  Frame frame;
+  for (int i = 0; i < kFrames && source->next(frame); ++i) {
+    if (frame.status != FrameStatus::ok)
+      continue;
+    tracker.track(frame.image);
+    focal.add(tracker);
+  }
+  const FocalEstimate estimate = focal.estimate();
+  if (!estimate.known)
+    return {};
+  const double half = 0.5 * camera.width / (camera.fx * estimate.factor);
+  constexpr double kDegrees = 180 / M_PI;
+  return {2 * std::atan(half) * kDegrees, 2 * estimate.sigma * half / (1 + half * half) * kDegrees};
+}
+
 /// A video without a camera file is looked through for turns and curves that tell its field of view.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {

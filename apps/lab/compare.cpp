@@ -4,7 +4,6 @@
 #include "interrupt.h"
 
 #include "lab/baseline/comparison_report.h"
-#include "lab/baseline/comparison_video.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
 #include "output/progress.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "report/report_charts.h"
+#include "report/report_drawings.h"
 
 #include "output/palette.h"
 #include "output/svg.h"

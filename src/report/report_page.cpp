@@ -6,8 +6,7 @@
 #include "output/page.h"
 #include "output/palette.h"
 #include "output/svg.h"
-#include "report/report_charts.h"
-#include "report/report_map.h"
+#include "report/report_drawings.h"
 #include "report/report_script.h"
 
 #include <cmath>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/best_view.h"
-#include "report/report_charts.h"
-#include "report/report_map.h"
+#include "report/report_drawings.h"
 #include "report/report_page.h"
 
 #include <gmock/gmock.h>

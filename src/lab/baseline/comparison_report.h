@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// A comparison as text for the terminal, as JSON for programs, and as one HTML page with its plots.
+/// A comparison as text for the terminal, as JSON for programs, as one HTML page with its plots, and as a video in
+/// which each tracker shows where it believes the model to be.
 
 #include "lab/baseline/basin.h"
 #include "lab/baseline/faults.h"
@@ -29,4 +30,12 @@ std::string toJson(const ComparisonReport &report);
 std::string toSvg(const ComparisonReport &report);
 /// Self-contained; position error by frame, basins and faults as inline SVG and tables.
 std::string toHtml(const ComparisonReport &report);
+
+/// Writes a video of two columns to \p path (mp4): a picture for each of \p scores that had a prior, with the model
+/// \p cao_path drawn where its pose puts it and its error below: green where it is right, orange where it complained,
+/// red where it is wrong in silence. Nothing is written when there is none.
+///
+/// \throw vpException naming the file, when it cannot be written.
+void writeComparisonVideo(const std::string &path, const TestFlight &flight, const std::string &cao_path,
+                          const std::vector<Score> &scores);
 } // namespace bole

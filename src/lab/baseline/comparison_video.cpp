@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/comparison_video.h"
+#include "lab/baseline/comparison_report.h"
 
 #include "output/video_writer.h"
 

@@ -5,7 +5,6 @@
 
 #include "geometry/so3.h"
 
-
 namespace bole
 {
 void SensorOptions::validate() const
@@ -30,14 +29,13 @@ SimulatedImu::SimulatedImu(const SensorOptions &options)
   options.validate();
 }
 
-ImuSample SimulatedImu::measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
-                                const Eigen::Vector3d &acceleration)
+GyroSample SimulatedImu::measure(std::int64_t stamp_ns, const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
+                                 const Eigen::Vector3d &acceleration)
 {
-  ImuSample sample;
-  sample.gyro = rate + m_gyro_bias + m_random.normal3(m_options.gyro_noise);
-  sample.accelerometer = wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + m_accelerometer_bias +
-                         m_random.normal3(m_options.accelerometer_noise);
-  return sample;
+  const Eigen::Vector3d gyro = rate + m_gyro_bias + m_random.normal3(m_options.gyro_noise);
+  const Eigen::Vector3d force = wRb.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + m_accelerometer_bias +
+                                m_random.normal3(m_options.accelerometer_noise);
+  return {stamp_ns, gyro, force};
 }
 
 PoseFilter::PoseFilter(const SensorOptions &options)

@@ -4,7 +4,7 @@
 /// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on board.
 
 #include "lab/simulation/random.h"
-#include <bole/pose.h>
+#include <bole/frame.h>
 
 namespace bole
 {
@@ -26,18 +26,13 @@ struct SensorOptions
   void validate() const;
 };
 
-struct ImuSample
-{
-  Eigen::Vector3d gyro;          ///< [rad/s], body
-  Eigen::Vector3d accelerometer; ///< specific force [m/s^2], body: +9.81 on z at rest
-};
-
 class SimulatedImu
 {
 public:
   explicit SimulatedImu(const SensorOptions &options);
   /// \param rate angular rate in the body frame [rad/s]; \param acceleration of the body in the world [m/s^2].
-  ImuSample measure(const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate, const Eigen::Vector3d &acceleration);
+  GyroSample measure(std::int64_t stamp_ns, const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
+                     const Eigen::Vector3d &acceleration);
 
 private:
   SensorOptions m_options;

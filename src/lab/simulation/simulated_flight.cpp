@@ -74,8 +74,8 @@ void SceneFrames::next(Frame &frame, RenderedFrame &rendered, bool truth_images)
   frame.wMb_odometry = m_filter.report(*frame.wMb_truth);
   for (; m_imu_stamp_ns <= frame.stamp_ns; m_imu_stamp_ns += kImuPeriodNs) {
     const double s = 1e-9 * static_cast<double>(m_imu_stamp_ns);
-    const ImuSample sample = m_imu.measure(m_path.bodyPose(s).R, m_path.bodyRate(s), m_path.acceleration(s));
-    frame.gyro.push_back({m_imu_stamp_ns, sample.gyro, sample.accelerometer});
+    frame.gyro.push_back(
+        m_imu.measure(m_imu_stamp_ns, m_path.bodyPose(s).R, m_path.bodyRate(s), m_path.acceleration(s)));
   }
 }
 

@@ -124,9 +124,8 @@ struct vpSimulatorArDrone::State
     ++ticks;
     const bole::Pose now = body.pose();
     const Eigen::Vector3d rate = bole::logSo3(last.R.transpose() * now.R) / kTick;
-    const bole::ImuSample sample = imu.measure(now.R, rate, body.acceleration());
     // the mean of the tick stands in its middle
-    gyro.push_back({nanoseconds(time() - 0.5 * kTick), sample.gyro, sample.accelerometer});
+    gyro.push_back(imu.measure(nanoseconds(time() - 0.5 * kTick), now.R, rate, body.acceleration()));
     if (body.isInAir())
       least_clearance = std::min(least_clearance, forest.distanceToBark(now.t));
   }

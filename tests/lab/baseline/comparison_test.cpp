@@ -2,7 +2,6 @@
 #include "support/drawn_trunks.h"
 
 #include "lab/baseline/comparison_report.h"
-#include "lab/baseline/comparison_video.h"
 #include "mbt/cao_reader.h"
 
 #include <gmock/gmock.h>

@@ -188,10 +188,10 @@ TEST(SimulatedImu, FeelsGravityAtRestAndTurnsWithTheBody)
   SensorOptions options;
   options.gyro_bias = options.gyro_noise = options.accelerometer_bias = options.accelerometer_noise = 0;
   SimulatedImu imu(options);
-  const ImuSample sample = imu.measure(expSo3({0.1, 0, 0}), {0.2, 0, -0.3}, Eigen::Vector3d::Zero());
-  EXPECT_EQ(sample.gyro, Eigen::Vector3d(0.2, 0, -0.3));
-  EXPECT_NEAR(sample.accelerometer.y(), 9.81 * std::sin(0.1), 1e-12);
-  EXPECT_NEAR(sample.accelerometer.z(), 9.81 * std::cos(0.1), 1e-12);
+  const GyroSample sample = imu.measure(0, expSo3({0.1, 0, 0}), {0.2, 0, -0.3}, Eigen::Vector3d::Zero());
+  EXPECT_EQ(sample.rate, Eigen::Vector3d(0.2, 0, -0.3));
+  EXPECT_NEAR(sample.force->y(), 9.81 * std::sin(0.1), 1e-12);
+  EXPECT_NEAR(sample.force->z(), 9.81 * std::cos(0.1), 1e-12);
 }
 
 TEST(SimulatedImu, HasAConstantBiasAsItsOptionsSay)
@@ -203,8 +203,8 @@ TEST(SimulatedImu, HasAConstantBiasAsItsOptionsSay)
   for (int run = 0; run < kRuns; ++run) {
     options.seed = 100 + run;
     SimulatedImu imu(options);
-    const Eigen::Vector3d bias = imu.measure(Eigen::Matrix3d::Identity(), {0, 0, 0}, {0, 0, -9.81}).accelerometer;
-    EXPECT_EQ(imu.measure(Eigen::Matrix3d::Identity(), {0, 0, 0}, {0, 0, -9.81}).accelerometer, bias);
+    const Eigen::Vector3d bias = *imu.measure(0, Eigen::Matrix3d::Identity(), {0, 0, 0}, {0, 0, -9.81}).force;
+    EXPECT_EQ(*imu.measure(0, Eigen::Matrix3d::Identity(), {0, 0, 0}, {0, 0, -9.81}).force, bias);
     squares += bias.squaredNorm() / 3;
   }
   EXPECT_NEAR(std::sqrt(squares / kRuns), options.accelerometer_bias, 0.1 * options.accelerometer_bias);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// The charts of the page, as SVG.
+/// The map and the charts of the page, as SVG.
 
 #include "report/run_record.h"
 
@@ -9,6 +9,10 @@
 
 namespace bole
 {
+/// The map with the boxes that show and hide its layers. Trunks are groups of class `trunk` with their id as
+/// `data-id`; one metre is 100 units, the world's y points up.
+std::string mapHtml(const RunRecord &run);
+
 /// Range, radius and place of a trunk over time, each with its sigma; \p truth may be nullptr.
 std::string trunkCharts(const RunRecord &run, const TrunkRecord &trunk, const TruthTrunk *truth);
 /// A row each for frames, sensors that contradict the others, and trunks, over time.
