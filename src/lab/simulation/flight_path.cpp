@@ -2,7 +2,6 @@
 #include "lab/simulation/flight_path.h"
 
 #include "geometry/constants.h"
-#include "geometry/require_range.h"
 
 #include "geometry/so3.h"
 #include "lab/simulation/random.h"
@@ -19,17 +18,8 @@ namespace
 constexpr double kTwoPi = 2 * M_PI;
 } // namespace
 
-void FlightOptions::validate() const
-{
-  requireRange("speed", speed, 0.05, 10);
-  requireRange("duration", duration, 0, 3600);
-  requireRange("height", height, 0.3, 10);
-  requireRange("wobble_deg", wobble_deg, 0, 20);
-}
-
 FlightPath::FlightPath(const FlightOptions &options) : m_options(options)
 {
-  options.validate();
   Random random(options.seed, 301);
   for (double &phase : m_phase)
     phase = random.uniform(0, kTwoPi);

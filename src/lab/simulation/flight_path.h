@@ -26,9 +26,6 @@ struct FlightOptions
   double duration = 12;    ///< [s], 0 to 3600
   double height = 1.2;     ///< over the ground at the start [m], 0.3 to 10
   double wobble_deg = 1.2; ///< of roll and pitch on top of what the acceleration asks for, 0 to 20
-
-  /// Throws vpException "name = value, must be ...".
-  void validate() const;
 };
 
 /// The true motion of the drone: position analytic in time; roll and pitch as a quadrotor needs

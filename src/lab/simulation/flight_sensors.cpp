@@ -1,32 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/flight_sensors.h"
 
-#include "geometry/require_range.h"
-
 #include "geometry/so3.h"
 
 namespace bole
 {
-void SensorOptions::validate() const
-{
-  requireRange("gyro_noise", gyro_noise, 0, 1);
-  requireRange("gyro_bias", gyro_bias, 0, 1);
-  requireRange("accelerometer_noise", accelerometer_noise, 0, 10);
-  requireRange("accelerometer_bias", accelerometer_bias, 0, 10);
-  requireRange("odometry_step_noise", odometry_step_noise, 0, 1);
-  requireRange("odometry_scale", odometry_scale, 0, 0.5);
-  requireRange("height_noise", height_noise, 0, 1);
-  requireRange("attitude_noise", attitude_noise, 0, 0.5);
-  requireRange("yaw_walk", yaw_walk, 0, 0.5);
-}
-
 SimulatedImu::SimulatedImu(const SensorOptions &options)
     : m_options(options),
       m_random(options.seed, 401),
       m_gyro_bias(m_random.normal3(options.gyro_bias)),
       m_accelerometer_bias(Random(options.seed, 403).normal3(options.accelerometer_bias))
 {
-  options.validate();
 }
 
 GyroSample SimulatedImu::measure(std::int64_t stamp_ns, const Eigen::Matrix3d &wRb, const Eigen::Vector3d &rate,
@@ -41,7 +25,6 @@ GyroSample SimulatedImu::measure(std::int64_t stamp_ns, const Eigen::Matrix3d &w
 PoseFilter::PoseFilter(const SensorOptions &options)
     : m_options(options), m_random(options.seed, 402), m_scale(1 + options.odometry_scale * m_random.normal())
 {
-  options.validate();
 }
 
 Pose PoseFilter::report(const Pose &wMb)

@@ -21,9 +21,6 @@ struct SensorOptions
   double height_noise = 0.019;        ///< of the height in one frame [m], 0 to 1
   double attitude_noise = 0.004;      ///< of roll, pitch and yaw in one frame [rad], 0 to 0.5
   double yaw_walk = 0.003;            ///< of the heading's drift in one frame [rad], 0 to 0.5
-
-  /// Throws vpException "name = value, must be ...".
-  void validate() const;
 };
 
 class SimulatedImu

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/forest.h"
 
-#include "geometry/require_range.h"
-
 #include "lab/simulation/random.h"
 
 #include <bole/trunk_record.h>
@@ -114,22 +112,6 @@ void placeSun(Forest &forest)
 }
 } // namespace
 
-void ForestOptions::validate() const
-{
-  requireRange("density", density, 0, 0.3);
-  requireRange("radius_median", radius_median, 0.02, 1);
-  requireRange("radius_spread", radius_spread, 0, 1);
-  requireRange("lean_deg", lean_deg, 0, 20);
-  requireRange("bow", bow, 0, 0.5);
-  requireRange("flare", flare, 0, 2);
-  requireRange("crown_leaves", crown_leaves, 0, 2000);
-  requireRange("undergrowth", undergrowth, 0, 1);
-  requireRange("saplings", saplings, 0, 1);
-  requireRange("ground_amplitude", ground_amplitude, 0, 1);
-  requireRange("margin", margin, 5, 40);
-  requireRange("clearance", clearance, 0, 3);
-}
-
 Eigen::Vector3d SimulatedTrunk::axisAt(double h) const
 {
   const double arch = 4 * h / height * (1 - h / height);
@@ -177,7 +159,6 @@ double Terrain::height(double x, double y) const
 Forest Forest::plant(const ForestOptions &options, const std::vector<Eigen::Vector3d> &path,
                      const std::vector<SimulatedTrunk> &wanted)
 {
-  options.validate();
   if (path.empty())
     throw vpException(vpException::badValue, "path = (no points), must be at least one point");
   Forest forest;

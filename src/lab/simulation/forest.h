@@ -41,9 +41,6 @@ struct ForestOptions
   double ground_amplitude = 0.1; ///< of the unevenness of the ground, 0 to 1
   double margin = 14;            ///< trunks as near as this to the path's bounding box are part of the truth, 5 to 40
   double clearance = 0.7;        ///< free space between path and bark, 0 to 3
-
-  /// Throws vpException "name = value, must be ...".
-  void validate() const;
 };
 
 /// One trunk: a leaning, bowed, tapering cone with a flared foot.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/simulated_flight.h"
 
+#include "geometry/require_range.h"
 #include "input/yaml_file.h"
 #include "lab/simulation/words.h"
 
@@ -15,31 +16,32 @@ namespace bole
 {
 namespace
 {
-/// Names every field of a scene to \p visit(section, key, field), for the reader and the writer alike.
+/// Names every field of a scene to \p visit(section, key, field), a number with its range behind it: for reading,
+/// writing and checking alike.
 template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit)
 {
   auto &forest = scene.forest;
   visit("forest", "seed", forest.seed);
-  visit("forest", "density", forest.density);
+  visit("forest", "density", forest.density, 0, 0.3);
   visit("forest", "light", forest.light);
   visit("forest", "bark", forest.bark);
-  visit("forest", "radius_median", forest.radius_median);
-  visit("forest", "radius_spread", forest.radius_spread);
-  visit("forest", "lean_deg", forest.lean_deg);
-  visit("forest", "bow", forest.bow);
-  visit("forest", "flare", forest.flare);
-  visit("forest", "crown_leaves", forest.crown_leaves);
-  visit("forest", "undergrowth", forest.undergrowth);
-  visit("forest", "saplings", forest.saplings);
-  visit("forest", "ground_amplitude", forest.ground_amplitude);
-  visit("forest", "margin", forest.margin);
-  visit("forest", "clearance", forest.clearance);
+  visit("forest", "radius_median", forest.radius_median, 0.02, 1);
+  visit("forest", "radius_spread", forest.radius_spread, 0, 1);
+  visit("forest", "lean_deg", forest.lean_deg, 0, 20);
+  visit("forest", "bow", forest.bow, 0, 0.5);
+  visit("forest", "flare", forest.flare, 0, 2);
+  visit("forest", "crown_leaves", forest.crown_leaves, 0, 2000);
+  visit("forest", "undergrowth", forest.undergrowth, 0, 1);
+  visit("forest", "saplings", forest.saplings, 0, 1);
+  visit("forest", "ground_amplitude", forest.ground_amplitude, 0, 1);
+  visit("forest", "margin", forest.margin, 5, 40);
+  visit("forest", "clearance", forest.clearance, 0, 3);
   auto &flight = scene.flight;
   visit("flight", "path", flight.kind);
   visit("flight", "seed", flight.seed);
-  visit("flight", "speed", flight.speed);
-  visit("flight", "height", flight.height);
-  visit("flight", "wobble_deg", flight.wobble_deg);
+  visit("flight", "speed", flight.speed, 0.05, 10);
+  visit("flight", "height", flight.height, 0.3, 10);
+  visit("flight", "wobble_deg", flight.wobble_deg, 0, 20);
   auto &renderer = scene.renderer;
   visit("camera", "width", renderer.camera.pinhole.width);
   visit("camera", "height", renderer.camera.pinhole.height);
@@ -49,8 +51,8 @@ template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit
   visit("camera", "cy", renderer.camera.pinhole.cy);
   visit("camera", "distortion", renderer.camera.distortion);
   visit("camera", "coefficients", renderer.camera.coefficients);
-  visit("camera", "rate_hz", scene.rate_hz);
-  visit("camera", "exposure_ms", scene.exposure_ms);
+  visit("camera", "rate_hz", scene.rate_hz, 1, 120);
+  visit("camera", "exposure_ms", scene.exposure_ms, 0, 100);
   visit("camera", "samples_per_pixel", renderer.samples_per_pixel);
   visit("camera", "exposure_target", renderer.exposure_target);
   visit("camera", "exposure_lag_frames", renderer.exposure_lag_frames);
@@ -58,18 +60,18 @@ template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit
   visit("camera", "read_noise", renderer.read_noise);
   visit("camera", "shot_noise", renderer.shot_noise);
   visit("camera", "noise_seed", renderer.noise_seed);
-  visit("camera", "h264_kbps", scene.h264_kbps);
+  visit("camera", "h264_kbps", scene.h264_kbps, 0, 20000);
   auto &sensors = scene.sensors;
   visit("sensors", "seed", sensors.seed);
-  visit("sensors", "gyro_noise", sensors.gyro_noise);
-  visit("sensors", "gyro_bias", sensors.gyro_bias);
-  visit("sensors", "accelerometer_noise", sensors.accelerometer_noise);
-  visit("sensors", "accelerometer_bias", sensors.accelerometer_bias);
-  visit("sensors", "odometry_step_noise", sensors.odometry_step_noise);
-  visit("sensors", "odometry_scale", sensors.odometry_scale);
-  visit("sensors", "height_noise", sensors.height_noise);
-  visit("sensors", "attitude_noise", sensors.attitude_noise);
-  visit("sensors", "yaw_walk", sensors.yaw_walk);
+  visit("sensors", "gyro_noise", sensors.gyro_noise, 0, 1);
+  visit("sensors", "gyro_bias", sensors.gyro_bias, 0, 1);
+  visit("sensors", "accelerometer_noise", sensors.accelerometer_noise, 0, 10);
+  visit("sensors", "accelerometer_bias", sensors.accelerometer_bias, 0, 10);
+  visit("sensors", "odometry_step_noise", sensors.odometry_step_noise, 0, 1);
+  visit("sensors", "odometry_scale", sensors.odometry_scale, 0, 0.5);
+  visit("sensors", "height_noise", sensors.height_noise, 0, 1);
+  visit("sensors", "attitude_noise", sensors.attitude_noise, 0, 0.5);
+  visit("sensors", "yaw_walk", sensors.yaw_walk, 0, 0.5);
 }
 
 template <class Trunk, class Visit> void visitTrunk(Trunk &trunk, Visit &&visit)
@@ -200,6 +202,15 @@ void readTrunks(const std::string &path, const YAML::Node &node, std::vector<Sim
 }
 } // namespace
 
+void SceneOptions::validate() const
+{
+  visitFields(*this, [](const char *, const char *key, const auto &field, auto... range) {
+    if constexpr (sizeof...(range) == 2)
+      requireRange(key, static_cast<double>(field), range...);
+  });
+  renderer.validate();
+}
+
 SceneOptions readScene(const std::string &path)
 {
   const YAML::Node root = loadYaml(path);
@@ -218,7 +229,7 @@ SceneOptions readScene(const std::string &path)
     if (std::find(std::begin(names), std::end(names), name) == std::end(names))
       top.fail(entry.first, name, "one of the sections forest, flight, camera, sensors, trunks");
     Section section(path, entry.second, name);
-    visitFields(scene, [&](const char *of, const char *key, auto &field) {
+    visitFields(scene, [&](const char *of, const char *key, auto &field, auto...) {
       if (name == of)
         section.read(key, field);
     });
@@ -236,7 +247,7 @@ SceneOptions readScene(const std::string &path)
 std::string sceneText(const SceneOptions &scene)
 {
   std::string out = "# A scene of `bole simulate --scene`. Lengths in metres.\n", current;
-  visitFields(scene, [&](const char *section, const char *key, const auto &field) {
+  visitFields(scene, [&](const char *section, const char *key, const auto &field, auto...) {
     if (current != section) {
       out += fmt::format("{}:\n", section);
       current = section;

@@ -35,17 +35,6 @@ void SceneOptions::setSeed(std::uint64_t seed)
   forest.seed = flight.seed = renderer.noise_seed = sensors.seed = seed;
 }
 
-void SceneOptions::validate() const
-{
-  forest.validate();
-  flight.validate();
-  renderer.validate();
-  sensors.validate();
-  requireRange("rate_hz", rate_hz, 1, 120);
-  requireRange("exposure_ms", exposure_ms, 0, 100);
-  requireRange("h264_kbps", h264_kbps, 0, 20000);
-}
-
 SceneFrames::SceneFrames(const SceneOptions &scene, int frames)
     : m_scene(scene),
       m_path(pathOf(scene, frames)),

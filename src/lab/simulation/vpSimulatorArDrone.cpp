@@ -170,7 +170,6 @@ void vpSimulatorArDrone::Options::validate() const
   if (renderer.camera.distortion != bole::Distortion::none)
     throw vpException(vpException::badValue, "distortion, must be none: frames are taken as a pinhole's");
   body.validate();
-  sensors.validate();
   renderer.validate();
 }
 

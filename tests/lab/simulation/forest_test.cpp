@@ -90,19 +90,6 @@ TEST(Forest, WantedTrunksComeFirstWithTheirFootOnTheGround)
   EXPECT_DOUBLE_EQ(forest.trunks.front().foot.z(), forest.terrain.height(3, 1));
 }
 
-TEST(Forest, RefusesADensityOutOfRange)
-{
-  ForestOptions options;
-  options.density = -1;
-  try {
-    Forest::plant(options, straightPath(5));
-    FAIL() << "accepted";
-  }
-  catch (const vpException &error) {
-    EXPECT_NE(std::string(error.what()).find("density = -1, must be in [0, 0.3]"), std::string::npos) << error.what();
-  }
-}
-
 TEST(SimulatedTrunk, HasItsRadiusAtBreastHeight)
 {
   SimulatedTrunk trunk;
