@@ -21,8 +21,6 @@ struct ResponseOptions
   double speed_lag = 0.55; ///< of the horizontal velocity and the climb, half by each of two lags [s], 0 (at once) to
                            ///< 3: 1 / (velocity loop + drag), as tilts of .16 s and a loop of 1.65/s give it
   double turn_lag = 0.2;   ///< of the rate of turn [s], 0 to 3
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// Law (a test): the path of a constant velocity v tends to v (t - delay - lag).

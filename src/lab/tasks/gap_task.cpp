@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/gap_task.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -50,20 +48,6 @@ bool isFree(const Gap &gap, const std::vector<Obstacle> &trunks, const Eigen::Ve
 }
 } // namespace
 
-void GapTaskOptions::validate() const
-{
-  requireRange("width_min", width_min, 0.3, 5);
-  requireRange("width_max", width_max, width_min, 20);
-  requireRange("range", range, 1, 20);
-  requireRange("evidence", evidence, -20, 20);
-  requireRange("angle", angle, 0.05, 0.7);
-  requireRange("off_axis", off_axis, 0, 10);
-  requireRange("beyond", beyond, 0.3, 5);
-  requireRange("search_s", search_s, 1, 600);
-  way.validate();
-  safety.validate();
-}
-
 Gap gapBetween(const Obstacle &one, const Obstacle &other, const Eigen::Vector2d &from)
 {
   const Eigen::Vector2d across = (other.xy - one.xy).normalized();
@@ -103,10 +87,7 @@ std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::V
   return best;
 }
 
-GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety, options.response), m_options(options)
-{
-  m_options.validate();
-}
+GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety, options.response), m_options(options) {}
 
 ServoTask::Values GapTask::errors() const
 {

@@ -29,8 +29,6 @@ struct GapTaskOptions
   WayOptions way{0.6};
   ResponseOptions response;
   SafetyOptions safety;
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// Two trunks and the way between them.

@@ -23,7 +23,6 @@ const char *toString(TaskPhase phase) { return nameOf(phase, {"searching", "serv
 ServoTask::ServoTask(const SafetyOptions &safety, const ResponseOptions &response)
     : m_safety(safety), m_response(response)
 {
-  m_safety.validate();
 }
 
 /// What the task wants, where it may want anything.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/slalom_task.h"
 
-#include "geometry/require_range.h"
-
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -20,24 +18,11 @@ constexpr double kLargestLook = 1; ///< from the line [rad]
 constexpr int kCandidateViews = 5; ///< a candidate seen this often is avoided too
 } // namespace
 
-void SlalomTaskOptions::validate() const
-{
-  requireRange("look", look, 0, 30);
-  requireRange("length", length, 1, 1000);
-  requireRange("swing", swing, 0, 3);
-  requireRange("wave_length", wave_length, 2, 50);
-  requireRange("reach", reach, 0.5, 10);
-  requireRange("off_line", off_line, 0, 10);
-  way.validate();
-  safety.validate();
-}
-
 SlalomTask::SlalomTask(const SlalomTaskOptions &options)
     : ServoTask(options.safety, options.response),
       m_options(options),
       m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
-  m_options.validate();
 }
 
 ServoTask::Values SlalomTask::errors() const

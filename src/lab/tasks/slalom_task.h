@@ -25,8 +25,6 @@ struct SlalomTaskOptions
   WayOptions way;
   ResponseOptions response;
   SafetyOptions safety;
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 class SlalomTask : public ServoTask

@@ -1,23 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/surroundings.h"
 
-#include "geometry/require_range.h"
-
 #include <algorithm>
 
 namespace bole
 {
-void SafetyOptions::validate() const
-{
-  requireRange("lost_frames", lost_frames, 1, 100);
-  requireRange("sure_frames", sure_frames, 1, 100);
-  requireRange("patience_frames", patience_frames, 1, 10000);
-  requireRange("hull", hull, 0.05, 2);
-  requireRange("least_free", least_free, 0, 2);
-  requireRange("stopping_s", stopping_s, 0.1, 5);
-  requireRange("unseen_speed", unseen_speed, 0.02, 3);
-}
-
 void Surroundings::see(const FrameReport &report)
 {
   const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);

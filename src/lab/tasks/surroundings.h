@@ -16,8 +16,6 @@ struct SafetyOptions
   double least_free = 0.12;  ///< between hull and what is believed to be bark [m], 0 to 2: what the drone errs
   double stopping_s = 0.5;   ///< over which what is left of a way is flown [s], 0.1 to 5: a gain of 2/s, as hold's
   double unseen_speed = 0.5; ///< into what was not seen to be free [m/s], 0.02 to 3: a bump that breaks nothing
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// Gathers what the frames of a flight tell.

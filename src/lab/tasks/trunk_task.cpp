@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/trunk_task.h"
-#include "geometry/require_range.h"
 
 #include <Eigen/Geometry>
 
@@ -46,20 +45,6 @@ Eigen::Vector4d obeying(Eigen::Vector4d velocity, double share)
 }
 } // namespace
 
-void TrunkTaskOptions::validate() const
-{
-  requireRange("ratio", ratio, 0, 0.5);
-  requireRange("distance", distance, 0.5, 20);
-  requireRange("bearing", bearing, -0.5, 0.5);
-  requireRange("speed", speed, -2, 2);
-  requireRange("gain", gain, 0.05, 3);
-  requireRange("largest_speed", largest_speed, 0.05, 3);
-  requireRange("free_way", free_way, 0, 5);
-  requireRange("search_s", search_s, 1, 600);
-  response.validate();
-  safety.validate();
-}
-
 TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
     : ServoTask(options.safety, options.response),
       m_bMc(bMc),
@@ -67,7 +52,6 @@ TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
       m_sidestep(0.7, kSidestep_s),
       m_response(options.response)
 {
-  m_options.validate();
   m_servo.setServo(vpServo::EYEINHAND_L_cVe_eJe);
   m_servo.setInteractionMatrixType(vpServo::CURRENT, vpServo::PSEUDO_INVERSE);
   m_servo.setLambda(m_options.gain);

@@ -47,8 +47,6 @@ struct TrunkTaskOptions
   double search_s = 40;       ///< gives up after [s], 1 to 600
   ResponseOptions response;
   SafetyOptions safety;
-
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// Laws (each a test, on exact features): the error decays at the gain, with a drone that obeys at once and with one

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/way_planner.h"
 
-#include "geometry/require_range.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -186,15 +184,6 @@ private:
   std::vector<double> m_clearance, m_speed, m_pace, m_left; ///< [m], [m/s], [s/m], [s]
 };
 } // namespace
-
-void WayOptions::validate() const
-{
-  requireRange("speed", speed, 0.05, 3);
-  requireRange("hull", hull, 0.05, 2);
-  requireRange("free", free, 0, 2);
-  requireRange("stopping_s", stopping_s, 0.1, 5);
-  requireRange("sigmas", sigmas, 0, 5);
-}
 
 Eigen::Vector2d Way::lookedAt(const Eigen::Vector2d &from, double range) const
 {

@@ -29,7 +29,6 @@ struct WayOptions
 
   /// Where hull and free were not seen to be free: what lets it stop within free [m/s].
   double unseenSpeed() const { return free / stopping_s; }
-  void validate() const; ///< \throw vpException naming the option, its value and the range
 };
 
 /// What is asked for. Functions get places on the task's axes.

@@ -130,13 +130,6 @@ TEST_F(Safety, NoTaskFliesIntoWhatIsBelieved)
   }
 }
 
-TEST(SafetyOptions, RefusesCountsOutOfRange)
-{
-  SafetyOptions options;
-  options.lost_frames = 0;
-  EXPECT_THROW(Ahead{options}, vpException);
-}
-
 TEST(Sidestep, GoesToAndFroByItsAmplitudeAndKeepsItsHeading)
 {
   Sidestep sidestep(0.5, 8);

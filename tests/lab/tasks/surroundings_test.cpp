@@ -131,12 +131,5 @@ TEST(Surroundings, WhereTheDroneHasBeenIsFree)
   EXPECT_GT(around.roomAt({0, 0.3}), 0.2); // no more than its hull
   EXPECT_EQ(around.roomAt({0, 1.7}), 0);
 }
-
-TEST(SafetyOptions, RefusesAHullWithoutSize)
-{
-  SafetyOptions options;
-  options.hull = 0;
-  EXPECT_THROW(options.validate(), vpException);
-}
 } // namespace
 } // namespace bole

@@ -334,12 +334,5 @@ TEST(TrunkTask, KeepsItsLargestSpeed)
   TrunkTask task(flight.bMc, options);
   EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
 }
-
-TEST(TrunkTask, RefusesOptionsOutOfRange)
-{
-  TrunkTaskOptions options;
-  options.gain = 0;
-  EXPECT_THROW(TrunkTask(forwardCamera(), options), vpException);
-}
 } // namespace
 } // namespace bole

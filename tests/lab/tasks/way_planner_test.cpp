@@ -187,12 +187,5 @@ TEST(WayPlanner, AWallIsNeverCrossed)
   goal.is_wall = [](double x, double) { return std::abs(x - 2) < 0.3; };
   EXPECT_FALSE(planWay({}, {0, -1}, goal, {}, {}).is_open);
 }
-
-TEST(WayPlanner, RefusesOptionsOutOfRange)
-{
-  WayOptions options;
-  options.stopping_s = 0;
-  EXPECT_THROW(options.validate(), vpException);
-}
 } // namespace
 } // namespace bole
