@@ -28,11 +28,6 @@ bool within(std::int64_t now_ns, double from_s, double for_s)
 {
   return from_s >= 0 && now_ns >= nanoseconds(from_s) && now_ns < nanoseconds(from_s + for_s);
 }
-
-DronePackets::Options packetOptions(const PacketFeed &feed, const ArDroneEmulator::Options &options)
-{
-  return {feed.generation(), feed.frameRateHz(), options.bit_rate, options.key_interval, options.clock_wrap};
-}
 } // namespace
 
 /// Flies the feed in the serving thread, and injects the faults.
@@ -66,7 +61,7 @@ struct ArDroneEmulator::State
         options(o),
         generation(feed->generation()),
         wire(o.host, generation, o.navdata_port, o.video_port, o.at_port),
-        packets(packetOptions(*feed, o)),
+        packets(feed->generation(), feed->frameRateHz(), o),
         random(o.seed)
   {
   }

@@ -15,7 +15,8 @@ constexpr std::uint32_t kUsualState = 0x0f800080 | 0x10; // threads up, camera r
 constexpr std::uint32_t kLanded = 2, kFlying = 3;
 } // namespace
 
-DronePackets::DronePackets(const Options &options) : m_options(options), m_last_demo_ns(-kOneSecond_ns)
+DronePackets::DronePackets(int generation, double frame_rate_hz, const ArDroneEmulator::Options &options)
+    : m_generation(generation), m_frame_rate_hz(frame_rate_hz), m_options(options), m_last_demo_ns(-kOneSecond_ns)
 {
   if (options.clock_wrap) {
     m_clock_ms = kPaveTimePeriod_ms - kWrapSoon_ms;
@@ -47,14 +48,14 @@ void DronePackets::forgetPicture()
 std::vector<std::uint8_t> DronePackets::picture(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
 {
   ++m_frame_number;
-  return m_options.generation == 1 ? encodeUvlc(image, m_frame_number) : pavePicture(image, stamp_ns);
+  return m_generation == 1 ? encodeUvlc(image, m_frame_number) : pavePicture(image, stamp_ns);
 }
 
 std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char> &image, std::int64_t stamp_ns)
 {
   if (!m_encoder)
     m_encoder = std::make_unique<H264Encoder>(static_cast<int>(image.getWidth()), static_cast<int>(image.getHeight()),
-                                              m_options.frame_rate_hz, m_options.bit_rate, m_options.key_interval);
+                                              m_frame_rate_hz, m_options.bit_rate, m_options.key_interval);
   const auto encoded = m_encoder->encode(image, m_force_key);
   m_force_key = false;
   PaveHeader header;

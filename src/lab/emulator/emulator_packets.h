@@ -4,6 +4,7 @@
 /// What an emulated drone says: pictures and navdata as bytes, numbered and stamped by its clocks.
 
 #include "ardrone/navdata.h"
+#include "lab/emulator/emulator.h"
 #include "lab/emulator/h264_encoder.h"
 
 #include <bole/visp.h>
@@ -16,14 +17,7 @@ namespace bole
 class DronePackets
 {
 public:
-  struct Options
-  {
-    int generation = 2;
-    double frame_rate_hz = 30, bit_rate = 1.3e6;
-    int key_interval = 15;
-    bool clock_wrap = false; ///< start both clocks 3 s before they wrap
-  };
-  explicit DronePackets(const Options &options);
+  DronePackets(int generation, double frame_rate_hz, const ArDroneEmulator::Options &options);
 
   std::vector<std::uint8_t> picture(const vpImage<unsigned char> &image, std::int64_t stamp_ns);
 
@@ -47,7 +41,9 @@ public:
 private:
   std::vector<std::uint8_t> pavePicture(const vpImage<unsigned char> &image, std::int64_t stamp_ns);
 
-  Options m_options;
+  const int m_generation;
+  const double m_frame_rate_hz;
+  const ArDroneEmulator::Options m_options;
   std::unique_ptr<H264Encoder> m_encoder;
   bool m_force_key = true, m_configured = false, m_wants_full = false;
   std::int64_t m_boot_ns = 0, m_last_demo_ns;
