@@ -49,6 +49,8 @@ enum class Distortion
   equidistant,       ///< k1 .. k4 (OpenCV fisheye, EuRoC)
   fov                ///< s [rad]: r_d = atan(2 r tan(s/2)) / s (Devernay and Faugeras; PTAM, AR.Drone 1)
 };
+/// As camera files write it.
+const char *toString(Distortion distortion);
 
 /// A calibrated camera with its lens. `input` rectifies its images once a frame.
 struct CameraModel

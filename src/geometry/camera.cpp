@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/camera.h>
 
+#include "geometry/names.h"
+
 #include <cmath>
 
 namespace bole
 {
+const char *toString(Distortion distortion)
+{
+  return nameOf(distortion, {"none", "radial-tangential", "equidistant", "fov"});
+}
+
 PinholeCamera PinholeCamera::scaled(double factor) const
 {
   PinholeCamera camera = *this;

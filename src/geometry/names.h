@@ -10,11 +10,14 @@
 
 namespace bole
 {
+/// Of a value beyond those of its enumeration.
+constexpr const char *kUnknownName = "unknown";
+
 /// The name of \p value; \p names stand in the order of the enumeration, which counts from 0.
 template <typename Enum> const char *nameOf(Enum value, std::initializer_list<const char *> names)
 {
   const auto at = static_cast<std::size_t>(value);
-  return at < names.size() ? names.begin()[at] : "unknown";
+  return at < names.size() ? names.begin()[at] : kUnknownName;
 }
 
 /// The value that toString() calls \p name, of those up to \p last; nothing where there is none.

@@ -14,17 +14,13 @@ std::string sensorYaml(const MountedCamera &camera, const std::string &comment, 
   for (int k = 0; k < 12; ++k)
     matrix += fmt::format("{}, ", T(k / 4, k % 4) + 0.0); // no -0
   const Distortion distortion = camera.model.distortion;
-  const char *name = distortion == Distortion::equidistant         ? "equidistant"
-                     : distortion == Distortion::fov               ? "fov"
-                     : distortion == Distortion::radial_tangential ? "radial-tangential"
-                                                                   : "none";
   const int count = distortion == Distortion::none ? 0 : distortion == Distortion::fov ? 1 : 4;
   const auto &c = camera.model.coefficients;
   const PinholeCamera &p = camera.model.pinhole;
   return fmt::format("sensor_type: camera\ncomment: {}\nT_BS:\n  cols: 4\n  rows: 4\n"
                      "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
                      "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
-                     comment, matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, name,
+                     comment, matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, toString(distortion),
                      fmt::join(c.begin(), c.begin() + count, ", "));
 }
 

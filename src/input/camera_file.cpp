@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/names.h"
 #include "input/camera_plausibility.h"
 #include "input/sensor_yaml.h"
 #include "input/yaml_file.h"
@@ -47,20 +48,13 @@ PinholeCamera readPinhole(const SensorYaml &yaml)
 void readDistortion(const SensorYaml &yaml, CameraModel &model)
 {
   const std::string name = yaml.has("distortion_model") ? yaml.text("distortion_model") : "none";
-  if (name == "none")
-    return;
-  std::size_t needed = 4;
-  if (name == "radial-tangential" || name == "radtan")
-    model.distortion = Distortion::radial_tangential;
-  else if (name == "equidistant")
-    model.distortion = Distortion::equidistant;
-  else if (name == "fov") {
-    model.distortion = Distortion::fov;
-    needed = 1;
-  }
-  else
+  const auto known = valueNamed(name == "radtan" ? "radial-tangential" : name, Distortion::fov);
+  if (!known)
     yaml.fail("distortion_model", "none, radial-tangential, equidistant or fov");
-
+  model.distortion = *known;
+  if (model.distortion == Distortion::none)
+    return;
+  const std::size_t needed = model.distortion == Distortion::fov ? 1 : 4;
   auto k = yaml.numbers("distortion_coefficients");
   if (needed == 4 && k.size() == 5 && k[4] == 0)
     k.pop_back();

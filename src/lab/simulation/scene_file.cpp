@@ -177,7 +177,7 @@ private:
 template <class T> std::string text(const T &value)
 {
   if constexpr (std::is_enum_v<T>)
-    return wordOf(value);
+    return toString(value);
   else
     return fmt::format("{}", value);
 }

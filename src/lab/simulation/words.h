@@ -3,6 +3,7 @@
 /// \file
 /// What scene files and commands call the values of an enumeration.
 
+#include "geometry/names.h"
 #include "lab/simulation/flight_path.h"
 #include <bole/camera.h>
 
@@ -14,38 +15,16 @@ namespace bole
 {
 template <class T> using Words = std::vector<std::pair<std::string, T>>;
 
-inline const Words<Light> &wordsOf(Light)
-{
-  static const Words<Light> words = {{"sun", Light::sun}, {"overcast", Light::overcast}};
-  return words;
-}
-inline const Words<Bark> &wordsOf(Bark)
-{
-  static const Words<Bark> words = {{"dark", Bark::dark}, {"bright", Bark::bright}, {"mixed", Bark::mixed}};
-  return words;
-}
-inline const Words<PathKind> &wordsOf(PathKind)
-{
-  static const Words<PathKind> words = {{"forward", PathKind::forward},
-                                        {"lateral", PathKind::lateral},
-                                        {"loop", PathKind::loop},
-                                        {"slalom", PathKind::slalom}};
-  return words;
-}
-inline const Words<Distortion> &wordsOf(Distortion)
-{
-  static const Words<Distortion> words = {{"none", Distortion::none},
-                                          {"radial-tangential", Distortion::radial_tangential},
-                                          {"equidistant", Distortion::equidistant},
-                                          {"fov", Distortion::fov}};
-  return words;
-}
+inline const char *toString(Light light) { return nameOf(light, {"sun", "overcast"}); }
+inline const char *toString(Bark bark) { return nameOf(bark, {"dark", "bright", "mixed"}); }
+inline const char *toString(PathKind path) { return nameOf(path, {"forward", "lateral", "loop", "slalom"}); }
 
-template <class T> std::string wordOf(T value)
+/// All values of an enumeration by their names.
+template <class T> Words<T> wordsOf(T)
 {
-  for (const auto &[word, meant] : wordsOf(value))
-    if (meant == value)
-      return word;
-  return {};
+  Words<T> words;
+  for (T value{}; std::string(toString(value)) != kUnknownName; value = static_cast<T>(static_cast<int>(value) + 1))
+    words.emplace_back(toString(value), value);
+  return words;
 }
 } // namespace bole

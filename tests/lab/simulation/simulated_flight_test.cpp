@@ -154,9 +154,9 @@ TEST(FlightPath, ThrustExplainsTheAccelerationWithoutWobble)
     for (double t = 0; t < 5; t += 0.7) {
       const Eigen::Vector3d force =
           path.bodyPose(t).R.transpose() * (path.acceleration(t) + Eigen::Vector3d(0, 0, 9.81));
-      EXPECT_NEAR(force.x(), 0, 1e-6) << wordOf(kind);
-      EXPECT_NEAR(force.y(), 0, 1e-6) << wordOf(kind);
-      EXPECT_GT(force.z(), 5) << wordOf(kind);
+      EXPECT_NEAR(force.x(), 0, 1e-6) << toString(kind);
+      EXPECT_NEAR(force.y(), 0, 1e-6) << toString(kind);
+      EXPECT_GT(force.z(), 5) << toString(kind);
     }
   }
 }
