@@ -113,7 +113,7 @@ const char *toString(ImageFault fault)
 
 struct ImageHealth::State
 {
-  Options options;
+  bool detects_frozen = true;
   cv::Mat last;     ///< the last accepted image
   cv::Mat thumb;    ///< of it
   cv::Mat previous; ///< thumb of the last image that had a picture in it, accepted or not
@@ -212,7 +212,7 @@ ImageFault ImageHealth::State::judgeQuality(const ImageNumbers &numbers)
 /// The last accepted image again, pixel by pixel or under fresh noise.
 ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &small)
 {
-  if (!options.detect_frozen || may_repeat)
+  if (!detects_frozen || may_repeat)
     return ImageFault::none;
   const int changed = cv::countNonZero(image != last);
   if (changed <= (1 - kSamePixels) * static_cast<double>(image.total()))
@@ -341,8 +341,10 @@ void ImageHealth::State::accept(const cv::Mat &image, const cv::Mat &small, cons
   gyro_from_last = Eigen::Vector3d::Zero();
 }
 
-ImageHealth::ImageHealth() : ImageHealth(Options{}) {}
-ImageHealth::ImageHealth(const Options &options) : m_state(std::make_unique<State>()) { m_state->options = options; }
+ImageHealth::ImageHealth(bool detects_frozen) : m_state(std::make_unique<State>())
+{
+  m_state->detects_frozen = detects_frozen;
+}
 ImageHealth::~ImageHealth() = default;
 ImageHealth::ImageHealth(ImageHealth &&) noexcept = default;
 ImageHealth &ImageHealth::operator=(ImageHealth &&) noexcept = default;
@@ -351,9 +353,9 @@ const std::string &ImageHealth::reason() const { return m_state->reason; }
 
 void ImageHealth::start(const vpImage<unsigned char> &I)
 {
-  const Options options = m_state->options;
+  const bool detects_frozen = m_state->detects_frozen;
   *m_state = State();
-  m_state->options = options;
+  m_state->detects_frozen = detects_frozen;
   const cv::Mat image(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
   const cv::Mat small = thumbOf(image);
   m_state->accept(image, small, measureImage(image));

@@ -62,13 +62,8 @@ struct MeasuredRotation
 class ImageHealth
 {
 public:
-  struct Options
-  {
-    bool detect_frozen = true; ///< off for a camera that may stand still without any noise
-    void validate() const {}
-  };
-  ImageHealth();
-  explicit ImageHealth(const Options &options);
+  /// \p detects_frozen: off for a camera that may stand still without any noise.
+  explicit ImageHealth(bool detects_frozen = true);
   ~ImageHealth();
   ImageHealth(ImageHealth &&) noexcept;
   ImageHealth &operator=(ImageHealth &&) noexcept;

@@ -55,9 +55,7 @@ void vpMbTrunkTracker::setOptions(const Options &options)
 {
   options.validate();
   m_impl->estimator.options = options;
-  bole::ImageHealth::Options health;
-  health.detect_frozen = options.detect_frozen > 0.5;
-  m_impl->health = bole::ImageHealth(health);
+  m_impl->health = bole::ImageHealth(options.detect_frozen > 0.5);
 }
 
 void vpMbTrunkTracker::setMotionPrior(const vpHomogeneousMatrix &cMo, const vpMatrix &covariance)
