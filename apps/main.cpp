@@ -7,14 +7,12 @@
 #include "output/versions.h"
 
 #include <algorithm>
-#include <bole/visp.h>
 #include <cstdio>
 #include <functional>
 #include <pthread.h>
 #include <string>
 #include <sys/resource.h>
 #include <thread>
-#include <visp3/core/vpException.h>
 
 namespace
 {
@@ -121,11 +119,7 @@ int run(CLI::App &app, int argc, char **argv)
   catch (const CLI::ParseError &error) {
     return error.get_exit_code() == 0 ? app.exit(error) : refuse(app, error);
   }
-  catch (const vpException &error) {
-    std::fprintf(stderr, "bole: %s\n", error.what());
-    return static_cast<int>(ExitCode::error);
-  }
-  catch (const std::exception &error) {
+  catch (const std::exception &error) { // vpException too
     std::fprintf(stderr, "bole: %s\n", error.what());
     return static_cast<int>(ExitCode::error);
   }
