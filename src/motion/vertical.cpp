@@ -71,7 +71,6 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
   constexpr double kShared = 4;            // inflates the covariance: patches of one trunk share its lean
   VerticalEstimate estimate;
   estimate.up = expected;
-  estimate.covariance = kPriorSigma * kPriorSigma * Eigen::Matrix2d::Identity();
   if (edges.size() < static_cast<std::size_t>(kLeastEdges))
     return estimate;
   const double inflation = kShared * frames;
@@ -104,13 +103,18 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
     if (cost < best) {
       best = cost;
       estimate.up = up;
-      estimate.covariance = H.inverse();
+      estimate.information = H - kPrior * Eigen::Matrix2d::Identity();
+      estimate.gradient = -kPrior * directionMinus(expected, up);
       estimate.edges = agreeing;
     }
   }
-  // edges at random agree too: those of a painted wall would put up anywhere
-  const double beyond_chance = estimate.edges - kChance * static_cast<double>(edges.size());
-  if (estimate.edges >= kLeastEdges && beyond_chance > 0.5 * estimate.edges)
+  // Edges at random agree too: those of a painted wall would put up anywhere. What remains may still be wrong in
+  // common, the more the fewer they are.
+  constexpr double kLeastShare = 0.25;
+  estimate.share = std::max(0.0, 1 - kChance * static_cast<double>(edges.size()) / std::max(1, estimate.edges));
+  estimate.information *= estimate.share * estimate.share;
+  estimate.gradient *= estimate.share * estimate.share;
+  if (estimate.edges >= kLeastEdges && estimate.share > kLeastShare)
     estimate.status = VerticalStatus::ok;
   return estimate;
 }
@@ -140,24 +144,42 @@ VerticalEstimate VerticalFinder::find(const vpImage<unsigned char> &image, const
 
 void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate)
 {
+  constexpr double kDrift = 1e-3; // standard deviation by which the rotation of a path errs from frame to frame [rad]
+  constexpr int kIterations = 3;
   if (estimate.status != VerticalStatus::ok)
     return;
-  const Matrix32d B = wRc * directionBasis(estimate.up);
-  const Eigen::Matrix3d information = B * estimate.covariance.inverse() * B.transpose();
   const Eigen::Vector3d seen = wRc * estimate.up;
+  if (m_n == 0) { // cameras are held upright, more or less
+    m_up = wRc * -Eigen::Vector3d::UnitY();
+    m_information = (Eigen::Matrix3d::Identity() - m_up * m_up.transpose()) / (kPriorSigma * kPriorSigma);
+  }
+  const Eigen::Vector3d before = m_up;
+  const Matrix32d at = directionBasis(before);
+  const Eigen::Matrix2d covariance =
+      (at.transpose() * m_information * at).inverse() + kDrift * kDrift * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d known = covariance.inverse();
+  // The log-likelihood of this frame about what it saw, in w.
+  const Matrix32d B = wRc * directionBasis(estimate.up);
+  const Eigen::Matrix3d information = B * estimate.information * B.transpose();
+  const Eigen::Vector3d gradient = B * estimate.gradient;
+  const auto gradientAt = [&](const Eigen::Vector3d &up) -> Eigen::Vector3d {
+    return gradient - information * directionBasis(seen) * directionMinus(up, seen);
+  };
+  const Eigen::Matrix2d H = at.transpose() * information * at;
+  double weight = 1;
   if (m_n >= 5) { // frames that contradict the others say less
-    const double off = seen.cross(m_up).norm();
-    const double variance = estimate.covariance.trace();
-    const double w = 1 / (1 + off * off / (4 * variance));
-    m_information += w * information;
-    m_weighted += w * seen / variance;
+    const Eigen::Vector2d g = at.transpose() * gradientAt(before);
+    const double off2 = g.dot((H + H * covariance * H + 1e-9 * Eigen::Matrix2d::Identity()).ldlt().solve(g));
+    weight = 1 / (1 + off2 / 4);
   }
-  else {
-    m_information += information;
-    m_weighted += seen / estimate.covariance.trace();
-  }
+  for (int i = 0; i < kIterations; ++i)
+    m_up = directionPlus(before, directionMinus(m_up, before) + (known + weight * H)
+                                                                    .ldlt()
+                                                                    .solve(weight * at.transpose() * gradientAt(m_up) -
+                                                                           known * directionMinus(m_up, before)));
+  m_information = at * (known + weight * H) * at.transpose();
   ++m_n;
-  m_up = m_weighted.normalized();
+  m_share += estimate.share;
 }
 
 Eigen::Matrix2d VerticalFilter::covariance() const

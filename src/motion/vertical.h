@@ -38,9 +38,15 @@ enum class VerticalStatus
 struct VerticalEstimate
 {
   VerticalStatus status = VerticalStatus::too_few_edges;
-  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();           ///< unit vector in the camera frame
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity(); ///< in directionBasis(up) [rad^2]
-  int edges = 0;                                            ///< patches that agree
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY(); ///< unit vector in the camera frame, with the prior
+  /// What the edges alone say, in directionBasis(up): information [1/rad^2] and gradient [1/rad] of their
+  /// log-likelihood at up, where the prior balances it.
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  int edges = 0;    ///< patches that agree
+  double share = 0; ///< of them beyond those that would agree by chance, 0 to 1
+
+  bool isSure() const { return status == VerticalStatus::ok && share > 0.5; }
 };
 
 /// A straight edge that may be vertical, in the frame of a camera or of a path.
@@ -69,13 +75,16 @@ private:
   std::deque<std::vector<VerticalEdge>> m_earlier; ///< of the last images, in w
 };
 
-/// Up in the frame w of a path, from many frames: directions \p up seen with \p covariance in the
-/// camera at \p wRc are averaged (robustly) as the flight goes on.
+/// Up in the frame w of a path, from many frames: a Kalman filter of a direction. A narrow view sees its roll and
+/// hardly its pitch, so each frame counts in the directions that its edges tell; the rotation of the path drifts, so
+/// old frames fade.
+///
+/// Laws (each a test): a pan tells what one view cannot; a path that drifts is followed.
 class VerticalFilter
 {
 public:
   void add(const Eigen::Matrix3d &wRc, const VerticalEstimate &estimate);
-  bool known() const { return m_n >= 3; }
+  bool known() const { return m_share > 1.5; } ///< three frames of which half of the edges agree, or more of fewer
   /// Unit vector in w; valid once known().
   Eigen::Vector3d up() const { return m_up; }
   /// In directionBasis(up()) [rad^2]. Frames share the lean of their trunks: ten of them count as
@@ -84,8 +93,8 @@ public:
 
 private:
   Eigen::Vector3d m_up = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d m_information = Eigen::Matrix3d::Zero(); ///< in w, rank 2 a frame
-  Eigen::Vector3d m_weighted = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d m_information = Eigen::Matrix3d::Zero(); ///< in w, across m_up [1/rad^2]
   int m_n = 0;
+  double m_share = 0; ///< sum over the frames
 };
 } // namespace bole

@@ -32,16 +32,15 @@ Matrix3d levelled(const Matrix3d &wRb, const Vector3d &bup)
   return Eigen::Quaterniond::FromTwoVectors(wRb * bup, Vector3d::UnitZ()).toRotationMatrix() * wRb;
 }
 
-/// Roll and pitch alone, at the body \p wMb with up in the direction \p bup.
-PosePrior tiltPrior(const Pose &wMb, const Vector3d &bup, double sigma)
+/// Roll and pitch alone, at the body \p wMb with up in the direction \p bup of the \p covariance across it.
+PosePrior tiltPrior(const Pose &wMb, const Vector3d &bup, const Matrix3d &covariance)
 {
   PosePrior prior;
   prior.mean = Pose(levelled(wMb.R, bup), wMb.t);
-  const Matrix3d bRw = prior.mean.R.transpose();
   prior.covariance.setZero();
   prior.covariance.topLeftCorner<3, 3>() = 1e4 * Matrix3d::Identity();
-  prior.covariance.bottomRightCorner<3, 3>() =
-      bRw * Vector3d(sigma * sigma, sigma * sigma, 10).asDiagonal() * bRw.transpose();
+  const Matrix3d across = skew(bup); // a direction turns about what is across it
+  prior.covariance.bottomRightCorner<3, 3>() = across * covariance * across.transpose() + 10 * bup * bup.transpose();
   return prior;
 }
 } // namespace
@@ -88,7 +87,7 @@ PointOdometryResult MonocularMotion::place(const Frame &frame, const std::option
   const VerticalEstimate vertical = m_verticals.find(frame.image, m_camera, placed.wMc.R, up());
   m_vertical.add(placed.wMc.R, vertical);
   m_frames_with_up += vertical.status == VerticalStatus::ok;
-  if (vertical.status == VerticalStatus::ok)
+  if (vertical.isSure())
     m_first_up = vertical.up;
   if (!m_has_unit && placed.status == PointOdometryStatus::ok)
     chooseUnit();
@@ -264,8 +263,10 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
     motion.odometry.push_back({last_placed, m_frame, odometry});
   motion.step.is_step_measured = m_has_unit && placed.status == PointOdometryStatus::ok;
   if (up()) { // frames share the lean of their trunks: the sum over frames must not know more than the filter
-    const double sigma = upSigma() * std::sqrt(std::min(30.0, double(m_frames_with_up)));
-    motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), sigma);
+    const Matrix3d bRw = m_bMc.R * m_pointsMc.R.transpose();
+    const Matrix32d basis = bRw * directionBasis(m_vertical.up());
+    const Matrix3d covariance = std::min(30, m_frames_with_up) * basis * m_vertical.covariance() * basis.transpose();
+    motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), covariance);
   }
   learnGround(wMa * motion.step.aMb);
 }
