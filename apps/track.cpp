@@ -256,8 +256,10 @@ void track(const TrackArguments &asked_for)
   RunSummary made = describeRun(arguments);
   SensorCalibration calibration;
   const auto source = openInput(arguments, asked, made, calibration);
-  for (const SensorVerdict &verdict : calibration.verdicts)
-    (verdict.sensor == "gyro" ? arguments.is_without_gyro : arguments.is_without_odometry) = true;
+  for (const SensorVerdict &verdict : calibration.verdicts) {
+    arguments.is_without_gyro = arguments.is_without_gyro || verdict.sensor == "gyro";
+    arguments.is_without_odometry = arguments.is_without_odometry || verdict.sensor == "odometry";
+  }
   made.sensors = calibration.verdicts;
   Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());

@@ -68,6 +68,8 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
   ++m_summary.frames[report.frame_status];
   if (report.frame_status != FrameStatus::ok && !report.reason.empty())
     m_summary.reasons.emplace(report.frame_status, report.reason);
+  if (report.gap_s > 0)
+    m_summary.gaps.push_back({1e-9 * static_cast<double>(report.stamp_ns) - report.gap_s, report.gap_s});
   m_summary.sensors = m_sensors_before;
   m_summary.sensors.insert(m_summary.sensors.end(), report.verdicts.begin(), report.verdicts.end());
   m_first_ns = m_is_begun ? m_first_ns : frame.stamp_ns;

@@ -40,7 +40,7 @@ struct GyroSample
 struct SensorVerdict
 {
   std::string sensor; ///< "gyro", "odometry" or "images"
-  std::string kind;   ///< for programs: rotation, bias, time, stuck, ended, jump, noise, direction or tilt
+  std::string kind;   ///< rotation, bias, time, stuck, ended, jump, noise, direction, tilt, height, scale, focal, mount
   double since_s = 0; ///< stamp at which the contradiction began [s]
   std::string text;   ///< for the user: "odometry: frozen since 5.0 s"
 };
@@ -51,7 +51,8 @@ struct Frame
   std::int64_t stamp_ns = 0;            ///< time of the middle of the exposure
   std::size_t index = 0;                ///< position in the source, counted with missing frames
   FrameStatus status = FrameStatus::ok; ///< whether the picture may be used
-  std::string message;                  ///< why the status is not ok
+  std::string message;                  ///< why the status is not ok, or what is wrong with its time
+  double gap_s = 0;                     ///< [s] since the frame before, where that is far longer than usual; else 0
   vpImage<unsigned char> image;         ///< grey, rectified: the pinhole of FrameSource::camera() applies
   std::optional<Pose> wMb_odometry;     ///< pose filter at this frame, where there is one
   /// [ns] of the host's steady clock when the last byte of the frame came; 0 for recordings.

@@ -69,7 +69,8 @@ struct FrameReport
   std::size_t index = 0;                                  ///< frames processed before this one
   std::int64_t stamp_ns = 0;                              ///< of the frame
   FrameStatus frame_status = FrameStatus::ok;             ///< whether its picture was used
-  std::string reason;                                     ///< why the status is not ok
+  std::string reason;                                     ///< why the status is not ok, or Frame::message
+  double gap_s = 0;                                       ///< Frame::gap_s
   Pose wMb;                                               ///< as known right after this frame
   Pose wMc;                                               ///< as known right after this frame
   Matrix6d pose_covariance = Matrix6d::Identity();        ///< of (rho, phi) of wMb, scale error left out

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_health.h"
 
+#include "geometry/median.h"
 #include "geometry/so3.h"
+
+#include <algorithm>
+#include <fmt/format.h>
 
 namespace bole
 {
 namespace
 {
 constexpr double kLargestGyroGap_s = 0.05; // beyond, the rotation between two samples is a guess
+constexpr double kLeastGap_s = 0.5;        // as a gyro or an odometry is called silent; a gap of less costs no trunk
+constexpr double kUnusual = 3;             // two frames in a row that did not come
+constexpr std::size_t kFewestIntervals = 3, kMostIntervals = 15; // that tell what is usual
 
 /// Rotation vector of the body over (\p from_ns, \p to_ns]; nothing where the samples do not cover it.
 std::optional<Eigen::Vector3d> integrated(const std::vector<GyroSample> &gyro, std::int64_t from_ns, std::int64_t to_ns)
@@ -45,9 +52,27 @@ MeasuredRotation FrameHealth::motionTo(const Frame &frame) const
   return motion;
 }
 
+void FrameHealth::judgeInterval(Frame &frame)
+{
+  if (!m_last_stamp_ns)
+    return;
+  const double interval_s = 1e-9 * static_cast<double>(frame.stamp_ns - *m_last_stamp_ns);
+  const double usual_s = medianOf({m_intervals_s.begin(), m_intervals_s.end()});
+  m_intervals_s.push_back(interval_s);
+  if (m_intervals_s.size() > kMostIntervals)
+    m_intervals_s.pop_front();
+  if (frame.status == FrameStatus::missing || m_intervals_s.size() <= kFewestIntervals ||
+      interval_s <= std::max(kLeastGap_s, kUnusual * usual_s))
+    return;
+  frame.gap_s = interval_s;
+  if (frame.message.empty())
+    frame.message = fmt::format("no picture for {:.1f} s before it", interval_s);
+}
+
 void FrameHealth::judge(Frame &frame)
 {
   const MeasuredRotation motion = motionTo(frame);
+  judgeInterval(frame);
   m_last_stamp_ns = frame.stamp_ns;
   m_last_odometry = frame.wMb_odometry;
   if (frame.status != FrameStatus::ok || frame.image.getSize() == 0)

@@ -108,15 +108,16 @@ struct Turn
   double duration() const { return secondsOf(b_ns - a_ns); }
 };
 
-/// A least squares fit.
-struct Fitted
+/// A least squares fit of P unknowns.
+template <int P> struct FittedOf
 {
   double cost = 0; ///< robust, counting what overlaps once
-  Vector3d value = Vector3d::Zero();
-  Matrix3d covariance = Matrix3d::Zero();
+  Eigen::Matrix<double, P, 1> value = Eigen::Matrix<double, P, 1>::Zero();
+  Eigen::Matrix<double, P, P> covariance = Eigen::Matrix<double, P, P>::Zero();
   double failing = 1; ///< share of the measurements that contradict it
-  std::size_t count = 0;
+  double scatter = 1; ///< variance of what is left over what it should be
 };
+using Fitted = FittedOf<3>;
 
 /// Median of the squares of three normal errors each, over what it should be; at least 1.
 double scatterOf(const std::vector<double> &squares) { return std::max(1.0, medianOf(squares) / 2.37); }
@@ -127,37 +128,39 @@ double failingOf(const std::vector<double> &squares)
   return squares.empty() ? 1 : double(failing) / double(squares.size());
 }
 
-/// A linear measurement r + J x of three unknowns with its information W.
-struct Row
+/// A linear measurement r + J x of P unknowns with its information W.
+template <int P> struct RowOf
 {
+  using Unknowns = Eigen::Matrix<double, P, 1>;
   template <int N>
-  Row(const Eigen::Matrix<double, N, 3> &J, const Eigen::Matrix<double, N, 1> &r, const Eigen::Matrix<double, N, N> &W,
-      double overlap_)
+  RowOf(const Eigen::Matrix<double, N, P> &J, const Eigen::Matrix<double, N, 1> &r,
+        const Eigen::Matrix<double, N, N> &W, double overlap_)
       : JWJ(J.transpose() * W * J), JWr(J.transpose() * W * r), rWr(r.dot(W * r)), size(N), overlap(overlap_)
   {
   }
   /// Of what is left of it at \p x, as of three numbers.
-  double squares(const Vector3d &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
+  double squares(const Unknowns &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
 
-  Matrix3d JWJ;
-  Vector3d JWr;
+  Eigen::Matrix<double, P, P> JWJ;
+  Unknowns JWr;
   double rWr = 0;
   int size = 3;
   double overlap = 1; ///< measurements that share what they measured
 };
+using Row = RowOf<3>;
 
 /// Robust solution; \p prior2: variance of each unknown.
-Fitted solve(const std::vector<Row> &rows, double prior2, double scatter = 0)
+template <int P>
+FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter)
 {
-  Fitted fit;
-  fit.count = rows.size();
+  FittedOf<P> fit;
   constexpr int kIterations = 6;
   std::vector<double> squares(rows.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    Matrix3d H = Matrix3d::Identity() / prior2;
-    Vector3d g = Vector3d::Zero();
+    Eigen::Matrix<double, P, P> H = prior2.cwiseInverse().asDiagonal();
+    typename RowOf<P>::Unknowns g = RowOf<P>::Unknowns::Zero();
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Row &row = rows[i];
+      const RowOf<P> &row = rows[i];
       const double w = (iteration == 0 ? 1 : weightFor(squares[i])) / row.overlap;
       H += w * row.JWJ;
       g += w * row.JWr;
@@ -168,11 +171,15 @@ Fitted solve(const std::vector<Row> &rows, double prior2, double scatter = 0)
       squares[i] = rows[i].squares(fit.value);
   }
   fit.failing = failingOf(squares);
-  const double inflation = scatter > 0 ? scatter : scatterOf(squares);
-  fit.covariance *= inflation;
+  fit.scatter = scatter > 0 ? scatter : scatterOf(squares);
+  fit.covariance *= fit.scatter;
   for (std::size_t i = 0; i < rows.size(); ++i)
-    fit.cost += soft(squares[i] / inflation) / rows[i].overlap;
+    fit.cost += soft(squares[i] / fit.scatter) / rows[i].overlap;
   return fit;
+}
+Fitted solve(const std::vector<Row> &rows, double prior2, double scatter = 0)
+{
+  return solve<3>(rows, Vector3d::Constant(prior2), scatter);
 }
 
 /// The bias of a gyro that is \p late_s, by the rotations of the points.
@@ -186,6 +193,37 @@ Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late
                         logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
   }
   return solve(rows, kWideBias * kWideBias, scatter);
+}
+
+/// Errors in what relates camera and gyro, which turn the points' rotations against the gyro's by a share of the
+/// rotation itself: beside the bias the attitude of the camera on the body, its two focal lengths, and the scale of the
+/// gyro.
+constexpr int kShares = 9;
+constexpr double kFocal = 0.007;    ///< of the narrow part of the prior on the share of a focal length
+constexpr double kGyroScale = 0.01; ///< ... of the gyro's rates
+constexpr double kMostShare = 0.6;  ///< more is another fault
+constexpr double kWideShare = 0.5;  ///< of the wide ones, and of the attitude [rad]
+struct Relation
+{
+  int first, count; ///< of its unknowns
+  double narrow;
+};
+constexpr Relation kAttitude{3, 3, kMount}, kFocalLengths{6, 2, kFocal}, kRates{8, 1, kGyroScale};
+
+std::vector<RowOf<kShares>> rowsOfShares(const GyroPath &path, const std::vector<Turn> &turns, const Matrix3d &bRc,
+                                         double late_s, double overlap)
+{
+  std::vector<RowOf<kShares>> rows;
+  for (const Turn &turn : turns) {
+    const auto turned = path.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
+    if (!turned)
+      continue;
+    const Vector3d angle = logSo3(*turned), seen = bRc.transpose() * angle;
+    Eigen::Matrix<double, 3, kShares> J;
+    J << turn.duration() * Matrix3d::Identity(), -skew(angle), bRc.col(1) * seen.y(), bRc.col(0) * seen.x(), angle;
+    rows.emplace_back(J, Vector3d(logSo3(orthonormalized(turned->transpose() * turn.aRb))), turn.information, overlap);
+  }
+  return rows;
 }
 
 /// A minimum over offsets of a clock, refined by a parabola.
@@ -211,6 +249,20 @@ template <typename Cost> Minimum minimiseLate(const Cost &cost)
   minimum.sigma_s = kLateStep_s * std::sqrt(2 / curvature);
   minimum.gain = costs[kLateSteps] - (*best - 0.5 * curvature * vertex * vertex);
   return minimum;
+}
+
+/// The bias and what \p open holds, the others as they are stated; the cost counts what each is off that.
+FittedOf<kShares> fitShares(const std::vector<RowOf<kShares>> &rows, const std::vector<Relation> &open, double scatter)
+{
+  Eigen::Matrix<double, kShares, 1> prior;
+  prior.head<3>().setConstant(kWideBias);
+  for (const Relation &relation : {kAttitude, kFocalLengths, kRates})
+    prior.segment(relation.first, relation.count).setConstant(relation.narrow);
+  for (const Relation &relation : open)
+    prior.segment(relation.first, relation.count).setConstant(kWideShare);
+  FittedOf<kShares> fit = solve<kShares>(rows, prior.cwiseAbs2(), scatter);
+  fit.cost += fit.value.cwiseQuotient(prior).squaredNorm();
+  return fit;
 }
 
 /// What is left of the frames once the constants are taken out.
@@ -270,6 +322,8 @@ public:
     if (!m_samples.empty() && m_turns.size() >= kLeastMotions)
       calibrateGyro();
     const SensorCalibration gyro_alone = m_result;
+    if (!m_result.verdicts.empty())
+      return m_result; // whatever else is measured rests on camera and gyro
     if (m_is_gyro_explained) {
       calibrateOdometryClock();
       calibrateRotation();
@@ -286,6 +340,7 @@ public:
 
 private:
   void calibrateGyro();
+  void judgeCamera(const GyroPath &path, const std::vector<Turn> &turns);
   void calibrateRotation();
   void calibrateOdometryClock();
   void calibrateScale();
@@ -316,9 +371,10 @@ void Estimation::calibrateGyro()
   Vector3d bias = Vector3d::Zero();
   Minimum late;
   Fitted fit;
+  std::vector<Turn> turns;                  // that every offset can be tried on
   for (int round = 0; round < 2; ++round) { // the second one with the bias taken off exactly
     const GyroPath path(m_samples, bias);
-    std::vector<Turn> turns; // that every offset can be tried on
+    turns.clear();
     for (const Turn &turn : m_turns)
       if (path.between(turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
         turns.push_back(turn);
@@ -339,6 +395,7 @@ void Estimation::calibrateGyro()
     fit = fitBias(path, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
     bias += fit.value;
   }
+  judgeCamera(GyroPath(m_samples, bias), turns);
   m_is_gyro_explained = fit.failing < kMostFailing;
   if (!m_is_gyro_explained)
     return;
@@ -356,6 +413,60 @@ void Estimation::calibrateGyro()
        fmt::format("gyro: bias {:.3f} +- {:.3f} rad/s", bias.norm(), sigma));
   if (is_biased)
     m_result.gyro_bias = bias;
+}
+
+/// What \p relation was found to be, with its sigma, for the user.
+SensorVerdict verdictOf(const Relation &relation, const Eigen::VectorXd &x, double sigma)
+{
+  if (relation.first == kFocalLengths.first) {
+    const Eigen::Array2d percent = 100 * (1 / (1 - x.array()) - 1);
+    return {
+        "images", "focal", 0,
+        fmt::format("images: focal lengths of the camera file off by {:+.1f} % (fx) and {:+.1f} % (fy), +- {:.1f} %, "
+                    "by the gyro",
+                    percent[0], percent[1], 100 * sigma)};
+  }
+  if (relation.first == kAttitude.first)
+    return {"images", "mount", 0,
+            fmt::format("images: the camera stands {:.1f} +- {:.1f} degrees otherwise to the gyro than T_BS says (roll "
+                        "{:.1f}, pitch {:.1f}, yaw {:.1f})",
+                        x.norm() / kDegree, sigma / kDegree, x[0] / kDegree, x[1] / kDegree, x[2] / kDegree)};
+  return {"gyro", "scale", 0,
+          fmt::format("gyro: its rates are off by {:+.1f} +- {:.1f} %", 100 * x[0] / (1 - x[0]), 100 * sigma)};
+}
+
+/// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of what was looked
+/// through. The user's numbers are not changed.
+void Estimation::judgeCamera(const GyroPath &path, const std::vector<Turn> &turns)
+{
+  constexpr double kAsGood = 9;   // the data do not tell one from the other: three standard deviations
+  constexpr double kInHalves = 6; // two and a half: what begins later is no constant
+  const std::vector<Relation> all = {kAttitude, kFocalLengths, kRates};
+  const auto rowsAt = [&](double late_s) { return rowsOfShares(path, turns, m_bMc.R, late_s, m_overlap); };
+  const Minimum late = minimiseLate([&](double late_s) { return fitShares(rowsAt(late_s), all, 1).cost; });
+  if (!late.is_inside)
+    return;
+  const std::vector<RowOf<kShares>> rows = rowsAt(late.late_s);
+  const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
+  const double scatter = fitShares(rows, all, 0).scatter;
+  const auto gainOf = [&](const std::vector<RowOf<kShares>> &some, const Relation &relation) {
+    return fitShares(some, {}, scatter).cost - fitShares(some, {relation}, scatter).cost;
+  };
+  double best = 0;
+  for (const Relation &relation : all) {
+    const FittedOf<kShares> fit = fitShares(rows, {relation}, scatter);
+    const Eigen::VectorXd x = fit.value.segment(relation.first, relation.count);
+    const double variance = fit.covariance.diagonal().segment(relation.first, relation.count).mean();
+    const double gain = gainOf(rows, relation);
+    if (gain < std::max(kBetter, best - kAsGood) || fit.failing >= kMostFailing || x.maxCoeff() > kMostShare ||
+        gainOf({rows.begin(), middle}, relation) < kInHalves || gainOf({middle, rows.end()}, relation) < kInHalves)
+      continue;
+    if (gain > best + kAsGood)
+      m_result.verdicts.clear();
+    m_result.verdicts.push_back(verdictOf(relation, x, std::sqrt(variance)));
+    m_result.verdicts.back().since_s = secondsOf(m_frames.front().stamp_ns);
+    best = std::max(best, gain);
+  }
 }
 
 /// Direction of flight: bRo takes that of the odometry to that of the points.

@@ -244,6 +244,8 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
     m_steps.clear();
     return;
   }
+  if (!m_had_odometry)
+    checkHeight(frame.wMb_odometry->t.z(), time_s);
   m_had_odometry = true;
   m_last_odometry_ns = frame.stamp_ns;
   Step step;
@@ -268,14 +270,35 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
         is_wrong = true;
         step.velocity = before.velocity;
         step.scatter = 0;
-        raise(Sensor::odometry, "jump", time_s, fmt::format("odometry: jump of {:.1f} m at {:.1f} s", extent, time_s),
-              Lasts::no);
+        step.is_jump = true;
+        raiseJump(extent, time_s);
       }
     }
   }
   m_steps.push_back(step);
   checkStandingStill(time_s);
   checkScatter();
+}
+
+/// Where the flight begins: trunks are looked for from the ground on, z = 0.
+void SensorMonitor::checkHeight(double height, double time_s)
+{
+  if (height < m_options.height_low || height > m_options.height_high)
+    raise(Sensor::odometry, "height", time_s,
+          fmt::format("odometry: its heights begin at {:.1f} m, must be over the ground (over the sea?)", height));
+}
+
+/// A filter may jump where it is corrected; one that goes on jumping tells no motion.
+void SensorMonitor::raiseJump(double extent, double time_s)
+{
+  constexpr std::ptrdiff_t kTooMany = 3; // before this one, within the memory
+  const auto isJump = [](const Step &step) { return step.is_jump; };
+  const auto first = std::find_if(m_steps.begin(), m_steps.end(), isJump);
+  if (std::count_if(first, m_steps.end(), isJump) < kTooMany)
+    raise(Sensor::odometry, "jump", time_s, fmt::format("odometry: jump of {:.1f} m at {:.1f} s", extent, time_s),
+          Lasts::no);
+  else
+    raise(Sensor::odometry, "noise", inSeconds(first->stamp_ns), "odometry: jumps again and again");
 }
 
 /// An odometry that stays where it is while the points move.

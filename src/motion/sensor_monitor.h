@@ -5,10 +5,10 @@
 ///
 /// Idea: gyro, odometry and points each measure the rotation between two frames. Every pair of them is compared by the
 /// squared difference over its variance; the sensor that stands in both failing pairs is the one that lies. Further
-/// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, leans against the accelerometer
-/// or flies askew to the points' direction; a gyro that repeats its value or ends. A pair fails when at least
-/// `of_window` of the last `window` comparisons exceed a limit, so that one false match raises no alarm. Stamps of the
-/// images that are off by an error of their own show otherwise: see checkStamps().
+/// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, begins far from the ground,
+/// leans against the accelerometer or flies askew to the points' direction; a gyro that repeats its value or ends. A
+/// pair fails when at least `of_window` of the last `window` comparisons exceed a limit, so that one false match raises
+/// no alarm. Stamps of the images that are off by an error of their own show otherwise: see checkStamps().
 ///
 /// Where the points contradict the gyro, the odometry, too coarse to fail against either, still says which of the two
 /// is more likely: its two squared differences are summed over the window.
@@ -56,10 +56,12 @@ struct SensorMonitorOptions
   double odometry_relative = 0.03;     ///< of its translation, in proportion
   double jump = 0.3;                   ///< of the odometry between two frames beyond what its velocity explains [m]
   double noise_factor = 4;             ///< scatter of the odometry over what odometry_walk says
-  double tilt_limit = 0.06;            ///< of the odometry's gravity against the accelerometer's, over 3 s [rad]
-  double direction_limit = 0.1;        ///< of a constant rotation between odometry and camera [rad]
-  double silence_s = 0.5;              ///< without a sample from a sensor that had some
-  double stuck_s = 0.5;                ///< with one value
+  double height_low = -2, height_high = 10; ///< of the odometry over the ground where it begins [m]: it may count from
+                                            ///< the body at take-off, and above the crowns no trunk is seen
+  double tilt_limit = 0.06;                 ///< of the odometry's gravity against the accelerometer's, over 3 s [rad]
+  double direction_limit = 0.1;             ///< of a constant rotation between odometry and camera [rad]
+  double silence_s = 0.5;                   ///< without a sample from a sensor that had some
+  double stuck_s = 0.5;                     ///< with one value
   double limit_stamps = 15; ///< of the log-likelihood ratio of stamps that scatter; 42 clean flights stay below 2
 };
 
@@ -103,6 +105,7 @@ private:
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< world [m/s]
     double scatter = 0;                                 ///< squared change of the horizontal step over what is expected
     double parallax_px = 0;
+    bool is_jump = false;
     bool is_held = false; ///< the pose before once more, while the points moved
   };
 
@@ -110,6 +113,8 @@ private:
   void compare(const Frame &frame, const RelativeMotion &motion);
   void checkGyroSamples(const Frame &frame);
   void checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions);
+  void checkHeight(double height, double time_s);
+  void raiseJump(double extent, double time_s);
   void checkStandingStill(double time_s);
   void checkScatter();
   void judgeFrame(const Frame &frame);

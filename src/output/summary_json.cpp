@@ -126,6 +126,9 @@ std::string toJson(const RunSummary &summary)
   json["ranges"] = summary.reference.has_ranges;
   json["motion"] = motionJson(summary);
   json["frames"] = framesJson(summary.frames);
+  json["gaps"] = Json::array();
+  for (const PictureGap &gap : summary.gaps)
+    json["gaps"].push_back({{"begin_s", gap.begin_s}, {"length_s", gap.length_s}});
   json["calibration"] = Json::array();
   for (const CalibratedConstant &constant : summary.calibration)
     json["calibration"].push_back({{"name", constant.name},

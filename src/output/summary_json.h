@@ -17,6 +17,13 @@
 
 namespace bole
 {
+/// A time without a picture.
+struct PictureGap
+{
+  double begin_s = 0; ///< stamp of the last frame before it
+  double length_s = 0;
+};
+
 struct RunSummary
 {
   // how the run was made
@@ -37,6 +44,7 @@ struct RunSummary
   WorldReference reference;                    ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
   std::map<FrameStatus, std::string> reasons; ///< the first message of each status
+  std::vector<PictureGap> gaps;               ///< times without a picture that are far longer than usual
   std::vector<SensorVerdict> sensors;         ///< sensors that contradict the others
   double duration_s = 0;                      ///< from the first frame to the last
   double path_m = 0;                          ///< length of the smoothed trajectory

@@ -27,11 +27,22 @@ std::size_t goodFrames(const RunSummary &summary)
   return ok == summary.frames.end() ? 0 : ok->second;
 }
 
+std::string gapsText(const std::vector<PictureGap> &gaps)
+{
+  if (gaps.empty())
+    return {};
+  const auto longest = std::max_element(
+      gaps.begin(), gaps.end(), [](const PictureGap &a, const PictureGap &b) { return a.length_s < b.length_s; });
+  const std::string text =
+      fmt::format("; no picture for {:.1f} s from {:.1f} s on", longest->length_s, longest->begin_s);
+  return gaps.size() == 1 ? text : fmt::format("{}, the longest of {} gaps", text, gaps.size());
+}
+
 std::string framesText(const RunSummary &summary)
 {
   const std::size_t all = framesIn(summary), good = goodFrames(summary);
   if (good == all)
-    return fmt::format("{} frames, all ok", all);
+    return fmt::format("{} frames, all ok{}", all, gapsText(summary.gaps));
   std::string text = fmt::format("{} of {} frames ok", good, all);
   for (const auto &[status, count] : summary.frames) {
     if (status == FrameStatus::ok)
@@ -41,7 +52,7 @@ std::string framesText(const RunSummary &summary)
     if (reason != summary.reasons.end())
       text += fmt::format(" ({})", reason->second);
   }
-  return text;
+  return text + gapsText(summary.gaps);
 }
 
 double medianOf(const RunSummary &summary, double (TrunkRecord::*sigma)() const)

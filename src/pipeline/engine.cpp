@@ -323,6 +323,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   m_online.push_back({frame.stamp_ns, wMb});
   report.index = newest();
   report.stamp_ns = frame.stamp_ns;
+  report.gap_s = frame.gap_s;
   report.frame_status = motion.image_fault.empty() ? frame.status : FrameStatus::doubtful;
   report.reason = motion.image_fault.empty() ? frame.message : motion.image_fault;
   report.wMb = wMb;

@@ -90,14 +90,18 @@ void readFrames(const fs::path &run, double since_s, Result &result)
     result.names += (result.names.empty() ? "" : ", ") + name.substr(0, 40);
 }
 
-void readSensors(const fs::path &run, Result &result)
+/// Times without a picture and sensors that are not believed.
+void readSummary(const fs::path &run, Result &result)
 {
-  const auto summary = nlohmann::json::parse(bytesOf(run / "summary.json"));
-  for (const auto &sensor : summary.at("sensors")) {
-    const double since_s = sensor.at("since_s");
+  const auto add = [&result](double since_s, const std::string &text) {
     result.named_s = result.named_s < 0 ? since_s : std::min(result.named_s, since_s);
-    result.names += (result.names.empty() ? "" : ", ") + sensor.at("text").get<std::string>();
-  }
+    result.names += (result.names.empty() ? "" : ", ") + text;
+  };
+  const auto summary = nlohmann::json::parse(bytesOf(run / "summary.json"));
+  for (const auto &gap : summary.at("gaps"))
+    add(gap.at("begin_s"), fmt::format("no picture for {:.1f} s", gap.at("length_s").get<double>()));
+  for (const auto &sensor : summary.at("sensors"))
+    add(sensor.at("since_s"), sensor.at("text"));
 }
 
 Result judgeRun(const fs::path &run, const std::string &flight, double since_s, int status)
@@ -107,7 +111,7 @@ Result judgeRun(const fs::path &run, const std::string &flight, double since_s, 
   if (!fs::exists(run / "trajectory.tum"))
     return result;
   readFrames(run, since_s, result);
-  readSensors(run, result);
+  readSummary(run, result);
   try {
     const Evaluation evaluation = evaluate(run.string(), flight);
     result.ate = evaluation.smoothed.absolute[static_cast<std::size_t>(Alignment::xy_yaw)].ate;

@@ -59,6 +59,27 @@ std::vector<Fault> cameraFiles()
       camera("other_size", "a picture of another size", "must be 640x480",
              "resolution: [640, 480]\nintrinsics: [400, 400, 319.5, 239.5]\n"),
   };
+  const auto wrong = [&all](const std::string &name, const std::string &what, const std::string &text) {
+    all.push_back({"camera file",
+                   name,
+                   what,
+                   Duty::survive,
+                   [=](SpoiltFlight &flight) { flight.replace(kYaml, text); },
+                   {},
+                   {},
+                   {},
+                   0});
+  };
+  wrong("focal_5_short", "a focal length 5 % too short", pinhole("190, 190, 159.5, 119.5"));
+  wrong("focal_10_long", "one 10 % too long", pinhole("220, 220, 159.5, 119.5"));
+  wrong("focal_twice", "one twice as long", pinhole("400, 400, 159.5, 119.5"));
+  wrong("focal_unequal", "fy 25 % too short", pinhole("200, 150, 159.5, 119.5"));
+  wrong("centre_swapped", "principal point and focal lengths exchanged", pinhole("159.5, 119.5, 200, 200"));
+  wrong("arm_pitched", "T_BS pitched by 10 degrees",
+        pinhole("200, 200, 159.5, 119.5",
+                "T_BS: [0,-0.173648,0.984808,0, -1,0,0,0, 0,-0.984808,-0.173648,0, 0,0,0,1]\n"));
+  wrong("arm_inverse", "T_BS the other way round",
+        pinhole("200, 200, 159.5, 119.5", "T_BS: [0,-1,0,0, 0,0,-1,0, 1,0,0,0, 0,0,0,1]\n"));
   all.push_back({"camera file", "opencv", "a calibration by OpenCV", Duty::read, [](SpoiltFlight &flight) {
                    flight.replace(kYaml, "%YAML:1.0\nimage_width: 320\nimage_height: 240\n"
                                          "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
@@ -92,6 +113,15 @@ std::string encoded(const cv::Mat &image, const char *kind)
   std::vector<unsigned char> bytes;
   cv::imencode(kind, image, bytes);
   return {bytes.begin(), bytes.end()};
+}
+
+/// The same pixels, written otherwise.
+Fault recoded(const std::string &name, const std::string &what, const std::function<cv::Mat(const cv::Mat &)> &change)
+{
+  return {"picture files", name, what, Duty::read, [=](SpoiltFlight &flight) {
+            for (std::size_t i = 0; i < flight.frames(); ++i)
+              flight.setBytes(i, encoded(change(flight.image(i)), ".png"));
+          }};
 }
 
 std::vector<Fault> pictureFiles()
@@ -144,6 +174,24 @@ std::vector<Fault> pictureFiles()
          for (std::size_t i = 0; i < flight.frames(); ++i)
            flight.setBytes(i, encoded(flight.image(i), ".jpg"));
        }},
+      recoded("colour", "all of them in colour",
+              [](const cv::Mat &grey) {
+                cv::Mat out;
+                cv::cvtColor(grey, out, cv::COLOR_GRAY2BGR);
+                return out;
+              }),
+      recoded("alpha", "all of them with a channel of transparency",
+              [](const cv::Mat &grey) {
+                cv::Mat out;
+                cv::cvtColor(grey, out, cv::COLOR_GRAY2BGRA);
+                return out;
+              }),
+      recoded("deep", "all of them with 16 bits",
+              [](const cv::Mat &grey) {
+                cv::Mat out;
+                grey.convertTo(out, CV_16U, 257);
+                return out;
+              }),
       {"picture files", "stamp_twice", "two with one stamp", Duty::refuse,
        [](SpoiltFlight &flight) { flight.camera.rows[kAt][0] = flight.camera.rows[kAt - 1][0]; }, "data.csv:52"},
       {"picture files", "stamps_us", "stamps in microseconds", Duty::refuse,

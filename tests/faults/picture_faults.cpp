@@ -235,6 +235,16 @@ std::vector<Fault> orderFaults()
                    });
                  }};
   };
+  const auto kept = [](const std::string &name, const std::string &what,
+                       const std::function<bool(std::size_t)> &is_kept) {
+    return Fault{"pictures", name, what, Duty::survive, [=](SpoiltFlight &flight) {
+                   std::vector<SpoiltFlight::Row> rows;
+                   for (std::size_t i = 0; i < flight.frames(); ++i)
+                     if (i < kAt || is_kept(i - kAt))
+                       rows.push_back(flight.camera.rows[i]);
+                   flight.camera.rows = std::move(rows);
+                 }};
+  };
   return {
       reordered("frozen_10", "the last picture 10 times", 10, [](std::size_t) { return kAt - 1; }),
       frozen("frozen_counter_10", "the same with a counter in a corner", 0),
@@ -257,11 +267,37 @@ std::vector<Fault> orderFaults()
          for (std::size_t i = kAt; i < flight.frames(); ++i)
            flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) + 500'000'000);
        }},
-      {"pictures", "gap_2s", "20 pictures not in the table", Duty::survive,
+      kept("gap_1s", "10 pictures not in the table", [](std::size_t i) { return i >= 10; }),
+      kept("gap_2s", "20 of them", [](std::size_t i) { return i >= 20; }),
+      kept("half_rate", "every second picture not in the table from then on", [](std::size_t i) { return i % 2 == 0; }),
+      kept("bursts", "a second of pictures, a second without", [](std::size_t i) { return i / 10 % 2 == 0; }),
+      {"pictures",
+       "rows_twice",
+       "each picture once more 50 ms later",
+       Duty::survive,
        [](SpoiltFlight &flight) {
-         const auto first = flight.camera.rows.begin() + kAt;
-         flight.camera.rows.erase(first, first + 20);
-       }},
+         std::vector<SpoiltFlight::Row> rows;
+         for (const SpoiltFlight::Row &row : flight.camera.rows)
+           for (const std::int64_t later_ns : {0, 50'000'000})
+             rows.push_back({std::to_string(std::stoll(row[0]) + later_ns), row[1]});
+         flight.camera.rows = std::move(rows);
+       },
+       {},
+       {},
+       {},
+       0},
+      {"pictures",
+       "stamps_drift",
+       "a clock that is 1 % slow",
+       Duty::survive,
+       [](SpoiltFlight &flight) {
+         for (std::size_t i = 0; i < flight.frames(); ++i)
+           flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) / 100 * 101);
+       },
+       {},
+       {},
+       {},
+       0},
   };
 }
 } // namespace

@@ -2,6 +2,8 @@
 // What pose filters and gyros say, and how their logs are written.
 #include "fault_list.h"
 
+#include <Eigen/Geometry>
+
 #include <cmath>
 
 namespace bole::faults
@@ -98,6 +100,138 @@ std::vector<Fault> lies()
   };
 }
 
+/// Poses that stand otherwise from the first to the last.
+Fault poses(const std::string &name, const std::string &what,
+            const std::function<void(Eigen::Vector3d &, Eigen::Quaterniond &)> &change)
+{
+  return {"sensors",
+          name,
+          what,
+          Duty::survive,
+          [=](SpoiltFlight &flight) {
+            Table &table = flight.odometry;
+            for (std::size_t i = 0; i < table.rows.size(); ++i) {
+              Eigen::Vector3d t(table.number(i, 1), table.number(i, 2), table.number(i, 3));
+              Eigen::Quaterniond q(table.number(i, 4), table.number(i, 5), table.number(i, 6), table.number(i, 7));
+              change(t, q);
+              const double values[] = {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()};
+              for (std::size_t k = 0; k < 7; ++k)
+                table.set(i, k + 1, values[k]);
+            }
+          },
+          {},
+          {},
+          {},
+          0};
+}
+
+/// Rates and forces, likewise.
+Fault samples(const std::string &name, const std::string &what,
+              const std::function<void(Eigen::Vector3d &, Eigen::Vector3d &)> &change)
+{
+  return {"sensors",
+          name,
+          what,
+          Duty::survive,
+          [=](SpoiltFlight &flight) {
+            Table &table = flight.imu;
+            for (std::size_t i = 0; i < table.rows.size(); ++i) {
+              Eigen::Vector3d rate(table.number(i, 1), table.number(i, 2), table.number(i, 3)),
+                  force(table.number(i, 4), table.number(i, 5), table.number(i, 6));
+              change(rate, force);
+              for (int k = 0; k < 3; ++k) {
+                table.set(i, static_cast<std::size_t>(k) + 1, rate[k]);
+                table.set(i, static_cast<std::size_t>(k) + 4, force[k]);
+              }
+            }
+          },
+          {},
+          {},
+          {},
+          0};
+}
+
+/// Every \p nth line of a table.
+Fault thinned(const std::string &name, const std::string &what, Table SpoiltFlight::*table, std::size_t nth)
+{
+  return {"sensors",
+          name,
+          what,
+          Duty::survive,
+          [=](SpoiltFlight &flight) {
+            std::vector<SpoiltFlight::Row> rows;
+            for (std::size_t i = 0; i < (flight.*table).rows.size(); i += nth)
+              rows.push_back((flight.*table).rows[i]);
+            (flight.*table).rows = std::move(rows);
+          },
+          {},
+          {},
+          {},
+          0};
+}
+
+/// What was wrong before the flight began.
+std::vector<Fault> conventions()
+{
+  using Eigen::Quaterniond;
+  using Eigen::Vector3d;
+  const auto frame = [](const Eigen::Matrix3d &R) {
+    return [=](Vector3d &t, Quaterniond &q) {
+      t = (R * t).eval();
+      q = Quaterniond(Eigen::Matrix3d(R * q.toRotationMatrix() * R.transpose()));
+    };
+  };
+  Eigen::Matrix3d optical;
+  optical << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  return {
+      poses("odometry_optical", "its axes are x right, y down, z ahead", frame(optical)),
+      poses("odometry_down", "its axes are x ahead, y right, z down", frame(Vector3d(1, -1, -1).asDiagonal())),
+      poses("odometry_xyzw", "quaternions with w at the end",
+            [](Vector3d &, Quaterniond &q) { q = Quaterniond(q.x(), q.y(), q.z(), q.w()); }),
+      poses("odometry_level", "yaw alone, no roll and no pitch",
+            [](Vector3d &, Quaterniond &q) {
+              const Eigen::Matrix3d R = q.toRotationMatrix();
+              q = Quaterniond(Eigen::AngleAxisd(std::atan2(R(1, 0), R(0, 0)), Vector3d::UnitZ()));
+            }),
+      poses("odometry_cm", "poses in centimetres", [](Vector3d &t, Quaterniond &) { t *= 100; }),
+      poses("odometry_sea", "heights over the sea", [](Vector3d &t, Quaterniond &) { t.z() += 500; }),
+      thinned("odometry_1hz", "a pose a second", &SpoiltFlight::odometry, 10),
+      {"sensors",
+       "odometry_late_2s",
+       "its clock 2 s late",
+       Duty::survive,
+       [](SpoiltFlight &flight) {
+         everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t + 2'000'000'000); });
+       },
+       {},
+       {},
+       {},
+       0},
+      samples("imu_axes", "y, z, x for x, y, z",
+              [](Vector3d &rate, Vector3d &force) {
+                rate = Vector3d(rate.y(), rate.z(), rate.x());
+                force = Vector3d(force.y(), force.z(), force.x());
+              }),
+      samples("gyro_scale", "rates 10 % too large", [](Vector3d &rate, Vector3d &) { rate *= 1.1; }),
+      samples("gyro_saturated", "no rate above 0.2 rad/s",
+              [](Vector3d &rate, Vector3d &) { rate = rate.cwiseMin(0.2).cwiseMax(-0.2); }),
+      samples("force_down", "an accelerometer that says -9.81 at rest",
+              [](Vector3d &, Vector3d &force) { force = -force; }),
+      thinned("imu_20hz", "20 samples a second", &SpoiltFlight::imu, 10),
+      {"sensors",
+       "imu_drift",
+       "its clock 1 % slow",
+       Duty::survive,
+       [](SpoiltFlight &flight) {
+         everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(t / 100 * 101); });
+       },
+       {},
+       {},
+       {},
+       0},
+  };
+}
+
 std::vector<Fault> units()
 {
   return {
@@ -174,7 +308,7 @@ std::vector<Fault> dialects()
 std::vector<Fault> sensorFaults()
 {
   std::vector<Fault> all;
-  for (const auto &part : {lies(), units(), dialects()})
+  for (const auto &part : {lies(), conventions(), units(), dialects()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

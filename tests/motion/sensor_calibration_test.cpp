@@ -22,10 +22,11 @@ MadeFlight noisy()
   return flight;
 }
 
-/// Eight seconds, the stamps of the sensors late by these times; \p damage changes a frame before it is looked at.
+/// Eight seconds, the stamps of the sensors late by these times; \p damage changes a frame before it is looked at, \p
+/// look the rotation that points saw, in the axes of the camera.
 SensorCalibration fly(
     MadeFlight flight, const std::function<void(Frame &)> &damage = [](Frame &) {}, double gyro_late_s = 0,
-    double odometry_late_s = 0)
+    double odometry_late_s = 0, const std::function<Matrix3d(const Matrix3d &)> &look = nullptr)
 {
   SensorCalibrator calibrator(forwardCamera());
   const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
@@ -46,7 +47,10 @@ SensorCalibration fly(
       frame.gyro.push_back(waiting.front());
       waiting.erase(waiting.begin());
     }
-    const std::vector<RelativeMotion> seen = flight.seen(i);
+    std::vector<RelativeMotion> seen = flight.seen(i);
+    for (RelativeMotion &motion : seen)
+      if (look)
+        motion.points.aRb = look(motion.points.aRb) * expSo3({turn(random) / 5, turn(random) / 5, turn(random) / 5});
     calibrator.add(frame, seen.empty() ? std::nullopt : std::optional<RelativeMotion>(seen.front()));
   }
   return calibrator.estimate();
@@ -62,6 +66,8 @@ const CalibratedConstant *constant(const SensorCalibration &calibration, const s
 
 void expectAsStated(const SensorCalibration &calibration)
 {
+  for (const SensorVerdict &verdict : calibration.verdicts)
+    EXPECT_EQ(verdict.kind, "rotation") << verdict.text;
   for (const CalibratedConstant &one : calibration.constants)
     EXPECT_FALSE(one.used) << one.text;
   EXPECT_EQ(calibration.gyro_late_s, 0);
@@ -152,6 +158,58 @@ TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
     if (isLate(f))
       turnRates(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
   }));
+}
+
+TEST(SensorCalibration, ACameraFileOfAnotherFocalLengthIsNamed)
+{
+  for (const double factor : {0.5, 0.8, 0.95, 1.05, 1.2, 2.0}) { // of the file's focal length over the true one
+    const auto look = [&](const Matrix3d &aRb) {
+      const Vector3d angle = logSo3(aRb);
+      return expSo3({angle.x() / factor, angle.y() / factor, angle.z()});
+    };
+    const SensorCalibration calibration = fly(
+        noisy(), [](Frame &) {}, 0, 0, look);
+    ASSERT_EQ(calibration.verdicts.size(), 1u) << factor;
+    EXPECT_EQ(calibration.verdicts[0].sensor, "images") << factor;
+    EXPECT_EQ(calibration.verdicts[0].kind, "focal") << calibration.verdicts[0].text;
+    const double told = std::stod(calibration.verdicts[0].text.substr(calibration.verdicts[0].text.find("by ") + 3));
+    EXPECT_NEAR(std::log(1 + told / 100), std::log(factor), 0.03) << calibration.verdicts[0].text;
+  }
+}
+
+TEST(SensorCalibration, ACameraThatStandsOtherwiseOnTheBodyIsNamed)
+{
+  for (const Vector3d &turned : {Vector3d(0.17, 0, 0), Vector3d(0, 0.17, 0), Vector3d(0, 0, -0.17)}) {
+    const Matrix3d R = expSo3(turned);
+    const SensorCalibration calibration = fly(
+        noisy(), [](Frame &) {}, 0, 0, [&](const Matrix3d &aRb) { return Matrix3d(R.transpose() * aRb * R); });
+    ASSERT_EQ(calibration.verdicts.size(), 1u);
+    EXPECT_EQ(calibration.verdicts[0].kind, "mount") << calibration.verdicts[0].text;
+    EXPECT_NE(calibration.verdicts[0].text.find("9."), std::string::npos) << calibration.verdicts[0].text;
+  }
+}
+
+TEST(SensorCalibration, AScaleOfTheGyroIsNamedAndNoCameraBlamed)
+{
+  for (const double factor : {0.8, 1.1, 1.3}) {
+    const SensorCalibration calibration =
+        fly(noisy(), [&](Frame &f) { turnRates(f, [&](const Vector3d &w) { return Vector3d(factor * w); }); });
+    ASSERT_EQ(calibration.verdicts.size(), 1u) << factor;
+    EXPECT_EQ(calibration.verdicts[0].sensor, "gyro") << factor;
+    EXPECT_EQ(calibration.verdicts[0].kind, "scale") << calibration.verdicts[0].text;
+  }
+}
+
+TEST(SensorCalibration, CameraAndGyroWithinWhatTheyAreStatedToAreNotNamed)
+{
+  const Matrix3d R = expSo3({0.012, -0.012, 0.012});
+  const SensorCalibration calibration = fly(
+      noisy(), [](Frame &f) { turnRates(f, [](const Vector3d &w) { return Vector3d(1.01 * w); }); }, 0, 0,
+      [&](const Matrix3d &aRb) {
+        const Vector3d angle = logSo3(R.transpose() * aRb * R);
+        return expSo3({angle.x() / 1.01, angle.y() / 1.01, angle.z()});
+      });
+  EXPECT_TRUE(calibration.verdicts.empty());
 }
 
 TEST(SensorCalibration, AxesThatAreExchangedAreNoConstant)

@@ -79,6 +79,8 @@ std::vector<Fault> faults()
            f.wMb_odometry->t.y() += 1;
        },
        Sensor::odometry, "jump"},
+      {"counts from the sea", [](Frame &f) { f.wMb_odometry->t.z() += 500; }, Sensor::odometry, "height"},
+      {"counts down", [](Frame &f) { f.wMb_odometry->t.z() *= -10; }, Sensor::odometry, "height"},
       {"freezes",
        [held = Pose()](Frame &f) mutable {
          if (!isLate(f))
@@ -220,6 +222,18 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
   }
   EXPECT_TRUE(monitor.verdicts().empty());
   EXPECT_TRUE(monitor.trusts(Sensor::gyro));
+}
+
+TEST(SensorMonitor, AnOdometryThatGoesOnJumpingIsNamedInAFewLinesAndLeftOut)
+{
+  const SensorMonitor monitor = fly([](Frame &f) {
+    f.wMb_odometry->t.x() *= 100; // in centimetres
+  });
+  EXPECT_FALSE(monitor.trusts(Sensor::odometry));
+  EXPECT_LE(monitor.verdicts().size(), 4u);
+  EXPECT_EQ(monitor.verdicts().back().kind, "noise") << monitor.verdicts().back().text;
+  const SensorMonitor once = fly([](Frame &f) { f.wMb_odometry->t.y() += isLate(f) ? 1 : 0; });
+  EXPECT_TRUE(once.trusts(Sensor::odometry));
 }
 
 TEST(SensorMonitor, AFaultIsDatedWithinHalfASecond)

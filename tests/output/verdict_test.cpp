@@ -51,6 +51,17 @@ TEST(Verdict, TellsWhichFramesWereNotOkAndWhy)
   EXPECT_TRUE(judge(summary).is_trusted);
 }
 
+TEST(Verdict, TellsOfTimesWithoutAPicture)
+{
+  RunSummary summary = goodRun();
+  summary.gaps = {{5, 2}};
+  EXPECT_THAT(textOf(summary), HasSubstr("100 frames, all ok; no picture for 2.0 s from 5.0 s on\n"));
+  summary.frames[FrameStatus::corrupt] = 1;
+  summary.gaps.push_back({8, 3});
+  EXPECT_THAT(textOf(summary), HasSubstr("1 corrupt; no picture for 3.0 s from 8.0 s on, the longest of 2 gaps\n"));
+  EXPECT_TRUE(judge(summary).is_trusted); // like frames that are missing
+}
+
 TEST(Verdict, OffersToLeaveOutASensorButNotTheImages)
 {
   RunSummary summary = goodRun();
