@@ -340,12 +340,14 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
                    "gyro-gone, gyro-bias");
   task->add_option("--fault-at", trial.loop.fault.start_s, "After servoing began [s]")->capture_default_str();
   task->add_option("--fault-for", trial.loop.fault.duration_s, "[s]")->capture_default_str();
-  task->add_option("--perception", arguments->perception,
-                   "What the task is told: real (the tracker), truth-map (images tracked against the true trunks) or "
-                   "truth (no image is looked at)")
+  task->add_option(
+          "--perception", arguments->perception,
+          "What the task is told: real (the tracker), truth-map (images tracked against the true trunks), visp-edges "
+          "(the same by ViSP's edge tracker) or truth (no image is looked at)")
       ->capture_default_str();
-  task->add_option("--missing", trial.missing,
-                   "By truth: share of the trunks that the map never has, while no bark has points")
+  task->add_option(
+          "--missing", trial.missing,
+          "By truth: share of the trunks, those asked for not counted, that the map never has; no bark has points then")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
   task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();

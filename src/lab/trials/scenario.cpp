@@ -121,6 +121,13 @@ const char *toString(ServoKind kind)
   return "?";
 }
 
+std::vector<int> Scenario::askedFor() const
+{
+  if (target >= 0)
+    return {target};
+  return left >= 0 ? std::vector<int>{left, right} : std::vector<int>{};
+}
+
 void ScenarioOptions::validate() const
 {
   requireRange("density", density, 0, 0.3);

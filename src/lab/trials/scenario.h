@@ -42,6 +42,9 @@ struct Scenario
   int target = -1;           ///< id of the trunk meant (hold, circle)
   int left = -1, right = -1; ///< ids of the gap's trunks
   double gap_width = 0;      ///< bark to bark at flight height [m]
+
+  /// Ids of the trunks without which the task is none.
+  std::vector<int> askedFor() const;
 };
 Scenario makeScenario(const ScenarioOptions &options);
 } // namespace bole

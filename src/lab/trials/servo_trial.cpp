@@ -186,12 +186,15 @@ std::unique_ptr<ServoTask> makeTask(const ServoTrialOptions &options, const Pose
 }
 
 std::unique_ptr<Perception> makePerception(const ServoTrialOptions &options, const vpSimulatorArDrone &robot,
-                                           const Forest &forest)
+                                           const Scenario &scenario)
 {
+  const Forest &forest = scenario.forest;
   if (options.perception == PerceptionKind::truth)
-    return truthPerception(robot.camera(), robot.bMc(), forest, options.missing);
+    return truthPerception(robot.camera(), robot.bMc(), forest, options.missing, scenario.askedFor());
   if (options.perception == PerceptionKind::truth_map)
-    return truthMapPerception(robot.camera(), robot.bMc(), forest);
+    return truthMapPerception(robot.camera(), robot.bMc(), forest, TrackerKind::trunk);
+  if (options.perception == PerceptionKind::visp_edges)
+    return truthMapPerception(robot.camera(), robot.bMc(), forest, TrackerKind::visp_generic_edge);
   return realPerception(robot.camera(), robot.bMc(), options.pipeline);
 }
 
@@ -335,7 +338,7 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   settings.start = scenario.start;
   settings.heading = scenario.heading;
   vpSimulatorArDrone robot(scenario.forest, settings);
-  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario.forest);
+  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
 
   const auto fly = [&](const Judge &judge) {

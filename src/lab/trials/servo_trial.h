@@ -17,7 +17,7 @@ struct ServoTrialOptions
   double ratio = 0;         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
   double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
   PerceptionKind perception = PerceptionKind::real;
-  double missing = 0;                   ///< by truth: share of the trunks that the map never has, 0 to 1
+  double missing = 0;                   ///< by truth: share of the trunks not asked for that the map never has, 0 to 1
   Options pipeline = defaultPipeline(); ///< of real perception
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
