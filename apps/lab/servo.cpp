@@ -56,6 +56,7 @@ const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::ser
                                       {"gap [m]", &ServoTrialResult::gap_width},
                                       {"progress [m]", &ServoTrialResult::progress},
                                       {"mean speed [m/s]", &ServoTrialResult::mean_speed},
+                                      {"along the line [m/s]", &ServoTrialResult::speed_along},
                                       {"median loop [ms]", &ServoTrialResult::median_loop_ms},
                                       {"95 % loop [ms]", &ServoTrialResult::p95_loop_ms},
                                       {"hover after fault [s]", &ServoTrialResult::hover_after_s},
@@ -327,7 +328,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
                      "Radius over distance to be kept (circle .07; hold: instead of --distance)")
         ->check(CLI::Range(0.01, 0.5));
   if (kind != ServoKind::hold)
-    task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1)")->check(CLI::Range(0.05, 2.0));
+    task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1.2)")->check(CLI::Range(0.05, 2.0));
   if (kind == ServoKind::circle)
     trial.loop.duration_s = 70; // round a trunk of 0.25 m at r/d .07
   if (kind == ServoKind::slalom) {
