@@ -237,7 +237,7 @@ TEST(Scenario, TheGapHasTheWidthItSaysAndIsFree)
     const auto at = [](const SimulatedTrunk &trunk) { return Eigen::Vector2d(trunk.axisAt(1.2).head<2>()); };
     const double free = (at(left) - at(right)).norm() - left.radiusAt(1.2) - right.radiusAt(1.2);
     EXPECT_NEAR(free, scenario.gap_width, 1e-9);
-    EXPECT_GE(free, 1.2);
+    EXPECT_GE(free, 1.3);
     const Eigen::Vector2d middle = 0.5 * (at(left) + at(right));
     EXPECT_GT(scenario.forest.distanceToBark({middle.x(), middle.y(), 1.2}), 0.5);
   }
