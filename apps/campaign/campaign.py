@@ -324,23 +324,31 @@ def write_tables(campaign, paths, output):
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]  # Okabe and Ito
 
 
-def picture(draw, width=6.4, height=3.6):
-    """What \p draw puts onto axes, with a legend of what it named; nothing where it drew nothing."""
+def drawn(draws, width, height):
+    """SVG of what each of \p draws puts onto axes of its own, with a legend of what the first named; None where nothing was
+    drawn."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(width, height), layout="constrained")
-    draw(axes)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend()
+    figure, axes = plt.subplots(1, len(draws), figsize=(width, height), layout="constrained", squeeze=False)
+    for draw, place in zip(draws, axes[0]):
+        draw(place)
+    if axes[0][0].get_legend_handles_labels()[1]:
+        axes[0][0].legend()
     out = io.BytesIO()
     figure.savefig(out, format="svg")
     plt.close(figure)
-    if not axes.has_data():
-        return ""
-    return '<img alt="" src="data:image/svg+xml;base64,' + base64.b64encode(out.getvalue()).decode() + '">'
+    return out.getvalue() if any(place.has_data() for place in axes[0]) else None
+
+
+def embedded(svg):
+    return '<img alt="" src="data:image/svg+xml;base64,' + base64.b64encode(svg).decode() + '">' if svg else ""
+
+
+def picture(draw, width=6.4, height=3.6):
+    return embedded(drawn([draw], width, height))
 
 
 def plot_shares(axes, colour, label, shares, marks_only=False):
@@ -411,8 +419,11 @@ def errors_by(trunks, flights, runs, key, error, label):
     return picture(draw)
 
 
+UNITS = {"latency": "latency of the video [s]", "gust": "gusts [m/s$^2$]", "density": "trunks a m$^2$", "speed": "speed [m/s]"}
+
+
 def sweep(campaign, flights, option):
-    """Share of the runs that succeed against an option that was swept, a curve a task."""
+    """Draws the share of the runs that succeed against an option that was swept, a curve a task."""
     def draw(axes):
         for colour, (name, runs) in zip(COLOURS, campaign.swept[option].items()):
             shares = []
@@ -420,9 +431,14 @@ def sweep(campaign, flights, option):
                 some = [bool(f["success"]) for f in flights if f["run"] == run and f["ok"] and "success" in f]
                 shares.append((value, sum(some), len(some)))
             plot_shares(axes, colour, name, shares)
-        axes.set(xlabel=option, ylabel="share that succeeded (95 %)", ylim=(0, 1.05))
+        axes.set(xlabel=UNITS.get(option, option), ylabel="share that succeeded (95 %)", ylim=(0, 1.05))
 
-    return picture(draw, 4.2, 3.2)
+    return draw
+
+
+def sweeps(campaign, flights):
+    """SVG of all that was swept, side by side."""
+    return drawn([sweep(campaign, flights, option) for option in campaign.swept], 4.2 * len(campaign.swept), 3.2)
 
 
 def spread(flights, runs, name, label, honest=None):
@@ -436,7 +452,7 @@ def spread(flights, runs, name, label, honest=None):
         if honest is not None:
             axes.axvline(honest, color=COLOURS[2], linestyle="--")
 
-    return picture(draw, 6.4, 1.2 + 0.5 * len(runs))
+    return picture(draw, height=1.2 + 0.5 * len(runs))
 
 
 def number(value):
@@ -509,8 +525,11 @@ def write_page(campaign, path):
               spread(flights, runs, "position_median_m", "median position error by flight [m]"),
               spread(flights, runs, "radius_rmse_m", "radius RMSE by flight [m]"),
               spread(flights, runs, "ate_m", "ATE after x, y, yaw [m]")]
-    if campaign.swept:
-        parts += ["<h2>Sweeps</h2>", *(sweep(campaign, flights, option) for option in campaign.swept)]
+    curves = sweeps(campaign, flights) if campaign.swept else None
+    if curves:
+        with open("sweeps.svg", "wb") as svg:
+            svg.write(curves)
+        parts += ["<h2>Sweeps</h2>", embedded(curves)]
     parts += ["<h2>By stratum</h2>", as_table([r for r in summary if r["stratum"] != "all" and r["measure"] in
                                                ("recall", "precision", "position_median_m", "radius_rmse_m", "nees_half", "succeeded")],
                                               ["run", "stratum", "value", "measure", "estimate", "low", "high", "flights"])]

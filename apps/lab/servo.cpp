@@ -56,6 +56,7 @@ const std::vector<Column> kColumns = {{"found after [s]", &ServoTrialResult::ser
                                       {"gap [m]", &ServoTrialResult::gap_width},
                                       {"progress [m]", &ServoTrialResult::progress},
                                       {"mean speed [m/s]", &ServoTrialResult::mean_speed},
+                                      {"along the line [m/s]", &ServoTrialResult::speed_along},
                                       {"median loop [ms]", &ServoTrialResult::median_loop_ms},
                                       {"95 % loop [ms]", &ServoTrialResult::p95_loop_ms},
                                       {"hover after fault [s]", &ServoTrialResult::hover_after_s},
@@ -327,7 +328,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
                      "Radius over distance to be kept (circle .07; hold: instead of --distance)")
         ->check(CLI::Range(0.01, 0.5));
   if (kind != ServoKind::hold)
-    task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1)")->check(CLI::Range(0.05, 2.0));
+    task->add_option("--speed", trial.speed, "[m/s] (circle .5, gap .6, slalom 1.2)")->check(CLI::Range(0.05, 2.0));
   if (kind == ServoKind::circle)
     trial.loop.duration_s = 70; // round a trunk of 0.25 m at r/d .07
   if (kind == ServoKind::slalom) {
@@ -340,12 +341,14 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
                    "gyro-gone, gyro-bias");
   task->add_option("--fault-at", trial.loop.fault.start_s, "After servoing began [s]")->capture_default_str();
   task->add_option("--fault-for", trial.loop.fault.duration_s, "[s]")->capture_default_str();
-  task->add_option("--perception", arguments->perception,
-                   "What the task is told: real (the tracker), truth-map (images tracked against the true trunks) or "
-                   "truth (no image is looked at)")
+  task->add_option(
+          "--perception", arguments->perception,
+          "What the task is told: real (the tracker), truth-map (images tracked against the true trunks), visp-edges "
+          "(the same by ViSP's edge tracker) or truth (no image is looked at)")
       ->capture_default_str();
-  task->add_option("--missing", trial.missing,
-                   "By truth: share of the trunks that the map never has, while no bark has points")
+  task->add_option(
+          "--missing", trial.missing,
+          "By truth: share of the trunks, those asked for not counted, that the map never has; no bark has points then")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
   task->add_option("--rate", trial.robot.rate_hz, "Frames a second")->capture_default_str();

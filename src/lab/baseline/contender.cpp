@@ -5,32 +5,12 @@
 
 #include <ctime>
 #include <fmt/format.h>
-#include <iostream>
 #include <opencv2/core/utility.hpp>
-#include <visp3/mbt/vpMbEdgeTracker.h>
-#include <visp3/mbt/vpMbGenericTracker.h>
 
 namespace bole
 {
 namespace
 {
-/// ViSP tells std::cout and std::cerr of every model and every setPose(); not while this lives.
-class Silence
-{
-public:
-  Silence() : m_out(std::cout.rdbuf(nullptr)), m_err(std::cerr.rdbuf(nullptr)) {}
-  ~Silence()
-  {
-    std::cout.rdbuf(m_out); // also clears the state that writing to nothing has set
-    std::cerr.rdbuf(m_err);
-  }
-  Silence(const Silence &) = delete;
-  Silence &operator=(const Silence &) = delete;
-
-private:
-  std::streambuf *m_out, *m_err;
-};
-
 /// Time that this thread has computed: what other programs take from the processor does not count.
 double threadTime_ms()
 {
@@ -40,19 +20,7 @@ double threadTime_ms()
 }
 } // namespace
 
-const char *toString(TrackerKind kind)
-{
-  return nameOf(kind,
-                {"vpMbEdgeTracker", "vpMbGenericTracker EDGE", "vpMbGenericTracker EDGE+KLT", "vpMbTrunkTracker"});
-}
-
 const char *toString(Help help) { return nameOf(help, {"alone", "prior", "re-initialised", "true pose"}); }
-
-std::string EdgeSettings::text() const
-{
-  return fmt::format("mask {}, range {}, threshold {:g}, step {:g}, far {:g} m", mask_size, range, threshold,
-                     sample_step, far_m);
-}
 
 Contender::Contender(TrackerKind kind, Help help, const EdgeSettings &settings, const std::string &trunk_xml)
     : m_kind(kind), m_help(help), m_settings(settings), m_trunk_xml(trunk_xml)
@@ -70,62 +38,12 @@ std::string Contender::settingsText() const
   return fmt::format("{}, far {:g} m", m_trunk_xml.empty() ? "defaults" : m_trunk_xml, m_settings.far_m);
 }
 
-std::unique_ptr<vpMbTracker> Contender::make(const std::string &cao_path, const PinholeCamera &camera) const
-{
-  vpMe me;
-  me.setMaskSize(unsigned(m_settings.mask_size));
-  me.setMaskNumber(180);
-  me.setRange(unsigned(m_settings.range));
-  me.setThreshold(m_settings.threshold);
-  me.setMu1(0.5);
-  me.setMu2(0.5);
-  me.setSampleStep(m_settings.sample_step);
-  std::unique_ptr<vpMbTracker> tracker;
-  if (m_kind == TrackerKind::visp_edge) {
-    auto edge = std::make_unique<vpMbEdgeTracker>();
-    edge->setMovingEdge(me);
-    tracker = std::move(edge);
-  }
-  else if (m_kind == TrackerKind::trunk) {
-    tracker = std::make_unique<vpMbTrunkTracker>();
-  }
-  else {
-    const bool klt = m_kind == TrackerKind::visp_generic_edge_klt;
-    auto generic = std::make_unique<vpMbGenericTracker>(
-        1, klt ? vpMbGenericTracker::EDGE_TRACKER | vpMbGenericTracker::KLT_TRACKER : vpMbGenericTracker::EDGE_TRACKER);
-    generic->setMovingEdge(me);
-    if (klt) {
-      vpKltOpencv points;
-      points.setMaxFeatures(300);
-      points.setWindowSize(5);
-      points.setQuality(0.01);
-      points.setMinDistance(5);
-      points.setHarrisFreeParameter(0.01);
-      points.setBlockSize(3);
-      points.setPyramidLevels(3);
-      generic->setKltOpencv(points);
-      generic->setKltMaskBorder(3);
-    }
-    tracker = std::move(generic);
-  }
-  if (m_kind == TrackerKind::trunk && !m_trunk_xml.empty())
-    tracker->loadConfigFile(m_trunk_xml, false);
-  tracker->setCameraParameters(camera.toVisp());
-  tracker->setAngleAppear(vpMath::rad(85));
-  tracker->setAngleDisappear(vpMath::rad(89));
-  tracker->setNearClippingDistance(0.1);
-  tracker->setFarClippingDistance(m_settings.far_m);
-  tracker->setClipping(tracker->getClipping() | vpPolygon3D::FOV_CLIPPING);
-  tracker->loadModel(cao_path);
-  return tracker;
-}
-
 void Contender::start(const std::string &cao_path, const PinholeCamera &camera, const vpImage<unsigned char> &image,
                       const Pose &cMo)
 {
   const Silence silence;
   cv::setNumThreads(1); // of ViSP's KLT: everybody has one thread
-  m_tracker = make(cao_path, camera);
+  m_tracker = makeTracker(m_kind, m_settings, cao_path, camera, m_trunk_xml);
   m_trunk = dynamic_cast<vpMbTrunkTracker *>(m_tracker.get());
   m_tracker->initFromPose(image, cMo.toVisp());
   m_cMo = cMo;

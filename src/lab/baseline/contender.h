@@ -3,6 +3,7 @@
 /// \file
 /// One tracker in a comparison: which class, with which settings, with how much help.
 
+#include "lab/baseline/model_tracker.h"
 #include "lab/baseline/test_flight.h"
 
 #include <bole/vpMbTrunkTracker.h>
@@ -12,14 +13,6 @@
 
 namespace bole
 {
-enum class TrackerKind
-{
-  visp_edge,
-  visp_generic_edge,
-  visp_generic_edge_klt,
-  trunk
-};
-
 /// How much the caller helps.
 enum class Help
 {
@@ -28,19 +21,7 @@ enum class Help
   reinitialised, ///< initFromPose() at odometry's prediction after each complaint
   truth ///< setPose() at the true pose every frame: only to time a tracker on the trunks that really are in view
 };
-const char *toString(TrackerKind kind);
 const char *toString(Help help);
-
-/// ViSP's moving-edge settings: what the sweep varies. Defaults are those of ViSP's tutorials.
-struct EdgeSettings
-{
-  int mask_size = 5;        ///< [px]
-  int range = 8;            ///< search along the normal [px]
-  double threshold = 10000; ///< likelihood
-  double sample_step = 4;   ///< [px]
-  double far_m = 15;        ///< clipping of the model [m]
-  std::string text() const;
-};
 
 /// What a tracker answered on one frame.
 struct Answer
@@ -74,7 +55,6 @@ public:
 
 private:
   void giveHelp(const TestFlight &flight, std::size_t k, const Pose &predicted, const vpImage<unsigned char> &image);
-  std::unique_ptr<vpMbTracker> make(const std::string &cao_path, const PinholeCamera &camera) const;
 
   TrackerKind m_kind;
   Help m_help;

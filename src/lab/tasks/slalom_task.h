@@ -22,7 +22,7 @@ struct SlalomTaskOptions
   double wave_length = 8; ///< of the line [m], 2 to 50
   double reach = 4;       ///< largest offset from the line [m], 0.5 to 10
   double off_line = 0.4;  ///< a second spent a metre off the line counts as so much longer [1/m], 0 to 10
-  WayOptions way;
+  WayOptions way{1.2};    ///< what it slows and turns for leaves a metre a second
   ResponseOptions response;
   SafetyOptions safety;
 };

@@ -35,6 +35,7 @@ constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks
 constexpr int kPatience = 10;            ///< frames that the way round is blocked before it goes round the other way
 constexpr double kWayRange = 3;          ///< of trunks that may stand in the way round [m]
 constexpr double kLargestTurnRate = 0.8; ///< [rad/s]
+constexpr double kNearestRatio = 0.5;    ///< r/d that is asked for or predicted: beyond it the hull touches most trunks
 
 /// What a drone flies that is sent \p velocity and obeys by \p share: only the horizontal velocity is a balance with
 /// drag.
@@ -136,7 +137,7 @@ TaskCommand TrunkTask::search(const FrameReport &report, double time_s)
 
 void TrunkTask::desire(double radius)
 {
-  m_ratio = m_options.ratio > 0 ? m_options.ratio : std::min(0.5, radius / m_options.distance);
+  m_ratio = m_options.ratio > 0 ? m_options.ratio : std::min(kNearestRatio, radius / m_options.distance);
   m_desired.buildFrom(m_options.bearing, 0, 0, std::log(m_ratio), radius);
 }
 
@@ -294,9 +295,9 @@ Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, do
   const Eigen::Vector2d there = J * ahead.advance(time_s + response.delay) + response.delay * drift;
   Eigen::Vector4d approach = response.speed_lag * ahead.velocity(); // what leads on sideways does not end
   approach.x() = ahead.coast().x();
+  const double ratio = m_log_ratio.value() + there(1) + J.row(1).dot(approach) + response.speed_lag * drift(1);
   m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * (J.row(0).dot(ahead.velocity()) + drift(0)),
-                      feature.inclination(), feature.tip(),
-                      m_log_ratio.value() + there(1) + J.row(1).dot(approach) + response.speed_lag * drift(1), radius);
+                      feature.inclination(), feature.tip(), std::min(ratio, std::log(kNearestRatio)), radius);
   ahead.send(time_s, {0, round, 0, 0});
   ahead.advance(time_s + response.delay + response.turn_lag); // the turn lags too: it is to match what is flown then
   return drift + J.col(1) * ahead.velocity().y();

@@ -16,10 +16,10 @@ constexpr double kBehind = 1;    ///< as far the field reaches behind the drone 
 constexpr double kNearSight = 3; ///< what is farther will be seen before it is reached [m]
 constexpr double kTouchPace =
     50; ///< through what the hull would touch: none flies there, who stands there leaves [s/m]
-constexpr double kOtherMind = 1.15; ///< what another way than the last must save
-constexpr double kSameWay = 0.4;    ///< places as near to the last way belong to it [m]
-constexpr double kSlant = 0.35;     ///< sine of the largest angle between what is flown and the way: 20 degrees
-constexpr double kAim = 0.8;        ///< as far ahead on the way the drone aims [m]
+constexpr double kOtherMind = 1.5; ///< times another way than the last: more than a frame changes what was seen
+constexpr double kSameWay = 0.4;   ///< places as near to the last way belong to it [m]
+constexpr double kSlant = 0.35;    ///< sine of the largest angle between what is flown and the way: 20 degrees
+constexpr double kAim = 0.8;       ///< as far ahead on the way the drone aims [m]
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 struct Step

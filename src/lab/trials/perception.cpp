@@ -4,11 +4,14 @@
 #include "geometry/names.h"
 #include "geometry/yaw.h"
 #include "input/frame_health.h"
+#include "mbt/cao_reader.h"
 #include <bole/pipeline.h>
 #include <bole/vpMbTrunkTracker.h>
 
 #include <Eigen/Geometry>
 
+#include <cstdlib>
+#include <filesystem>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -47,8 +50,9 @@ FrameReport reportOn(const Frame &frame)
 class TruthPerception : public Perception
 {
 public:
-  TruthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing)
-      : m_sight(camera, bMc, forest, missing)
+  TruthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing,
+                  const std::vector<int> &asked_for)
+      : m_sight(camera, bMc, forest, missing, asked_for)
   {
   }
   FrameReport process(Frame &frame, const Pose &truth) override
@@ -62,25 +66,33 @@ private:
   TrueSight m_sight;
 };
 
+/// A tracker that knows the forest's trunks, from the height of knees to that of hands.
+std::unique_ptr<vpMbTracker> trackerOf(TrackerKind kind, const PinholeCamera &camera, const Forest &forest)
+{
+  constexpr double kLow = 0.6, kHigh = 2; // over the foot [m]
+  std::vector<Cylinder> model;
+  for (const SimulatedTrunk &trunk : forest.trunks)
+    model.push_back(cylinderOf(trunk.cylinder(), trunk.foot.z() + kLow, trunk.foot.z() + kHigh));
+  std::string folder = (std::filesystem::temp_directory_path() / "bole-servo-XXXXXX").string();
+  if (!mkdtemp(folder.data()))
+    throw vpException(vpException::ioError, "%s: cannot be made", folder.c_str());
+  const std::string path = folder + "/forest.cao"; // the trackers read files only
+  writeCao(path, model);
+  const Silence silence;
+  std::unique_ptr<vpMbTracker> tracker = makeTracker(kind, {}, path, camera);
+  std::filesystem::remove_all(folder);
+  return tracker;
+}
+
 /// Height, roll and pitch of a pose filter do not drift, so they are taken as they are; heading and place go on by its
 /// steps from where the images put the drone last.
 class TruthMapPerception : public Perception
 {
 public:
-  TruthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest)
-      : m_health(camera, bMc), m_sight(camera, bMc, forest), m_camera(camera), m_bMc(bMc), m_forest(forest)
+  TruthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, TrackerKind kind)
+      : m_health(camera, bMc), m_sight(camera, bMc, forest), m_bMc(bMc), m_tracker(trackerOf(kind, camera, forest))
   {
-    m_tracker.setCameraParameters(camera.toVisp());
-    for (const SimulatedTrunk &trunk : forest.trunks) {
-      const Trunk cylinder = trunk.cylinder();
-      const auto point = [&](double h) {
-        const Eigen::Vector3d p = cylinder.axisAt(trunk.foot.z() + h);
-        vpPoint at;
-        at.setWorldCoordinates(p.x(), p.y(), p.z());
-        return at;
-      };
-      m_tracker.addTrunk(point(0.6), point(2), cylinder.radius());
-    }
+    m_trunks = dynamic_cast<vpMbTrunkTracker *>(m_tracker.get());
   }
 
   FrameReport process(Frame &frame, const Pose &truth) override
@@ -113,20 +125,25 @@ private:
   /// Whether the images say where the drone is: m_estimate.
   bool track(const vpImage<unsigned char> &image, const Pose &wMb)
   {
+    const Silence silence;
     const vpHomogeneousMatrix cMw = (wMb * m_bMc).inverse().toVisp();
-    if (!m_is_started)
-      m_tracker.initFromPose(image, cMw);
-    m_is_started = true;
-    m_tracker.setMotionPrior(cMw, stepCovariance(wMb));
     try {
-      m_tracker.track(image);
+      if (!m_is_started)
+        m_tracker->initFromPose(image, cMw);
+      else if (!m_trunks)
+        m_tracker->setPose(image, cMw);
+      m_is_started = true;
+      if (m_trunks)
+        m_trunks->setMotionPrior(cMw, stepCovariance(wMb));
+      m_tracker->track(image);
     }
     catch (const vpException &) {
       return false;
     }
-    vpHomogeneousMatrix tracked;
-    m_tracker.getPose(tracked);
-    m_estimate = Pose::fromVisp(tracked).inverse() * m_bMc.inverse();
+    const Pose tracked = Pose::fromVisp(m_tracker->getPose());
+    if (!tracked.isFinite())
+      return false;
+    m_estimate = tracked.inverse() * m_bMc.inverse();
     return true;
   }
 
@@ -148,23 +165,23 @@ private:
 
   FrameHealth m_health;
   TrueSight m_sight;
-  PinholeCamera m_camera;
   Pose m_bMc;
-  const Forest &m_forest;
-  vpMbTrunkTracker m_tracker;
+  std::unique_ptr<vpMbTracker> m_tracker;
+  vpMbTrunkTracker *m_trunks; ///< nullptr: ViSP's
   bool m_is_started = false;
   std::optional<Pose> m_odometry;
   Pose m_estimate;
 };
 } // namespace
 
-const char *toString(PerceptionKind kind) { return nameOf(kind, {"truth", "truth-map", "real"}); }
+const char *toString(PerceptionKind kind) { return nameOf(kind, {"truth", "truth-map", "visp-edges", "real"}); }
 
 PerceptionKind perceptionFromString(const std::string &word)
 {
   if (const auto kind = valueNamed(word, PerceptionKind::real))
     return *kind;
-  throw vpException(vpException::badValue, "perception = %s, must be truth, truth-map or real", word.c_str());
+  throw vpException(vpException::badValue, "perception = %s, must be truth, truth-map, visp-edges or real",
+                    word.c_str());
 }
 
 std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options)
@@ -172,12 +189,13 @@ std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Po
   return std::make_unique<RealPerception>(camera, bMc, options);
 }
 std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                            double missing)
+                                            double missing, const std::vector<int> &asked_for)
 {
-  return std::make_unique<TruthPerception>(camera, bMc, forest, missing);
+  return std::make_unique<TruthPerception>(camera, bMc, forest, missing, asked_for);
 }
-std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest)
+std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
+                                               TrackerKind tracker)
 {
-  return std::make_unique<TruthMapPerception>(camera, bMc, forest);
+  return std::make_unique<TruthMapPerception>(camera, bMc, forest, tracker);
 }
 } // namespace bole

@@ -4,6 +4,7 @@
 /// What a task is told of a frame: by the pipeline, or by the truth. The same seeds flown by each tell what control,
 /// tracking and mapping cost.
 
+#include "lab/baseline/model_tracker.h"
 #include "lab/simulation/forest.h"
 #include <bole/options.h>
 #include <bole/report.h>
@@ -15,9 +16,10 @@ namespace bole
 {
 enum class PerceptionKind
 {
-  truth,     ///< true poses, and of each trunk that has been in view the true cylinder; no image is looked at
-  truth_map, ///< poses from images tracked against the true cylinders, the odometry between; the map is the truth's
-  real       ///< the pipeline
+  truth,      ///< true poses, and of each trunk that has been in view the true cylinder; no image is looked at
+  truth_map,  ///< poses from images tracked against the true cylinders, the odometry between; the map is the truth's
+  visp_edges, ///< the same by ViSP's edge tracker (vpMbGenericTracker, settings of its tutorials)
+  real        ///< the pipeline
 };
 const char *toString(PerceptionKind kind);
 /// \throw vpException for another word.
@@ -32,11 +34,14 @@ public:
 };
 
 std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options);
-/// \p missing: share of the trunks that the map never has; where it is not 0 no bark has points either.
+/// \p missing: share of the trunks that the map never has, \p asked_for (ids) not among them; where it is not 0 no bark
+/// has points either.
 std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                            double missing = 0);
-/// \p sensors: the noise of the odometry, which is the prior of the tracking.
-std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest);
+                                            double missing = 0, const std::vector<int> &asked_for = {});
+/// \p tracker: of the true trunks; each gets the odometry's step from its last pose as prior (setMotionPrior() or
+/// setPose()).
+std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
+                                               TrackerKind tracker);
 
 /// What an eye that makes no mistake knows of a wood: it keeps what has come into view.
 ///
@@ -46,8 +51,9 @@ std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, cons
 class TrueSight
 {
 public:
-  /// \p missing: as truthPerception.
-  TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing = 0);
+  /// \p missing, \p asked_for: as truthPerception.
+  TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing = 0,
+            const std::vector<int> &asked_for = {});
   /// Fills poses, trunks, map and points of \p report. \p truth: from where it looks; \p estimate: where it believes to
   /// be, in the world of the truth; \p is_tracked: trunks in view were measured.
   void look(const Pose &truth, const Pose &estimate, bool is_tracked, FrameReport &report);

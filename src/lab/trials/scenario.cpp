@@ -79,7 +79,7 @@ Scenario twoTrunks(const ForestOptions &forest, Random &random)
 {
   SimulatedTrunk one = upright(random, random.uniform(0.1, 0.22)), other = upright(random, random.uniform(0.1, 0.22));
   const double range = random.uniform(4, 6), angle = random.uniform(-10, 10) * kDegree;
-  const double turned = angle + random.uniform(-25, 25) * kDegree, width = random.uniform(1.2, 2);
+  const double turned = angle + random.uniform(-25, 25) * kDegree, width = random.uniform(1.3, 2);
   const Eigen::Vector2d middle(range * std::cos(angle), range * std::sin(angle));
   const Eigen::Vector2d along(std::cos(turned), std::sin(turned)), left(-along.y(), along.x());
   stand(one, middle + (0.5 * width + one.radiusAt(kFlightHeight)) * left);
@@ -108,6 +108,13 @@ Scenario stand(const ScenarioOptions &options, ForestOptions forest)
 } // namespace
 
 const char *toString(ServoKind kind) { return nameOf(kind, {"hold", "circle", "gap", "slalom"}); }
+
+std::vector<int> Scenario::askedFor() const
+{
+  if (target >= 0)
+    return {target};
+  return left >= 0 ? std::vector<int>{left, right} : std::vector<int>{};
+}
 
 void ScenarioOptions::validate() const
 {

@@ -31,8 +31,9 @@ struct ScenarioOptions
 /// Light, bark and every tree differ from seed to seed.
 ///
 /// hold, circle: a trunk of radius 0.1 to 0.25 m, 3 to 5.5 m ahead and up to 10 degrees aside; the ground between is
-/// free. gap: two trunks with 1.2 to 2 m between their bark, the middle 4 to 6 m ahead and up to 10 degrees aside, the
-/// gap turned by up to 25 degrees. slalom: trunks at random, on the line too; only the place of take-off is free.
+/// free. gap: two trunks with 1.3 to 2 m between their bark (1.2 m are asked for, and trunks lean), the middle 4 to 6 m
+/// ahead and up to 10 degrees aside, the gap turned by up to 25 degrees. slalom: trunks at random, on the line too;
+/// only the place of take-off is free.
 struct Scenario
 {
   Forest forest;
@@ -41,6 +42,9 @@ struct Scenario
   int target = -1;           ///< id of the trunk meant (hold, circle)
   int left = -1, right = -1; ///< ids of the gap's trunks
   double gap_width = 0;      ///< bark to bark at flight height [m]
+
+  /// Ids of the trunks without which the task is none.
+  std::vector<int> askedFor() const;
 };
 Scenario makeScenario(const ScenarioOptions &options);
 } // namespace bole

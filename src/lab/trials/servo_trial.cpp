@@ -186,12 +186,15 @@ std::unique_ptr<ServoTask> makeTask(const ServoTrialOptions &options, const Pose
 }
 
 std::unique_ptr<Perception> makePerception(const ServoTrialOptions &options, const vpSimulatorArDrone &robot,
-                                           const Forest &forest)
+                                           const Scenario &scenario)
 {
+  const Forest &forest = scenario.forest;
   if (options.perception == PerceptionKind::truth)
-    return truthPerception(robot.camera(), robot.bMc(), forest, options.missing);
+    return truthPerception(robot.camera(), robot.bMc(), forest, options.missing, scenario.askedFor());
   if (options.perception == PerceptionKind::truth_map)
-    return truthMapPerception(robot.camera(), robot.bMc(), forest);
+    return truthMapPerception(robot.camera(), robot.bMc(), forest, TrackerKind::trunk);
+  if (options.perception == PerceptionKind::visp_edges)
+    return truthMapPerception(robot.camera(), robot.bMc(), forest, TrackerKind::visp_generic_edge);
   return realPerception(robot.camera(), robot.bMc(), options.pipeline);
 }
 
@@ -248,12 +251,26 @@ bool passedBetween(const LoopRecord &record, const SimulatedTrunk &left, const S
   return false;
 }
 
+/// Speeds from where it leaves to where it arrives.
 void judgeSlalom(ServoTrialResult &result)
 {
   const LoopRecord &record = result.record;
+  const LoopSample *first = nullptr, *last = nullptr;
+  double path = 0;
+  for (const LoopSample &sample : record.samples) {
+    if (sample.phase != TaskPhase::servoing)
+      continue;
+    if (last)
+      path += (sample.truth.t - last->truth.t).head<2>().norm();
+    first = first ? first : &sample;
+    last = &sample;
+  }
   result.progress = record.samples.empty() ? 0 : record.samples.back().truth.t.x();
-  const double seconds = result.duration_s - std::max(0.0, record.servoing_from_s);
-  result.mean_speed = result.progress / std::max(seconds, 1e-3);
+  if (first != last) {
+    const double seconds = last->time_s - first->time_s;
+    result.mean_speed = path / seconds;
+    result.speed_along = (last->truth.t - first->truth.t).x() / seconds;
+  }
   result.outcome = record.is_finished ? "" : fmt::format("stopped at {:.1f} m", result.progress);
 }
 
@@ -335,7 +352,7 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   settings.start = scenario.start;
   settings.heading = scenario.heading;
   vpSimulatorArDrone robot(scenario.forest, settings);
-  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario.forest);
+  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
 
   const auto fly = [&](const Judge &judge) {

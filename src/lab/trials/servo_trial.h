@@ -15,9 +15,9 @@ struct ServoTrialOptions
   ScenarioOptions scenario; ///< with the task and the seed
   double distance = 3;      ///< hold [m], 0.5 to 20
   double ratio = 0;         ///< hold, circle: r/d; 0: hold by distance, circle 0.07
-  double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1
+  double speed = 0;         ///< circle, gap, slalom [m/s]; 0: 0.5, 0.6, 1.2
   PerceptionKind perception = PerceptionKind::real;
-  double missing = 0;                   ///< by truth: share of the trunks that the map never has, 0 to 1
+  double missing = 0;                   ///< by truth: share of the trunks not asked for that the map never has, 0 to 1
   Options pipeline = defaultPipeline(); ///< of real perception
   LoopOptions loop;
   vpSimulatorArDrone::Options robot = defaultRobot(); ///< start, heading and seeds are set by the scenario
@@ -46,7 +46,8 @@ struct ServoTrialResult
   double gap_width = kNotMeasured;       ///< gap: true free width of the one passed [m]
   bool is_other_gap = false;             ///< gap: not the one that the scenario has set up
   double progress = kNotMeasured;        ///< slalom [m]
-  double mean_speed = kNotMeasured;      ///< slalom [m/s]
+  double mean_speed = kNotMeasured;      ///< slalom: of its path, from leaving to arriving [m/s]
+  double speed_along = kNotMeasured;     ///< the same: of its progress along the line [m/s]
   double median_loop_ms = kNotMeasured, p95_loop_ms = kNotMeasured;
   double hover_after_s = kNotMeasured; ///< fault: until it hovered [s]
   double drift = kNotMeasured;         ///< fault: how far it moved while it lasted [m]

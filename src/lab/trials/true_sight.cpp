@@ -33,12 +33,15 @@ double toCircle(const Eigen::Vector2d &from, const Eigen::Vector2d &u, const Eig
 }
 } // namespace
 
-TrueSight::TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing)
+TrueSight::TrueSight(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing,
+                     const std::vector<int> &asked_for)
     : m_camera(camera), m_bMc(bMc), m_forest(forest), m_has_points_on_bark(missing <= 0)
 {
   Random random(forest.options.seed, 900);
   for (const SimulatedTrunk &trunk : forest.trunks)
     m_known.push_back({trunk.cylinder(), 0, random.uniform() < missing});
+  for (const int id : asked_for)
+    m_known[static_cast<std::size_t>(id)].is_missing = false;
 }
 
 void TrueSight::look(const Pose &truth, const Pose &estimate, bool is_tracked, FrameReport &report)

@@ -92,6 +92,17 @@ TEST(TrunkTask, AWrongRadiusSlowsButDoesNotMoveTheRatioItKeeps)
   EXPECT_NEAR(std::exp(flight.feature().logRatio()), 0.06, 1e-3);
 }
 
+TEST(TrunkTask, BacksOffWhereItsPredictionReachesTheBark)
+{
+  TrunkTaskOptions options;
+  options.distance = 3;
+  TrunkTask task(forwardCamera(), options);
+  Eigen::Vector4d v = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 4; ++k) // towards it at 0.3 m/s, to a centimetre before the bark
+    v = task.velocityFor(before(0.3 - 0.03 * k, 0, 0.2).feature(), 0.2, 0.1 * k, 0);
+  EXPECT_LT(v.x(), -0.2);
+}
+
 TEST(TrunkTask, CirclesAtTheRatioAndTheSpeedAskedFor)
 {
   Flight flight = before(2.5, 0, 0.15);

@@ -165,6 +165,22 @@ TEST(WayPlanner, KeepsItsSideWhereTheOtherIsHardlyQuicker)
   EXPECT_LT(planned({trunkAt(4, 0.05, 0.3)}).lookedAt({0, 0}, 3.5).y(), 0);
 }
 
+TEST(WayPlanner, KeepsItsSideWhileItMayBeFlownAtMoreThanHalfItsSpeed)
+{
+  const std::vector<Obstacle> trunk = {trunkAt(2, -0.05, 0.3)};
+  const Way left = planned(trunk);
+  const auto side = [&](double room) { // was seen to be free on the left
+    return planned(
+               trunk, [room](double, double y) { return y > 0.2 ? room : 1; }, left)
+        .lookedAt({0, 0}, 2)
+        .y();
+  };
+  const WayOptions options;
+  const double room = options.hull + options.free; // and .35 m for a metre a second
+  EXPECT_GT(side(room + 0.35 * 0.6), 0);
+  EXPECT_LT(side(room + 0.35 * 0.4), 0);
+}
+
 TEST(WayPlanner, LeavesWhatItStandsInByTheMap)
 {
   const Way way = planned({trunkAt(0.3, -0.2, 0.1)});

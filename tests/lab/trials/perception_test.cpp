@@ -2,6 +2,7 @@
 #include "lab/trials/perception.h"
 #include "lab/trials/servo_trial.h"
 #include <bole/open_source.h>
+#include <bole/vpFeatureTrunk.h>
 
 #include <algorithm>
 #include <cmath>
@@ -57,6 +58,16 @@ TEST(TrueSight, KeepsWhatHasBeenInViewAndCountsItsViews)
   ASSERT_TRUE(knownTrunk(report, 0));
   EXPECT_EQ(knownTrunk(report, 0)->observations, 3);
   EXPECT_FALSE(trackedTrunk(report, 0));
+}
+
+TEST(TrueSight, MissesAllTrunksButThoseAskedFor)
+{
+  const Forest forest = wood();
+  TrueSight sight({}, forwardCamera(), forest, 1, {2});
+  FrameReport report;
+  sight.look(kHere, kHere, true, report);
+  ASSERT_EQ(report.map.size(), 1u);
+  EXPECT_EQ(report.map[0].id, 2);
 }
 
 TEST(TrueSight, RaysEndAtBarkAndPassBesideIt)
@@ -125,6 +136,30 @@ TEST(Perception, ByTheTrueMapTheImagesSayWhereTheDroneIs)
   EXPECT_LT(worst, 0.25);
   EXPECT_GT(worst, 1e-4); // measured, not told
   EXPECT_GT(odometry, worst);
+}
+
+TEST(Perception, ViSPsEdgesSayInWhichDirectionTheTrunkIs)
+{
+  double worst = 0, moved = 0;
+  std::optional<Pose> last, last_odometry;
+  int frames = 0;
+  const ServoTrialOptions options = holdBy(PerceptionKind::visp_edges);
+  const Trunk trunk = makeScenario(options.scenario).forest.trunks[0].cylinder();
+  const auto bearing = [&](const Pose &wMb) {
+    vpFeatureTrunk seen;
+    seen.buildFrom(trunk, wMb * forwardCamera());
+    return seen.bearing();
+  };
+  runServoTrial(options, [&](const Frame &frame, const FrameReport &report, const LoopSample &sample) {
+    worst = std::max(worst, std::abs(bearing(report.wMb) - bearing(sample.truth)));
+    if (last)
+      moved = std::max(moved, ((report.wMb.t - last->t) - (frame.wMb_odometry->t - last_odometry->t)).norm());
+    last = report.wMb;
+    last_odometry = frame.wMb_odometry;
+    return ++frames < 10;
+  });
+  EXPECT_LT(worst, 0.05);
+  EXPECT_GT(moved, 0.01); // by the image, not by the odometry alone
 }
 } // namespace
 } // namespace bole
