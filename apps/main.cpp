@@ -71,7 +71,7 @@ std::vector<std::string> optionsOf(const CLI::App &command)
 
 void sayUnknown(const std::string &word, const char *kind, const std::vector<std::string> &known)
 {
-  const std::string name = word.substr(0, word.find('=')), meant = nearestWord(name, known);
+  const std::string name = word.substr(0, word.find('=')), meant = bole::nearestWord(name, known);
   std::fprintf(stderr, "bole: %s: no such %s%s\n", name.c_str(), kind,
                meant.empty() ? "" : (", did you mean " + meant + "?").c_str());
 }

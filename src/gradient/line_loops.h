@@ -2,7 +2,6 @@
 #pragma once
 // Private to the stage: sums of a gradient image along a line, a sample a row.
 
-
 namespace bole
 {
 /// Samples at x = x_top + slope i of the rows i of \p pixels, which are \p columns wide.

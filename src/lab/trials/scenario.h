@@ -5,7 +5,6 @@
 
 #include "lab/simulation/forest.h"
 
-
 namespace bole
 {
 enum class ServoKind
