@@ -218,7 +218,7 @@ TEST(VerticalFilter, APanTellsThePitchThatOneNarrowViewCannot)
   Eigen::Matrix3d wRc = Eigen::Matrix3d::Identity();
   for (int k = 0; k <= 30; ++k) {
     wRc = expSo3(-0.025 * k * w_up);
-    filter.add(wRc, gravityFromVerticals(drawTrunks(narrow, wRc.transpose() * w_up), narrow));
+    filter.add(wRc, VerticalFinder().find(drawTrunks(narrow, wRc.transpose() * w_up), narrow, wRc, std::nullopt));
   }
   EXPECT_LT(directionMinus(filter.up(), w_up).norm(), 0.03);
   const Eigen::Vector3d up = wRc.transpose() * filter.up();
