@@ -9,6 +9,7 @@
 #include <bole/config.h>
 #include <bole/graph.h>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
 #include <array>

@@ -6,6 +6,7 @@
 #include <bole/config.h>
 #include <bole/pipeline.h>
 
+#include <Eigen/Cholesky>
 #include <gmock/gmock.h>
 
 namespace bole
