@@ -247,11 +247,9 @@ std::vector<TriangulatedRay> Engine::points() const
 
 void Engine::reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view)
 {
-  constexpr double kLeastCorrection = 0.1; // of the log of the scale: less changes no decision
   for (const PointCount &count : countPoints(points, m_map, view, m_units))
     m_map.record(count);
   apply(m_map.review(view.time_s, view.has_ranges));
-  reviewScale(kLeastCorrection, false);
 }
 
 /// Covariances are asked for where something was seen lately: that of a trunk farther back costs a walk to where it
@@ -319,6 +317,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   if (newest() > 0) {
     const double dt = seconds(frame.stamp_ns - m_online.back().stamp_ns);
     m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / std::max(dt, 1e-3);
+    followScale(dt);
   }
   m_online.push_back({frame.stamp_ns, wMb});
   report.index = newest();
@@ -344,7 +343,7 @@ void Engine::finish()
   refreshWholeMap();
   if (m_units.flow.final_pass && m_motion->hasRanges()) {
     decideByAllFrames();
-    reviewScale(0, true);
+    takeScale();
     return;
   }
   const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
@@ -353,7 +352,7 @@ void Engine::finish()
     m_smoother.optimize(kSettled);
     refreshWholeMap();
   }
-  reviewScale(0, true);
+  takeScale();
 }
 
 } // namespace bole

@@ -74,7 +74,10 @@ private:
   void detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients);
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
-  void reviewScale(double least_correction, bool with_radii);
+  void followScale(double seconds_passed);
+  void measureScale();
+  void takeScale();
+  void setUnits();
   std::vector<KnownTrunk> known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
   FrameReport complete(FrameReport report, const Frame &frame, const Motion &motion);
   std::size_t newest() const { return m_smoother.poseCount() - 1; }
@@ -82,9 +85,11 @@ private:
 
   PinholeCamera m_camera;
   Pose m_bMc;
-  StageOptions m_options; ///< in metres
-  StageOptions m_units;   ///< the same in units of the motion
-  double m_metres = 1;    ///< in one unit of the motion
+  StageOptions m_options;        ///< in metres
+  StageOptions m_units;          ///< the same in units of the motion
+  double m_metres = 1;           ///< in one unit of the motion
+  double m_metres_of_units = 1;  ///< for which m_units was made
+  std::size_t m_next_scale = 10; ///< frame at which the scale is measured next
   std::unique_ptr<MotionSource> m_motion;
   SaliencyEstimator m_saliency;
   Smoother m_smoother;

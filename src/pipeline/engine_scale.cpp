@@ -2,6 +2,7 @@
 // The scale of the map, and what is read in it.
 #include "pipeline/engine.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bole
@@ -23,17 +24,45 @@ ScaleEstimate Engine::estimateScale(bool with_radii) const
   return {sum / information, 1 / std::sqrt(information), scale.source};
 }
 
-/// Takes over the scale when it is off by more than \p least_correction (of its log). The radii count only at the end:
-/// the detector looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows
-/// them runs away.
-void Engine::reviewScale(double least_correction, bool with_radii)
+/// Measures the scale from time to time and lets the metres follow it. The radii count only at the end: the detector
+/// looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows them runs away.
+void Engine::followScale(double seconds_passed)
+{
+  constexpr std::size_t kLeast = 10, kMost = 60; // frames between two measurements
+  constexpr std::size_t kShare = 10;             // of what is compared there is a tenth more by then
+  constexpr double kAtOnce = 0.1;                // of the log of the scale: as much changes decisions
+  constexpr double kFollows_s = 2;               // below that, at a pace that nobody takes for a motion
+  if (!m_motion->hasRanges())
+    return;
+  if (newest() >= m_next_scale) {
+    measureScale();
+    m_next_scale = newest() + std::clamp(newest() / kShare, kLeast, kMost);
+  }
+  const double log_metres = std::log(m_metres), off = estimateScale(false).log_scale - log_metres;
+  const double share = std::abs(off) > kAtOnce ? 1 : 1 - std::exp(-seconds_passed / kFollows_s);
+  m_metres = std::exp(log_metres + share * off);
+  if (std::abs(std::log(m_metres / m_metres_of_units)) > kAtOnce)
+    setUnits();
+}
+
+void Engine::measureScale()
+{
+  m_motion->measureScale([this](std::size_t pose) { return m_smoother.pose(pose); });
+}
+
+/// At the end.
+void Engine::takeScale()
 {
   if (!m_motion->hasRanges())
     return;
-  const double log_scale = estimateScale(with_radii).log_scale;
-  if (std::abs(log_scale - std::log(m_metres)) <= least_correction)
-    return;
-  m_metres = std::exp(log_scale);
+  measureScale();
+  m_metres = std::exp(estimateScale(true).log_scale);
+  setUnits();
+}
+
+void Engine::setUnits()
+{
+  m_metres_of_units = m_metres;
   m_units = inUnits(m_options, m_metres);
   m_map.setOptions(m_units.map);
   m_saliency = SaliencyEstimator(m_camera, m_units.saliency);

@@ -41,6 +41,7 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_odometry_alone(options.motion.relative_alone),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
+      m_path_scale({}, options.points.gyro),
       m_inertial(bMc, {}, options.points.gyro),
       m_monitor(bMc)
 {
@@ -71,6 +72,7 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   const Frame &trusted = m_monitor.trusted(frame, room);
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
+  m_path_scale.add(trusted);
   m_last_ns = frame.stamp_ns;
   return seen;
 }
@@ -108,10 +110,20 @@ std::optional<double> OdometryMotion::groundZ() const
   return m_has_odometry ? std::optional<double>(0.0) : std::nullopt;
 }
 
+/// The path tells its scale where it sways; where it does not, the odometry's scale may be known better.
+void OdometryMotion::measureScale(const PathScale::Path &path)
+{
+  if (!m_has_odometry)
+    return;
+  const std::optional<LogScale> of_path = m_path_scale.measure(path, m_scale_sigma),
+                                of_odometry = m_inertial.scale(m_scale_sigma);
+  m_scale = of_path && !(of_odometry && of_odometry->sigma < of_path->sigma) ? of_path : of_odometry;
+}
+
 ScaleEstimate OdometryMotion::scale() const
 {
-  if (const std::optional<LogScale> scale = m_inertial.scale(m_scale_sigma))
-    return {-scale->mean, scale->sigma, ScaleSource::odometry};
+  if (m_scale)
+    return {-m_scale->mean, m_scale->sigma, ScaleSource::odometry};
   return {0, m_scale_sigma, ScaleSource::odometry};
 }
 

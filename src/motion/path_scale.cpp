@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/path_scale.h"
+
+#include "geometry/constants.h"
+#include "geometry/require_range.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+void PathScaleOptions::validate() const
+{
+  const auto positive = [](const char *name, double value) { requireRange(name, value, 1e-12, 1e6); };
+  positive("path_scale.accelerometer_noise", accelerometer_noise);
+  positive("path_scale.accelerometer_bias_sigma", accelerometer_bias_sigma);
+  requireRange("path_scale.accelerometer_bias_walk", accelerometer_bias_walk, 0, 1e6);
+  positive("path_scale.tilt_sigma", tilt_sigma);
+  positive("path_scale.path_sigma", path_sigma);
+  requireRange("path_scale.path_walk", path_walk, 0, 1e6);
+  positive("path_scale.height_sigma", height_sigma);
+  positive("path_scale.heading_sigma", heading_sigma);
+  positive("path_scale.memory_s", memory_s);
+}
+
+PathScale::PathScale(const PathScaleOptions &options, const GyroOptions &gyro) : m_options(options), m_gyro(gyro)
+{
+  options.validate();
+}
+
+void PathScale::add(const Frame &frame)
+{
+  m_steps.push_back(stepTo(frame));
+  m_stamp_ns = frame.stamp_ns;
+  ++m_frames;
+  double kept_s = 0;
+  for (const Step &step : m_steps)
+    kept_s += step.duration;
+  if (kept_s - m_steps.front().duration > m_options.memory_s)
+    m_steps.pop_front();
+}
+
+/// The samples' means held in between.
+PathScale::Step PathScale::stepTo(const Frame &frame)
+{
+  Step step;
+  step.frame = m_frames;
+  if (frame.wMb_odometry)
+    step.up = frame.wMb_odometry->R.transpose() * Vector3d::UnitZ();
+  std::int64_t at_ns = m_stamp_ns;
+  step.is_known = m_frames > 0;
+  int samples = 0;
+  constexpr double kRate = 200; // [Hz], of the densities: a sample that stands for longer has its noise for all of it
+  const auto advance = [&](const GyroSample &first, const GyroSample &second, std::int64_t end_ns) {
+    const double dt = 1e-9 * static_cast<double>(end_ns - at_ns);
+    step.is_known = step.is_known && std::max(dt, 1e-9 * static_cast<double>(end_ns - first.stamp_ns)) <= kMostGap_s;
+    const Vector3d force = step.turn * (0.5 * (*first.force + *second.force));
+    step.moved += dt * step.velocity + 0.5 * dt * dt * force;
+    step.velocity += dt * force;
+    step.turn = step.turn * expSo3(0.5 * (first.rate + second.rate) * dt);
+    at_ns = end_ns;
+    ++samples;
+  };
+  for (const GyroSample &sample : frame.gyro) {
+    if (!sample.force) {
+      m_last.reset();
+      step.is_known = false;
+      continue;
+    }
+    if (!m_first_force)
+      m_first_force = sample.force;
+    m_force_varies = m_force_varies || *m_first_force != *sample.force;
+    const std::int64_t end_ns = std::min(sample.stamp_ns, frame.stamp_ns);
+    if (end_ns > at_ns)
+      advance(m_last.value_or(sample), sample, end_ns);
+    m_last = sample;
+  }
+  if (m_last && frame.stamp_ns > at_ns)
+    advance(*m_last, *m_last, frame.stamp_ns);
+  step.is_known = step.is_known && m_last;
+  step.duration = m_frames > 0 ? 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns) : 0;
+  if (samples > 0)
+    step.longer = std::max(1.0, kRate * step.duration / samples);
+  return step;
+}
+
+/// One pass over the path at one scale.
+class PathScale::Filter
+{
+  // Where the errors stand in the state: attitude (right tangent), velocity and place on the path, biases.
+  static constexpr int kAttitude = 0, kVelocity = 3, kPlace = 6, kGyro = 9, kForce = 12, kStates = 15;
+  using States = Eigen::Matrix<double, kStates, kStates>;
+  using Row = Eigen::Matrix<double, 1, kStates>;
+
+public:
+  Filter(const PathScaleOptions &options, const GyroOptions &gyro, double log_scale)
+      : m_options(options), m_gyro(gyro), m_factor(std::exp(log_scale), std::exp(log_scale), 1)
+  {
+    m_covariance.diagonal().segment<3>(kGyro).setConstant(std::pow(gyro.bias_sigma, 2));
+    m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(options.accelerometer_bias_sigma, 2));
+  }
+
+  double logLikelihood() const { return m_log_likelihood; }
+  int compared() const { return m_compared; }
+
+  /// What moves is forgotten; what is constant stays. The velocity is that of the path from \p before, loosely.
+  void start(const Pose &before, const Pose &now, const Step &step)
+  {
+    constexpr double kTilt = 0.02; // of the path [rad]
+    m_covariance.topRows<kGyro>().setZero();
+    m_covariance.leftCols<kGyro>().setZero();
+    m_wRb = now.R;
+    m_velocity = (now.t - before.t) / step.duration;
+    m_place = now.t;
+    const double speed_sigma = 0.3 + 0.3 * m_velocity.norm();
+    m_covariance.diagonal().segment<3>(kAttitude).setConstant(kTilt * kTilt);
+    m_covariance.diagonal().segment<3>(kVelocity).setConstant(speed_sigma * speed_sigma);
+    m_covariance.diagonal().segment<3>(kPlace) = placeVariance();
+  }
+
+  void predict(const Step &step)
+  {
+    const Vector3d gravity(0, 0, -kGravity); // [m/s^2]
+    const double dt = step.duration;
+    const Matrix3d turn = step.turn * expSo3(-m_gyro_bias * dt), stretch = m_factor.asDiagonal() * m_wRb;
+    // a bias of the gyro turns what was measured later in the step the more
+    const Matrix3d velocity_by_gyro = 0.5 * dt * skew(step.velocity);
+    const Vector3d gained = step.velocity + velocity_by_gyro * m_gyro_bias - dt * m_force_bias;
+    const Vector3d moved = step.moved - 0.5 * dt * dt * m_force_bias;
+
+    States F = States::Identity();
+    F.block<3, 3>(kAttitude, kAttitude) = turn.transpose();
+    F.block<3, 3>(kAttitude, kGyro) = -dt * Matrix3d::Identity();
+    F.block<3, 3>(kVelocity, kAttitude) = -stretch * skew(gained);
+    F.block<3, 3>(kVelocity, kGyro) = stretch * velocity_by_gyro;
+    F.block<3, 3>(kVelocity, kForce) = -dt * stretch;
+    F.block<3, 3>(kPlace, kAttitude) = -stretch * skew(moved);
+    F.block<3, 3>(kPlace, kVelocity) = dt * Matrix3d::Identity();
+    F.block<3, 3>(kPlace, kForce) = -0.5 * dt * dt * stretch;
+    m_covariance = (F * m_covariance * F.transpose()).eval();
+    const auto white = [&](int at, const Vector3d &density) {
+      m_covariance.diagonal().segment<3>(at) += dt * density.cwiseAbs2();
+    };
+    const Vector3d force = m_options.accelerometer_noise * std::sqrt(step.longer) * m_factor;
+    white(kAttitude, Vector3d::Constant(m_gyro.noise_density * std::sqrt(step.longer)));
+    white(kVelocity, force);
+    white(kPlace, dt / std::sqrt(3.0) * force);
+    white(kPlace, Vector3d(m_options.path_walk, m_options.path_walk, 0));
+    white(kGyro, Vector3d::Constant(m_gyro.bias_walk));
+    white(kForce, Vector3d::Constant(m_options.accelerometer_bias_walk));
+
+    m_place += dt * m_velocity + m_factor.cwiseProduct(0.5 * dt * dt * gravity + m_wRb * moved);
+    m_velocity += m_factor.cwiseProduct(dt * gravity + m_wRb * gained);
+    m_wRb = orthonormalized(m_wRb * turn);
+  }
+
+  /// Where is up, by the pose filter?
+  void compareTilt(const Vector3d &measured)
+  {
+    const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ(), left = up.unitOrthogonal();
+    for (const Vector3d &across : {left, Vector3d(up.cross(left))}) {
+      Row H = Row::Zero();
+      H.segment<3>(kAttitude) = across.transpose() * skew(up);
+      update(H, across.dot(measured - up), std::pow(m_options.tilt_sigma, 2));
+    }
+  }
+
+  /// The place on the path, and its heading.
+  void comparePath(const Pose &wMb)
+  {
+    for (int axis = 0; axis < 3; ++axis) {
+      Row H = Row::Zero();
+      H(kPlace + axis) = 1;
+      update(H, wMb.t(axis) - m_place(axis), placeVariance()(axis));
+    }
+    const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ();
+    Row H = Row::Zero();
+    H.segment<3>(kAttitude) = up.transpose();
+    update(H, up.dot(logSo3(m_wRb.transpose() * wMb.R)), std::pow(m_options.heading_sigma, 2));
+    ++m_compared;
+  }
+
+private:
+  Vector3d placeVariance() const
+  {
+    const double across2 = std::pow(m_options.path_sigma, 2);
+    return {across2, across2, std::pow(m_options.height_sigma, 2)};
+  }
+
+  /// Kalman's update by one number.
+  void update(const Row &H, double residual, double variance)
+  {
+    const Eigen::Matrix<double, kStates, 1> PHt = m_covariance * H.transpose();
+    const double innovation = (H * PHt).value() + variance;
+    const Eigen::Matrix<double, kStates, 1> change = PHt * (residual / innovation);
+    m_covariance -= PHt * PHt.transpose() / innovation;
+    m_log_likelihood -= 0.5 * (residual * residual / innovation + std::log(innovation));
+    m_wRb = m_wRb * expSo3(change.segment<3>(kAttitude));
+    m_velocity += change.segment<3>(kVelocity);
+    m_place += change.segment<3>(kPlace);
+    m_gyro_bias += change.segment<3>(kGyro);
+    m_force_bias += change.segment<3>(kForce);
+  }
+
+  const PathScaleOptions &m_options;
+  const GyroOptions &m_gyro;
+  Vector3d m_factor; ///< of the path's lengths
+  Matrix3d m_wRb = Matrix3d::Identity();
+  Vector3d m_velocity = Vector3d::Zero(), m_place = Vector3d::Zero(); ///< on the path
+  Vector3d m_gyro_bias = Vector3d::Zero(), m_force_bias = Vector3d::Zero();
+  double m_log_likelihood = 0;
+  int m_compared = 0;
+  States m_covariance = States::Zero();
+};
+
+/// Of a path of this scale; nothing where it was compared nowhere.
+std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, double log_scale) const
+{
+  Filter filter(m_options, m_gyro, log_scale);
+  bool is_started = false;
+  for (std::size_t i = 1; i < m_steps.size(); ++i) {
+    const Step &step = m_steps[i];
+    if (is_started && step.is_known) {
+      filter.predict(step);
+      if (step.up)
+        filter.compareTilt(*step.up);
+      filter.comparePath(path[i]);
+    }
+    else if (step.duration > 0) {
+      filter.start(path[i - 1], path[i], step);
+      is_started = true;
+    }
+  }
+  return filter.compared() > 0 ? std::optional<double>(filter.logLikelihood()) : std::nullopt;
+}
+
+std::optional<LogScale> PathScale::measure(const Path &path, double prior_sigma)
+{
+  constexpr double kApart = 0.03, kMostStep = 0.2, kSettled = 0.003; // of the log of the scale
+  constexpr double kLeast = 4; // information: a slope that does not bend tells a side, not a place
+  constexpr int kMostRounds = 6;
+  if (!m_force_varies)
+    return std::nullopt;
+  std::vector<Pose> poses;
+  for (const Step &step : m_steps)
+    poses.push_back(path(step.frame));
+  const double prior = 1 / std::max(1e-12, prior_sigma * prior_sigma);
+  LogScale scale;
+  for (int round = 0; round < kMostRounds; ++round) { // Newton's steps on a parabola through three scales
+    const auto less = logLikelihood(poses, m_log_scale - kApart), here = logLikelihood(poses, m_log_scale),
+               more = logLikelihood(poses, m_log_scale + kApart);
+    if (!less || !here || !more)
+      return std::nullopt;
+    const double slope = (*more - *less) / (2 * kApart);
+    const double information = std::max(kLeast, (2 * *here - *less - *more) / (kApart * kApart));
+    const double alone = m_log_scale + slope / information;
+    scale.contradicts_prior = alone * alone > 9 * (1 / information + 1 / prior);
+    const double known = scale.contradicts_prior ? information : information + prior;
+    scale.mean = information * alone / known;
+    scale.sigma = 1 / std::sqrt(known);
+    const double step = std::clamp(scale.mean - m_log_scale, -kMostStep, kMostStep);
+    m_log_scale += step;
+    if (std::abs(step) < kSettled)
+      return scale;
+  }
+  m_log_scale = 0;
+  return std::nullopt;
+}
+} // namespace bole
