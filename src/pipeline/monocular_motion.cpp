@@ -265,8 +265,8 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
   if (up()) { // frames share the lean of their trunks: the sum over frames must not know more than the filter
     const Matrix3d bRw = m_bMc.R * m_pointsMc.R.transpose();
     const Matrix32d basis = bRw * directionBasis(m_vertical.up());
-    const Matrix3d covariance = std::min(30, m_frames_with_up) * basis * m_vertical.covariance() * basis.transpose();
-    motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), covariance);
+    const Matrix3d of_up = std::min(30, m_frames_with_up) * basis * m_vertical.covariance() * basis.transpose();
+    motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), of_up);
   }
   learnGround(wMa * motion.step.aMb);
 }

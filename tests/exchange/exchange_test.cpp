@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
