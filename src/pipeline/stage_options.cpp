@@ -30,7 +30,6 @@ void scaleToCamera(StageOptions &o, double s)
   o.detection.profile.contrast_min /= blur;
   o.tracking.contrast_min /= blur;
   o.lines.border_a *= blur;
-  o.map.turning_contrast /= blur;
   o.flow.gate_sigma_px *= place;
   o.flow.search_px *= place;
   o.detection.inlier_px *= place;
