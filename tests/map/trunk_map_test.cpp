@@ -6,7 +6,6 @@
 
 #include <functional>
 #include <random>
-#include <visp3/core/vpException.h>
 
 namespace
 {
@@ -582,17 +581,4 @@ TEST_F(Life, RecordsTellThePlaceAtBreastHeight)
   EXPECT_NEAR(record.covariance(2, 2), 0.04 * 0.15 * 0.15, 1e-12);
   EXPECT_EQ(record.observations, 4);
   EXPECT_NEAR(record.last_seen_s - record.first_seen_s, 0.3, 1e-12);
-}
-
-TEST(MapOptions, AnOptionOutOfRangeIsNamed)
-{
-  MapOptions options;
-  options.lost_misses = 0;
-  try {
-    TrunkMap map(options);
-    FAIL() << "no exception";
-  }
-  catch (const vpException &error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("map.lost_misses = 0, must be in [1, 1000]"));
-  }
 }
