@@ -170,8 +170,8 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   const double wanted_px = kStartParallax * focal();
   const bool translates =
       is_focal_known || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
-  if (!translates && matches.size() >= 6) {
-    // What looks like a flight past a wall is taken for a pan.
+  if ((!translates || !estimate.hasRotation()) && matches.size() >= 6) {
+    // What looks like a flight past a wall is taken for a pan, and so is what cannot be told from one.
     wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
                                                        kLeastNoise_px / focal(), relative_pose)
                                        .aRb;

@@ -183,9 +183,12 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
 /// Replaces the image of each trunk tracked by a summary factor.
 void Engine::add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)
 {
+  constexpr double kOnePlace = 0.05; // of a view that a camera which only turns has: what is wrong in one is so in all
   for (const TrackedTrunk &trunk : tracked) {
     if (trunk.result.status == TrackingStatus::tracked) {
-      const double weight = weightOfView(m_map.trunk(trunk.predicted.id).seen_from, view.wMc.t, m_units.flow);
+      const double weight = view.has_ranges
+                                ? weightOfView(m_map.trunk(trunk.predicted.id).seen_from, view.wMc.t, m_units.flow)
+                                : kOnePlace;
       if (isDropped(m_smoother.addObservation(newest(), trunk.predicted.smoother_id, summaryOf(trunk.result, weight))))
         continue;
     }
