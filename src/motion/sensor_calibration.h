@@ -12,9 +12,9 @@
 /// All are robust least squares. The prior of each has two parts: as the sensor is stated (narrow), or anything within
 /// kMost... (wide). A constant is taken over where the wide part explains the measurements better, so a sensor that is
 /// as stated is read as it stands, and the constants that are taken over carry the covariance of their measurement.
-/// Focal lengths and attitude of the camera and the scale of the gyro are not taken over but named (SensorVerdict), where
-/// under another one the points' rotations would agree with the gyro's: they are the user's.
-/// A fault that begins later is no constant: what the constants do not explain is left alone, for SensorMonitor.
+/// Focal lengths and attitude of the camera and the scale of the gyro are not taken over but named (SensorVerdict),
+/// where under another one the points' rotations would agree with the gyro's: they are the user's. A fault that begins
+/// later is no constant: what the constants do not explain is left alone, for SensorMonitor.
 ///
 /// Frames: b body, w world, o the body as the odometry has it: wRo = wRb * bRo.
 ///
