@@ -116,6 +116,12 @@ std::optional<GyroAgreement::Usual> GyroAgreement::usual() const
   return usual;
 }
 
+Eigen::Vector2d GyroAgreement::usualOffset() const
+{
+  const std::optional<Usual> known = usual();
+  return known ? known->centre : Eigen::Vector2d::Zero();
+}
+
 bool GyroAgreement::follows(const Eigen::Vector2d &image, const Eigen::Vector2d &gyro, int frames) const
 {
   const std::optional<Usual> known = usual();

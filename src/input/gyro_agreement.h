@@ -45,6 +45,8 @@ public:
   int lag() const { return m_lag; }
   /// The sequence is broken; how well images and gyro agree is remembered.
   void reset();
+  /// Median of image less gyro over the intervals that agreed [rad]; 0 while there are too few.
+  Eigen::Vector2d usualOffset() const;
   /// Whether a shift over some \p frames is what the gyro says, as well as those of the flight are.
   bool follows(const Eigen::Vector2d &image, const Eigen::Vector2d &gyro, int frames) const;
 

@@ -56,6 +56,20 @@ void remember(std::deque<double> &values, double value)
 /// Shift of a distant image over the focal length when the camera rotates by \p rotation.
 Eigen::Vector2d shiftOf(const Eigen::Vector3d &rotation) { return {rotation.y(), -rotation.x()}; }
 
+/// \p image as it would be had the camera not rolled: \p rotation, about its own axes [rad].
+cv::Mat unrolled(const cv::Mat &image, const std::optional<Eigen::Vector3d> &rotation)
+{
+  constexpr double kLeast_rad = 0.01; // half a pixel at the border of a thumb
+  const double roll = rotation ? rotation->z() : 0;
+  if (std::abs(roll) < kLeast_rad)
+    return image;
+  const cv::Point2f centre(0.5F * static_cast<float>(image.cols - 1), 0.5F * static_cast<float>(image.rows - 1));
+  cv::Mat out;
+  cv::warpAffine(image, out, cv::getRotationMatrix2D(centre, -roll * 180 / CV_PI, 1), image.size(), cv::INTER_LINEAR,
+                 cv::BORDER_REPLICATE);
+  return out;
+}
+
 /// The middle of \p image, enlarged to its size.
 cv::Mat enlarged(const cv::Mat &image, double zoom)
 {
@@ -141,11 +155,12 @@ struct ImageHealth::State
   ImageFault judgeAlone(const ImageNumbers &numbers);
   ImageFault judgeQuality(const ImageNumbers &numbers);
   ImageFault judgeFrozen(const cv::Mat &image, const cv::Mat &small);
-  ImageFault judgeOrder(const cv::Mat &small, const MeasuredRotation &motion);
-  ImageFault judgeOdd(const cv::Mat &small, const ImageMatch &moved, double focal);
+  ImageFault judgeOrder(const cv::Mat &picture, const MeasuredRotation &motion);
+  ImageFault judgeOdd(const cv::Mat &picture, const cv::Mat &small, const ImageMatch &moved, double focal);
   GyroAgreement::Interval intervalOf(const ImageMatch &moved, double focal) const;
+  bool movedAsOne(const cv::Mat &small, const GyroAgreement::Interval &interval, double focal) const;
   ImageFault named(GyroAgreement::Verdict verdict);
-  bool isBack(const cv::Mat &small, const ImageMatch &moved, double focal) const;
+  bool isBack(const cv::Mat &picture, const cv::Mat &small, const ImageMatch &moved, double focal) const;
   ImageFault begin(Suspicion suspicion)
   {
     odd = std::move(suspicion);
@@ -229,9 +244,10 @@ ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &
 }
 
 /// Whether an image follows the last accepted one again, after others that did not.
-bool ImageHealth::State::isBack(const cv::Mat &small, const ImageMatch &moved, double focal) const
+bool ImageHealth::State::isBack(const cv::Mat &picture, const cv::Mat &small, const ImageMatch &moved,
+                                double focal) const
 {
-  const ImageMatch with_last = matchImages(thumb, small);
+  const ImageMatch with_last = matchImages(thumb, unrolled(picture, gyro_from_last));
   if (with_last.correlation > std::max(kBackLeast, moved.correlation + kBackGain))
     return true;
   if (odd.fault != ImageFault::out_of_order) // what was done to the image before is undone
@@ -243,12 +259,13 @@ bool ImageHealth::State::isBack(const cv::Mat &small, const ImageMatch &moved, d
 }
 
 /// Against the images before and the gyro.
-ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRotation &motion)
+ImageFault ImageHealth::State::judgeOrder(const cv::Mat &picture, const MeasuredRotation &motion)
 {
-  const double focal = motion.focal_px * small.cols / last.cols;
+  const double focal = motion.focal_px * picture.cols / last.cols;
+  const cv::Mat small = unrolled(picture, gyro);
   const ImageMatch moved = matchImages(previous, small);
   if (odd.fault != ImageFault::none)
-    return judgeOdd(small, moved, focal);
+    return judgeOdd(picture, small, moved, focal);
   ++since_torn;
   if (moved.correlation < kFlipLeast)
     if (Suspicion other = otherwise(previous, small, moved);
@@ -267,16 +284,19 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &small, const MeasuredRo
     return begin({ImageFault::out_of_order, "out of order: it shows another place than the frame before"});
   }
   const ImageFault fault = named(agreement.add(interval, true));
+  if (fault == ImageFault::out_of_order && !movedAsOne(small, interval, focal))
+    return ImageFault::none;
   if (fault == ImageFault::out_of_order)
     return begin({fault, "out of order: it does not follow the frame before as the gyro says"});
   return fault;
 }
 
 /// After an image that stood otherwise to those before it.
-ImageFault ImageHealth::State::judgeOdd(const cv::Mat &small, const ImageMatch &moved, double focal)
+ImageFault ImageHealth::State::judgeOdd(const cv::Mat &picture, const cv::Mat &small, const ImageMatch &moved,
+                                        double focal)
 {
   const bool is_out_of_order = odd.fault == ImageFault::out_of_order;
-  const bool is_back = isBack(small, moved, focal);
+  const bool is_back = isBack(picture, small, moved, focal);
   if (is_out_of_order && gyro && focal > 0) {
     const ImageFault fault = named(agreement.add(intervalOf(moved, focal), false));
     if (!is_back && fault != ImageFault::none) { // they follow each other, at another time
@@ -289,6 +309,26 @@ ImageFault ImageHealth::State::judgeOdd(const cv::Mat &small, const ImageMatch &
     return say(odd.fault, odd.text);
   odd = {};
   return ImageFault::none;
+}
+
+/// Whether the parts of the image all moved as the whole did, and not as the gyro says: a flight past something near
+/// moves that alone.
+bool ImageHealth::State::movedAsOne(const cv::Mat &small, const GyroAgreement::Interval &interval, double focal) const
+{
+  constexpr double kMost = 0.5; // of the way of the whole
+  constexpr int kLeastParts = 2;
+  const Eigen::Vector2d expected = focal * (interval.gyro + agreement.usualOffset());
+  const Eigen::Vector2d whole = focal * interval.image - expected;
+  int parts = 0;
+  for (const ImageMatch &strip : matchStrips(previous, small)) {
+    if (strip.correlation < kSureMatch)
+      continue;
+    ++parts;
+    const bool may_follow = strip.bestNear(expected.x(), expected.y()) > strip.correlation - kSureMargin;
+    if (may_follow || (Eigen::Vector2d(strip.x, strip.y) - expected).dot(whole) < kMost * whole.squaredNorm())
+      return false;
+  }
+  return parts >= kLeastParts;
 }
 
 /// What the images and the gyro say of the time since the image before.

@@ -111,18 +111,18 @@ cv::Mat thumbOf(const cv::Mat &I)
 }
 
 /// Shift s at which now(u) = before(u + s).
-ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now)
+namespace
 {
-  const int reach_x = static_cast<int>(kSearchShare * now.cols);
-  const int reach_y = std::min(reach_x / 2 + 1, now.rows / 4);
-  const cv::Rect inner(reach_x, reach_y, now.cols - 2 * reach_x, now.rows - 2 * reach_y);
+/// Where what \p now shows in \p inner stood \p before, searched for as far as \p reach.
+ImageMatch matchInner(const cv::Mat &before, const cv::Mat &now, const cv::Rect &inner, const cv::Point &reach)
+{
+  const cv::Rect searched(inner.tl() - reach, inner.size() + cv::Size(2 * reach.x, 2 * reach.y));
   cv::Mat response;
-  cv::matchTemplate(before, now(inner), response, cv::TM_CCOEFF_NORMED);
+  cv::matchTemplate(before(searched), now(inner), response, cv::TM_CCOEFF_NORMED);
   double value = -1;
   cv::Point at;
   cv::minMaxLoc(response, nullptr, &value, nullptr, &at);
-  ImageMatch result{
-      value, static_cast<double>(at.x - reach_x), static_cast<double>(at.y - reach_y), response, {reach_x, reach_y}};
+  ImageMatch result{value, static_cast<double>(at.x - reach.x), static_cast<double>(at.y - reach.y), response, reach};
   if (at.x > 0 && at.x + 1 < response.cols)
     result.x +=
         parabola(response.at<float>(at.y, at.x - 1), static_cast<float>(value), response.at<float>(at.y, at.x + 1));
@@ -130,6 +130,30 @@ ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now)
     result.y +=
         parabola(response.at<float>(at.y - 1, at.x), static_cast<float>(value), response.at<float>(at.y + 1, at.x));
   return result;
+}
+
+cv::Point reachIn(const cv::Mat &image)
+{
+  const int x = static_cast<int>(kSearchShare * image.cols);
+  return {x, std::min(x / 2 + 1, image.rows / 4)};
+}
+} // namespace
+
+ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now)
+{
+  const cv::Point reach = reachIn(now);
+  return matchInner(before, now, {reach, cv::Point(now.cols, now.rows) - reach}, reach);
+}
+
+std::vector<ImageMatch> matchStrips(const cv::Mat &before, const cv::Mat &now)
+{
+  constexpr int kStrips = 3;
+  const cv::Point reach = reachIn(now);
+  const int width = (now.cols - 2 * reach.x) / kStrips;
+  std::vector<ImageMatch> matches;
+  for (int i = 0; i < kStrips; ++i)
+    matches.push_back(matchInner(before, now, {reach.x + i * width, reach.y, width, now.rows - 2 * reach.y}, reach));
+  return matches;
 }
 
 double ImageMatch::bestNear(double at_x, double at_y) const

@@ -4,6 +4,7 @@
 /// What is counted in an image to judge its health. Private to ImageHealth.
 
 #include <opencv2/core.hpp>
+#include <vector>
 
 namespace bole
 {
@@ -36,6 +37,8 @@ struct ImageMatch
   double bestNear(double at_x, double at_y) const;
 };
 ImageMatch matchImages(const cv::Mat &before, const cv::Mat &now);
+/// The same of a third of the width each, from left to right: what is near moves otherwise than what is far.
+std::vector<ImageMatch> matchStrips(const cv::Mat &before, const cv::Mat &now);
 
 /// Standard deviation of the difference: an exposure that changes is no motion.
 double changeBetween(const cv::Mat &a, const cv::Mat &b);
