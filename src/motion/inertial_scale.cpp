@@ -2,7 +2,6 @@
 #include "motion/inertial_scale.h"
 
 #include "geometry/constants.h"
-#include "geometry/require_range.h"
 
 #include <Eigen/Dense>
 
@@ -19,6 +18,9 @@ namespace
 // Where the errors stand in the state: attitude (right tangent), velocity, displacement, biases, log of the scale.
 constexpr int kAttitude = 0, kVelocity = 3, kMoved = 6, kGyro = 9, kForce = 12, kScale = 15;
 const Vector3d kGravityVector(0, 0, -kGravity); // [m/s^2]
+constexpr double kWindow_s = 0.25;              // least time between two comparisons
+constexpr double kOdometryWalk = 0.038;         // horizontal [m/sqrt(s)]
+constexpr double kHeightSigma = 0.03;           // of the difference of two heights by the odometry [m]
 constexpr double kGate = 30;                    // squared innovation over its variance: not of this model
 
 double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
@@ -33,26 +35,12 @@ Eigen::Matrix<double, 2, 3> across(const Vector3d &unit)
 }
 } // namespace
 
-void InertialScaleOptions::validate() const
+InertialScale::InertialScale(const Pose &bMc, const GyroOptions &gyro, double start_sigma)
+    : m_bMc(bMc), m_gyro(gyro), m_start_sigma(start_sigma)
 {
-  const auto positive = [](const char *name, double value) { requireRange(name, value, 1e-12, 1e6); };
-  positive("inertial_scale.accelerometer_noise", accelerometer_noise);
-  positive("inertial_scale.accelerometer_bias_sigma", accelerometer_bias_sigma);
-  requireRange("inertial_scale.accelerometer_bias_walk", accelerometer_bias_walk, 0, 1e6);
-  positive("inertial_scale.tilt_sigma", tilt_sigma);
-  positive("inertial_scale.odometry_walk", odometry_walk);
-  positive("inertial_scale.odometry_height_sigma", odometry_height_sigma);
-  positive("inertial_scale.start_sigma", start_sigma);
-  positive("inertial_scale.window", window);
-}
-
-InertialScale::InertialScale(const Pose &bMc, const InertialScaleOptions &options, const GyroOptions &gyro)
-    : m_bMc(bMc), m_options(options), m_gyro(gyro)
-{
-  options.validate();
   m_covariance.diagonal().segment<3>(kGyro).setConstant(std::pow(gyro.bias_sigma, 2));
-  m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(options.accelerometer_bias_sigma, 2));
-  m_covariance(kScale, kScale) = std::pow(options.start_sigma, 2);
+  m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(accelerometer::kBiasSigma, 2));
+  m_covariance(kScale, kScale) = std::pow(start_sigma, 2);
 }
 
 void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
@@ -65,7 +53,7 @@ void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion
   const auto seen = std::find_if(motions.begin(), motions.end(), [this](const RelativeMotion &motion) {
     return motion.a_index == m_anchor->index && motion.points.hasRotation();
   });
-  if (duration < m_options.window || (seen == motions.end() && duration < 2 * m_options.window))
+  if (duration < kWindow_s || (seen == motions.end() && duration < 2 * kWindow_s))
     return;
   if (!m_started)
     start(frame);
@@ -128,7 +116,7 @@ void InertialScale::start(const Frame &frame)
   const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
   m_wRb = m_anchor->wMb->R;
   m_velocity = (frame.wMb_odometry->t - m_anchor->wMb->t) / duration;
-  const double tilt2 = std::pow(m_options.tilt_sigma, 2), velocity_sigma = 0.3 + 0.3 * m_velocity.norm();
+  const double tilt2 = std::pow(accelerometer::kTiltSigma, 2), velocity_sigma = 0.3 + 0.3 * m_velocity.norm();
   m_covariance.diagonal().segment<3>(kAttitude) << tilt2, tilt2, 1e-6;
   m_covariance.diagonal().segment<3>(kVelocity).setConstant(velocity_sigma * velocity_sigma);
   m_started = true;
@@ -177,12 +165,11 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   const auto white = [&](int at, double density, double longer) {
     m_covariance.diagonal().segment<3>(at).array() += density * density * dt * longer;
   };
-  constexpr double kRate = 200; // [Hz], of the densities: a sample that stands for longer has its noise for all of it
-  const double longer = std::max(1.0, kRate * dt);
+  const double longer = std::max(1.0, accelerometer::kRate * dt);
   white(kAttitude, m_gyro.noise_density, longer);
-  white(kVelocity, m_options.accelerometer_noise, longer);
+  white(kVelocity, accelerometer::kNoise, longer);
   white(kGyro, m_gyro.bias_walk, 1);
-  white(kForce, m_options.accelerometer_bias_walk, 1);
+  white(kForce, accelerometer::kBiasWalk, 1);
 
   const Vector3d acceleration = m_wRb * specific + kGravityVector;
   m_moved += dt * m_velocity + 0.5 * dt * dt * acceleration;
@@ -218,7 +205,7 @@ void InertialScale::compareTilt(const Pose &wMb)
   const Eigen::Matrix<double, 2, 3> rows = across(up);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, kStates);
   H.middleCols<3>(kAttitude) = rows * skew(up);
-  update(H, rows * (measured - up), std::pow(m_options.tilt_sigma, 2) * Eigen::Matrix2d::Identity());
+  update(H, rows * (measured - up), std::pow(accelerometer::kTiltSigma, 2) * Eigen::Matrix2d::Identity());
 }
 
 /// The displacement by the odometry, in the heading of this filter: its horizontal part has the scale.
@@ -231,8 +218,8 @@ void InertialScale::compareOdometry(const Pose &wMb, double duration)
   H.middleCols<3>(kMoved) = factor.asDiagonal();
   H.middleCols<3>(kAttitude) = m_wRb * skew(in_body);
   H.block<2, 1>(0, kScale) = scale * m_moved.head<2>();
-  const double walk2 = std::pow(m_options.odometry_walk, 2) * duration;
-  const Vector3d noise(walk2, walk2, std::pow(m_options.odometry_height_sigma, 2));
+  const double walk2 = std::pow(kOdometryWalk, 2) * duration;
+  const Vector3d noise(walk2, walk2, std::pow(kHeightSigma, 2));
   update(H, m_wRb * in_body - factor.cwiseProduct(m_moved), Matrix3d(noise.asDiagonal()));
 }
 
@@ -315,7 +302,7 @@ std::optional<LogScale> InertialScale::scale(double prior_sigma) const
   result.contradicts_prior = m_log_scale * m_log_scale > 9 * (variance + prior2);
   if (result.contradicts_prior)
     return LogScale{m_log_scale, std::sqrt(variance), true};
-  const double measured = std::max(0.0, 1 / variance - std::pow(m_options.start_sigma, -2)); // without its own prior
+  const double measured = std::max(0.0, 1 / variance - std::pow(m_start_sigma, -2)); // without its own prior
   const double information = measured + 1 / std::max(1e-12, prior2);
   result.mean = m_log_scale / variance / information;
   result.sigma = 1 / std::sqrt(information);

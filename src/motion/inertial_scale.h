@@ -22,6 +22,7 @@
 ///
 /// Cost: 0.1 ms a frame with 20 samples. Not thread-safe.
 
+#include "motion/accelerometer.h"
 #include "motion/gyro.h"
 #include "motion/point_motion.h"
 
@@ -29,28 +30,6 @@
 
 namespace bole
 {
-struct InertialScaleOptions
-{
-  double accelerometer_noise = 0.01;     ///< [m/s^2/sqrt(Hz)], > 0
-  double accelerometer_bias_sigma = 0.1; ///< of the constant bias [m/s^2], > 0
-  double accelerometer_bias_walk = 1e-3; ///< [m/s^2/sqrt(s)], >= 0
-  double tilt_sigma = 0.005;             ///< of roll and pitch of the odometry [rad], > 0
-  double odometry_walk = 0.038;          ///< horizontal [m/sqrt(s)], > 0
-  double odometry_height_sigma = 0.03;   ///< of the difference of two heights [m], > 0
-  double start_sigma = 0.1;              ///< of the log of the scale before anything was measured, > 0
-  double window = 0.25;                  ///< least time between two comparisons [s], > 0
-
-  /// Throws vpException: "inertial_scale.name = value, must be ...".
-  void validate() const;
-};
-
-/// Logarithm of the odometry's length over the true length.
-struct LogScale
-{
-  double mean = 0, sigma = 0;
-  bool contradicts_prior = false; ///< more than three standard deviations from the scale that was expected
-};
-
 /// A displacement by gyro and accelerometer.
 struct InertialStep
 {
@@ -62,7 +41,8 @@ struct InertialStep
 class InertialScale
 {
 public:
-  explicit InertialScale(const Pose &bMc, const InertialScaleOptions &options = {}, const GyroOptions &gyro = {});
+  /// \param start_sigma of the log of the scale before anything was measured
+  explicit InertialScale(const Pose &bMc, const GyroOptions &gyro = {}, double start_sigma = 0.1);
 
   /// Takes in the next frame and what the points say of it. A frame without samples of the accelerometer begins anew.
   void process(const Frame &frame, const std::vector<RelativeMotion> &motions);
@@ -96,8 +76,8 @@ private:
   void update(const Eigen::MatrixXd &H, const Eigen::VectorXd &residual, const Eigen::MatrixXd &noise);
 
   Pose m_bMc;
-  InertialScaleOptions m_options;
   GyroOptions m_gyro;
+  double m_start_sigma;
   std::vector<GyroSample> m_samples; ///< since the anchor, one before it where there is one
   std::optional<Eigen::Vector3d> m_first_force;
   bool m_force_varies = false;

@@ -25,39 +25,20 @@
 ///
 /// Cost: 30 us a frame of the path in measure(). Not thread-safe.
 
+#include "motion/accelerometer.h"
 #include "motion/gyro.h"
-#include "motion/inertial_scale.h"
 
 #include <deque>
 #include <functional>
 
 namespace bole
 {
-struct PathScaleOptions
-{
-  double accelerometer_noise = 0.01;     ///< [m/s^2/sqrt(Hz)], > 0
-  double accelerometer_bias_sigma = 0.1; ///< of the constant bias [m/s^2], > 0
-  double accelerometer_bias_walk = 1e-3; ///< [m/s^2/sqrt(s)], >= 0
-  double tilt_sigma = 0.005;             ///< of roll and pitch of the odometry [rad], > 0
-  /// The path's error: white, and walking. On simulated flights among trees half the squared difference of two errors
-  /// is 40, 150, 310 mm^2 an axis after 0.1, 1 and 4 s of hovering, 45, 270, 500 in flights of 12 s, once the path is
-  /// laid on the truth, which takes a part of the walk with it.
-  double path_sigma = 0.008;   ///< horizontal [m], > 0
-  double path_walk = 0.02;     ///< horizontal [m/sqrt(s)], >= 0
-  double height_sigma = 0.02;  ///< of the path [m], > 0
-  double heading_sigma = 0.02; ///< of the path [rad], > 0
-  double memory_s = 60;        ///< of the path compared [s], > 0
-
-  /// Throws vpException: "path_scale.name = value, must be ...".
-  void validate() const;
-};
-
 class PathScale
 {
 public:
   using Path = std::function<Pose(std::size_t)>; ///< wMb by the number of the frame
 
-  explicit PathScale(const PathScaleOptions &options = {}, const GyroOptions &gyro = {});
+  explicit PathScale(const GyroOptions &gyro = {}) : m_gyro(gyro) {}
 
   /// Takes in the next frame, the frames being counted from 0. One without samples of the accelerometer begins anew.
   void add(const Frame &frame);
@@ -82,7 +63,6 @@ private:
   Step stepTo(const Frame &frame);
   std::optional<double> logLikelihood(const std::vector<Pose> &path, double log_scale) const;
 
-  PathScaleOptions m_options;
   GyroOptions m_gyro;
   std::deque<Step> m_steps;
   std::optional<GyroSample> m_last; ///< sample

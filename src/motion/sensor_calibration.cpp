@@ -2,7 +2,8 @@
 #include "motion/sensor_calibration.h"
 
 #include "geometry/constants.h"
-#include "geometry/median.h"
+#include "motion/calibration_fit.h"
+#include "motion/camera_gyro.h"
 #include "motion/inertial_scale.h"
 #include "motion/sensor_monitor.h"
 
@@ -25,162 +26,15 @@ namespace
 constexpr double kLooksThrough_s = 10;
 constexpr double kBaseline_s = 0.25; ///< least time between the two frames of a motion
 
-constexpr double kMostLate_s = 0.15, kLateStep_s = 0.01;
-constexpr int kLateSteps = 15;
 constexpr double kLeastLate_s = 0.01; ///< less turns a body by less than what the points are worth [s]
 constexpr double kMostScale = 0.5;    ///< of the log of the odometry's scale that is looked for
-constexpr double kWideBias = 0.1;     ///< of the wide part of the prior [rad/s]
-constexpr double kMount = 0.017;      ///< of the narrow part of the prior on the odometry's attitude [rad]
-constexpr double kWideMount = 0.17;   ///< of the wide one
+constexpr double kWideMount = 0.17;   ///< of the wide part of the prior on the odometry's attitude [rad]
 constexpr double kScale = 0.03;       ///< of the narrow part of the prior on the log of the scale
 constexpr double kWideScale = 0.25;   ///< of the wide one
 constexpr double kWidePart = 0.1;     ///< of the odometries: those that are not as stated
-constexpr double kBetter = 16;        ///< by which twice the log of the likelihood must grow: four standard deviations
-constexpr double kSoft = 9;           ///< squared error over its variance from which a measurement loses its say
-constexpr double kFails = 30;         ///< ... at which it contradicts what was fitted
-constexpr double kMostFailing = 0.15; ///< of the measurements: more, and the constants do not explain the sensor
 constexpr double kPointsSigma = 7e-4; ///< of a rotation by points beside their own covariance [rad]
 constexpr double kTurnSigma = 0.007;  ///< of the odometry's rotation between two poses [rad]
 constexpr std::size_t kLeastMotions = 15;
-
-std::int64_t nsOf(double s) { return static_cast<std::int64_t>(std::llround(s * 1e9)); }
-double secondsOf(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
-
-double soft(double squares) { return kSoft * std::log1p(squares / kSoft); }
-double weightFor(double squares) { return 1 / (1 + squares / kSoft); }
-
-/// The gyro integrated once: its rotation between any two times costs two lookups.
-class GyroPath
-{
-public:
-  GyroPath(const std::vector<GyroSample> &samples, const Vector3d &bias) : m_samples(samples), m_bias(bias)
-  {
-    Matrix3d R = Matrix3d::Identity();
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      if (i > 0)
-        R = R * turn(i - 1, samples[i].stamp_ns - samples[i - 1].stamp_ns);
-      m_turned.push_back(R);
-    }
-  }
-
-  /// Nothing outside of the samples and where some are missing.
-  std::optional<Matrix3d> between(std::int64_t a_ns, std::int64_t b_ns) const
-  {
-    const auto a = at(a_ns), b = at(b_ns);
-    if (!a || !b)
-      return std::nullopt;
-    for (std::size_t i = a->second; i < b->second; ++i)
-      if (secondsOf(m_samples[i + 1].stamp_ns - m_samples[i].stamp_ns) > kMostGap_s)
-        return std::nullopt;
-    return Matrix3d(a->first.transpose() * b->first);
-  }
-
-private:
-  /// From sample \p i on for \p ns, the rate linear between the samples.
-  Matrix3d turn(std::size_t i, std::int64_t ns) const
-  {
-    const GyroSample &from = m_samples[i], &to = m_samples[std::min(i + 1, m_samples.size() - 1)];
-    const double part = to.stamp_ns > from.stamp_ns ? double(ns) / double(to.stamp_ns - from.stamp_ns) : 0;
-    return expSo3((from.rate + 0.5 * part * (to.rate - from.rate) - m_bias) * secondsOf(ns));
-  }
-
-  std::optional<std::pair<Matrix3d, std::size_t>> at(std::int64_t stamp_ns) const
-  {
-    const auto after = std::upper_bound(m_samples.begin(), m_samples.end(), stamp_ns,
-                                        [](std::int64_t t, const GyroSample &sample) { return t < sample.stamp_ns; });
-    if (after == m_samples.begin() || secondsOf(stamp_ns - (after - 1)->stamp_ns) > kMostGap_s)
-      return std::nullopt;
-    const auto i = static_cast<std::size_t>(after - m_samples.begin()) - 1;
-    return std::make_pair(Matrix3d(m_turned[i] * turn(i, stamp_ns - m_samples[i].stamp_ns)), i);
-  }
-
-  std::vector<GyroSample> m_samples;
-  std::vector<Matrix3d> m_turned; ///< since the first sample, at each
-  Vector3d m_bias;
-};
-
-/// The rotation of the body over an interval, by points.
-struct Turn
-{
-  std::int64_t a_ns = 0, b_ns = 0;
-  Matrix3d aRb = Matrix3d::Identity();
-  Matrix3d information = Matrix3d::Zero(); ///< without that of the gyro's noise
-  double duration() const { return secondsOf(b_ns - a_ns); }
-};
-
-/// A least squares fit of P unknowns.
-template <int P> struct FittedOf
-{
-  double cost = 0; ///< robust, counting what overlaps once
-  Eigen::Matrix<double, P, 1> value = Eigen::Matrix<double, P, 1>::Zero();
-  Eigen::Matrix<double, P, P> covariance = Eigen::Matrix<double, P, P>::Zero();
-  double failing = 1; ///< share of the measurements that contradict it
-  double scatter = 1; ///< variance of what is left over what it should be
-};
-using Fitted = FittedOf<3>;
-
-/// Median of the squares of three normal errors each, over what it should be; at least 1.
-double scatterOf(const std::vector<double> &squares) { return std::max(1.0, medianOf(squares) / 2.37); }
-
-double failingOf(const std::vector<double> &squares)
-{
-  const auto failing = std::count_if(squares.begin(), squares.end(), [](double e2) { return e2 > kFails; });
-  return squares.empty() ? 1 : double(failing) / double(squares.size());
-}
-
-/// A linear measurement r + J x of P unknowns with its information W.
-template <int P> struct RowOf
-{
-  using Unknowns = Eigen::Matrix<double, P, 1>;
-  template <int N>
-  RowOf(const Eigen::Matrix<double, N, P> &J, const Eigen::Matrix<double, N, 1> &r,
-        const Eigen::Matrix<double, N, N> &W, double overlap_)
-      : JWJ(J.transpose() * W * J), JWr(J.transpose() * W * r), rWr(r.dot(W * r)), size(N), overlap(overlap_)
-  {
-  }
-  /// Of what is left of it at \p x, as of three numbers.
-  double squares(const Unknowns &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
-
-  Eigen::Matrix<double, P, P> JWJ;
-  Unknowns JWr;
-  double rWr = 0;
-  int size = 3;
-  double overlap = 1; ///< measurements that share what they measured
-};
-using Row = RowOf<3>;
-
-/// Robust solution; \p prior2: variance of each unknown.
-template <int P>
-FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter)
-{
-  FittedOf<P> fit;
-  constexpr int kIterations = 6;
-  std::vector<double> squares(rows.size());
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    Eigen::Matrix<double, P, P> H = prior2.cwiseInverse().asDiagonal();
-    typename RowOf<P>::Unknowns g = RowOf<P>::Unknowns::Zero();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const RowOf<P> &row = rows[i];
-      const double w = (iteration == 0 ? 1 : weightFor(squares[i])) / row.overlap;
-      H += w * row.JWJ;
-      g += w * row.JWr;
-    }
-    fit.covariance = H.inverse();
-    fit.value = -fit.covariance * g;
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      squares[i] = rows[i].squares(fit.value);
-  }
-  fit.failing = failingOf(squares);
-  fit.scatter = scatter > 0 ? scatter : scatterOf(squares);
-  fit.covariance *= fit.scatter;
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    fit.cost += soft(squares[i] / fit.scatter) / rows[i].overlap;
-  return fit;
-}
-Fitted solve(const std::vector<Row> &rows, double prior2, double scatter = 0)
-{
-  return solve<3>(rows, Vector3d::Constant(prior2), scatter);
-}
 
 /// The bias of a gyro that is \p late_s, by the rotations of the points.
 Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late_s, double overlap, double scatter)
@@ -193,76 +47,6 @@ Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late
                         logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
   }
   return solve(rows, kWideBias * kWideBias, scatter);
-}
-
-/// Errors in what relates camera and gyro, which turn the points' rotations against the gyro's by a share of the
-/// rotation itself: beside the bias the attitude of the camera on the body, its two focal lengths, and the scale of the
-/// gyro.
-constexpr int kShares = 9;
-constexpr double kFocal = 0.007;    ///< of the narrow part of the prior on the share of a focal length
-constexpr double kGyroScale = 0.01; ///< ... of the gyro's rates
-constexpr double kMostShare = 0.6;  ///< more is another fault
-constexpr double kWideShare = 0.5;  ///< of the wide ones, and of the attitude [rad]
-struct Relation
-{
-  int first, count; ///< of its unknowns
-  double narrow;
-};
-constexpr Relation kAttitude{3, 3, kMount}, kFocalLengths{6, 2, kFocal}, kRates{8, 1, kGyroScale};
-
-std::vector<RowOf<kShares>> rowsOfShares(const GyroPath &path, const std::vector<Turn> &turns, const Matrix3d &bRc,
-                                         double late_s, double overlap)
-{
-  std::vector<RowOf<kShares>> rows;
-  for (const Turn &turn : turns) {
-    const auto turned = path.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
-    if (!turned)
-      continue;
-    const Vector3d angle = logSo3(*turned), seen = bRc.transpose() * angle;
-    Eigen::Matrix<double, 3, kShares> J;
-    J << turn.duration() * Matrix3d::Identity(), -skew(angle), bRc.col(1) * seen.y(), bRc.col(0) * seen.x(), angle;
-    rows.emplace_back(J, Vector3d(logSo3(orthonormalized(turned->transpose() * turn.aRb))), turn.information, overlap);
-  }
-  return rows;
-}
-
-/// A minimum over offsets of a clock, refined by a parabola.
-struct Minimum
-{
-  double late_s = 0, sigma_s = 0, gain = 0; ///< gain: of the cost against no offset
-  bool is_inside = false;
-};
-
-template <typename Cost> Minimum minimiseLate(const Cost &cost)
-{
-  std::vector<double> costs;
-  for (int k = -kLateSteps; k <= kLateSteps; ++k)
-    costs.push_back(cost(kLateStep_s * k));
-  const auto best = std::min_element(costs.begin(), costs.end());
-  Minimum minimum;
-  minimum.is_inside = best != costs.begin() && best + 1 != costs.end();
-  if (!minimum.is_inside)
-    return minimum;
-  const double before = *(best - 1), after = *(best + 1), curvature = std::max(1e-9, before - 2 * *best + after);
-  const double vertex = std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5);
-  minimum.late_s = kLateStep_s * (double(best - costs.begin()) - kLateSteps + vertex);
-  minimum.sigma_s = kLateStep_s * std::sqrt(2 / curvature);
-  minimum.gain = costs[kLateSteps] - (*best - 0.5 * curvature * vertex * vertex);
-  return minimum;
-}
-
-/// The bias and what \p open holds, the others as they are stated; the cost counts what each is off that.
-FittedOf<kShares> fitShares(const std::vector<RowOf<kShares>> &rows, const std::vector<Relation> &open, double scatter)
-{
-  Eigen::Matrix<double, kShares, 1> prior;
-  prior.head<3>().setConstant(kWideBias);
-  for (const Relation &relation : {kAttitude, kFocalLengths, kRates})
-    prior.segment(relation.first, relation.count).setConstant(relation.narrow);
-  for (const Relation &relation : open)
-    prior.segment(relation.first, relation.count).setConstant(kWideShare);
-  FittedOf<kShares> fit = solve<kShares>(rows, prior.cwiseAbs2(), scatter);
-  fit.cost += fit.value.cwiseQuotient(prior).squaredNorm();
-  return fit;
 }
 
 /// What is left of the frames once the constants are taken out.
@@ -340,7 +124,6 @@ public:
 
 private:
   void calibrateGyro();
-  void judgeCamera(const GyroPath &path, const std::vector<Turn> &turns);
   void calibrateRotation();
   void calibrateOdometryClock();
   void calibrateScale();
@@ -395,7 +178,9 @@ void Estimation::calibrateGyro()
     fit = fitBias(path, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
     bias += fit.value;
   }
-  judgeCamera(GyroPath(m_samples, bias), turns);
+  m_result.verdicts = judgeCamera(GyroPath(m_samples, bias), turns, m_bMc.R, m_overlap);
+  for (SensorVerdict &verdict : m_result.verdicts)
+    verdict.since_s = secondsOf(m_frames.front().stamp_ns);
   m_is_gyro_explained = fit.failing < kMostFailing;
   if (!m_is_gyro_explained)
     return;
@@ -413,60 +198,6 @@ void Estimation::calibrateGyro()
        fmt::format("gyro: bias {:.3f} +- {:.3f} rad/s", bias.norm(), sigma));
   if (is_biased)
     m_result.gyro_bias = bias;
-}
-
-/// What \p relation was found to be, with its sigma, for the user.
-SensorVerdict verdictOf(const Relation &relation, const Eigen::VectorXd &x, double sigma)
-{
-  if (relation.first == kFocalLengths.first) {
-    const Eigen::Array2d percent = 100 * (1 / (1 - x.array()) - 1);
-    return {
-        "images", "focal", 0,
-        fmt::format("images: focal lengths of the camera file off by {:+.1f} % (fx) and {:+.1f} % (fy), +- {:.1f} %, "
-                    "by the gyro",
-                    percent[0], percent[1], 100 * sigma)};
-  }
-  if (relation.first == kAttitude.first)
-    return {"images", "mount", 0,
-            fmt::format("images: the camera stands {:.1f} +- {:.1f} degrees otherwise to the gyro than T_BS says (roll "
-                        "{:.1f}, pitch {:.1f}, yaw {:.1f})",
-                        x.norm() / kDegree, sigma / kDegree, x[0] / kDegree, x[1] / kDegree, x[2] / kDegree)};
-  return {"gyro", "scale", 0,
-          fmt::format("gyro: its rates are off by {:+.1f} +- {:.1f} %", 100 * x[0] / (1 - x[0]), 100 * sigma)};
-}
-
-/// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of what was looked
-/// through. The user's numbers are not changed.
-void Estimation::judgeCamera(const GyroPath &path, const std::vector<Turn> &turns)
-{
-  constexpr double kAsGood = 9;   // the data do not tell one from the other: three standard deviations
-  constexpr double kInHalves = 6; // two and a half: what begins later is no constant
-  const std::vector<Relation> all = {kAttitude, kFocalLengths, kRates};
-  const auto rowsAt = [&](double late_s) { return rowsOfShares(path, turns, m_bMc.R, late_s, m_overlap); };
-  const Minimum late = minimiseLate([&](double late_s) { return fitShares(rowsAt(late_s), all, 1).cost; });
-  if (!late.is_inside)
-    return;
-  const std::vector<RowOf<kShares>> rows = rowsAt(late.late_s);
-  const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
-  const double scatter = fitShares(rows, all, 0).scatter;
-  const auto gainOf = [&](const std::vector<RowOf<kShares>> &some, const Relation &relation) {
-    return fitShares(some, {}, scatter).cost - fitShares(some, {relation}, scatter).cost;
-  };
-  double best = 0;
-  for (const Relation &relation : all) {
-    const FittedOf<kShares> fit = fitShares(rows, {relation}, scatter);
-    const Eigen::VectorXd x = fit.value.segment(relation.first, relation.count);
-    const double variance = fit.covariance.diagonal().segment(relation.first, relation.count).mean();
-    const double gain = gainOf(rows, relation);
-    if (gain < std::max(kBetter, best - kAsGood) || fit.failing >= kMostFailing || x.maxCoeff() > kMostShare ||
-        gainOf({rows.begin(), middle}, relation) < kInHalves || gainOf({middle, rows.end()}, relation) < kInHalves)
-      continue;
-    if (gain > best + kAsGood)
-      m_result.verdicts.clear();
-    m_result.verdicts.push_back(verdictOf(relation, x, std::sqrt(variance)));
-    m_result.verdicts.back().since_s = secondsOf(m_frames.front().stamp_ns);
-    best = std::max(best, gain);
-  }
 }
 
 /// Direction of flight: bRo takes that of the odometry to that of the points.
@@ -497,7 +228,8 @@ void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row
 /// Gravity: over all frames the mean force, turned by the odometry, is up.
 void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Row> &rows) const
 {
-  constexpr double kSigma = 0.012; // of the tilt by the bias of an accelerometer, 0.1 m/s^2 [rad]
+  constexpr double kSigma = 0.012;                   // of the tilt by the bias of an accelerometer, 0.1 m/s^2 [rad]
+  constexpr std::int64_t kVelocity_ns = 290'000'000; // that a velocity is taken over: three frames at 10 Hz
   constexpr std::size_t kParts = 3;
   for (std::size_t part = 0; part < kParts; ++part) {
     const std::size_t first = part * (frames.size() - 1) / kParts, last = (part + 1) * (frames.size() - 1) / kParts;
@@ -506,7 +238,10 @@ void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Row> &
     int count = 0;
     bool varies = false;
     std::optional<Vector3d> before;
-    if (last < first + 8)
+    std::size_t steps = 1; // that a velocity is taken over
+    while (first + steps < last && frames[first + steps].stamp_ns - frames[first].stamp_ns < kVelocity_ns)
+      ++steps;
+    if (last < first + 2 * steps + 2)
       return;
     for (std::size_t i = first + 1; i <= last; ++i) {
       if (!frames[i].wMb_odometry)
@@ -523,13 +258,13 @@ void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Row> &
     }
     if (count < 40 || !varies || !frames[first].wMb_odometry)
       return;
-    const auto velocity = [&](std::size_t i) { // over three steps
-      return Vector3d((frames[i + 3].wMb_odometry->t - frames[i].wMb_odometry->t) /
-                      secondsOf(frames[i + 3].stamp_ns - frames[i].stamp_ns));
+    const auto velocity = [&](std::size_t i) {
+      return Vector3d((frames[i + steps].wMb_odometry->t - frames[i].wMb_odometry->t) /
+                      secondsOf(frames[i + steps].stamp_ns - frames[i].stamp_ns));
     };
     const double dt = secondsOf(frames[last].stamp_ns - frames[first].stamp_ns);
-    const double lag = secondsOf(frames[first + 3].stamp_ns - frames[first].stamp_ns);
-    const Vector3d acceleration = (velocity(last - 3) - velocity(first)) / std::max(0.1, dt - lag);
+    const double lag = secondsOf(frames[first + steps].stamp_ns - frames[first].stamp_ns);
+    const Vector3d acceleration = (velocity(last - steps) - velocity(first)) / std::max(0.1, dt - lag);
     const Vector3d up = sum / count - acceleration;
     const double sigma = std::hypot(kSigma, 0.1 / (kGravity * dt)); // 0.1 m/s: of a velocity
     rows.emplace_back(Matrix23d(by_rotation.topRows<2>() / count / kGravity), Eigen::Vector2d(up.head<2>() / kGravity),
@@ -674,9 +409,7 @@ void Estimation::judge()
 
 void Estimation::calibrateScale()
 {
-  InertialScaleOptions options;
-  options.start_sigma = kMostScale;
-  InertialScale inertial(m_bMc, options, m_gyro);
+  InertialScale inertial(m_bMc, m_gyro, kMostScale);
   replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) { inertial.process(frame, seen); });
   const std::optional<LogScale> measured = inertial.scale(kMostScale);
   if (!measured || std::abs(measured->mean) > kMostScale)

@@ -512,8 +512,9 @@ void SensorMonitor::checkDirection()
 /// Gravity of the odometry's roll and pitch against the accelerometer's, accelerations by the odometry's own velocity.
 void SensorMonitor::checkTilt(const Frame &frame)
 {
-  constexpr std::size_t kLeast = 20; // steps
-  if (m_steps.size() < kLeast || !frame.wMb_odometry || m_samples.empty() ||
+  constexpr double kLeast_s = 1.8, kVelocity_s = 0.3; // of the memory, and that a velocity is taken over
+  if (m_steps.size() < 2 || inSeconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns) < kLeast_s ||
+      !frame.wMb_odometry || m_samples.empty() ||
       inSeconds(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
       inSeconds(m_samples.front().stamp_ns - m_steps[1].stamp_ns) > kMostGap_s ||
       std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.is_held; }))
@@ -542,11 +543,17 @@ void SensorMonitor::checkTilt(const Frame &frame)
   if (count < 40 || !varies)
     return;
   const double dt = inSeconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
-  const std::size_t n = m_steps.size();
-  const auto velocity = [&](std::size_t i) {
-    return Vector3d((m_steps[i].velocity + m_steps[i + 1].velocity + m_steps[i + 2].velocity) / 3);
+  const auto velocity = [this](std::int64_t around_ns) {
+    Vector3d total = Vector3d::Zero();
+    int steps = 0;
+    for (auto one = m_steps.begin() + 1; one != m_steps.end(); ++one)
+      if (std::abs(inSeconds(one->stamp_ns - around_ns)) < kVelocity_s - 0.01) {
+        total += one->velocity;
+        ++steps;
+      }
+    return Vector3d(total / steps);
   };
-  const Vector3d mean = sum / count - (velocity(n - 3) - velocity(1)) / dt;
+  const Vector3d mean = sum / count - (velocity(m_steps.back().stamp_ns) - velocity(m_steps[1].stamp_ns)) / dt;
   const double tilt = std::atan2(mean.head<2>().norm(), mean.z());
   constexpr double kLongest = 0.2; // beyond it the limit does not grow
   const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));

@@ -15,6 +15,7 @@ namespace bole::test
 {
 struct MadeFlight
 {
+  double frame_rate = 10;    ///< [Hz], 5 to 60
   double sway = 1.2;         ///< amplitude of the path from side to side [m]
   double factor = 1;         ///< of the odometry's horizontal lengths
   double odometry_noise = 0; ///< horizontal, a frame [m]
@@ -52,10 +53,11 @@ struct MadeFlight
     return {nanoseconds(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
   }
 
-  /// The frame at 0.1 s times \p index; to be asked for in the order of time.
+  /// To be asked for in the order of time.
   Frame frame(std::size_t index)
   {
-    const double t = 0.1 * static_cast<double>(index);
+    const double t = static_cast<double>(index) / frame_rate;
+    const int samples = static_cast<int>(std::lround(200 / frame_rate));
     Frame frame;
     frame.index = index;
     frame.stamp_ns = nanoseconds(t);
@@ -63,22 +65,23 @@ struct MadeFlight
     frame.wMb_odometry = truth(t);
     frame.wMb_odometry->t.head<2>() *= factor;
     frame.wMb_odometry->t += walked;
-    for (int k = 1; k <= 20 && index > 0; ++k)
-      frame.gyro.push_back(sample(t - 0.1 + 0.005 * k));
+    for (int k = 1; k <= samples && index > 0; ++k)
+      frame.gyro.push_back(sample(t - 0.005 * (samples - k)));
     return frame;
   }
 
-  /// What points say of the motion since three frames before.
+  /// What points say of the motion since 0.3 s before.
   std::vector<RelativeMotion> seen(std::size_t index)
   {
-    if (index < 3)
+    const auto back = static_cast<std::size_t>(std::lround(0.3 * frame_rate));
+    if (index < back)
       return {};
     const Pose bMc = forwardCamera();
-    const double to = 0.1 * static_cast<double>(index), from = to - 0.3;
+    const double to = static_cast<double>(index) / frame_rate, from = static_cast<double>(index - back) / frame_rate;
     const Pose aMb = (truth(from) * bMc).inverse() * (truth(to) * bMc);
     RelativeMotion motion;
-    motion.frames_back = 3;
-    motion.a_index = index - 3;
+    motion.frames_back = static_cast<int>(back);
+    motion.a_index = index - back;
     motion.b_index = index;
     motion.a_ns = nanoseconds(from);
     motion.b_ns = nanoseconds(to);

@@ -15,13 +15,14 @@ using test::MadeFlight;
 constexpr double kBegins_s = 5;
 
 /// Eight seconds; \p damage changes a frame before the monitor sees it.
-SensorMonitor fly(const std::function<void(Frame &)> &damage)
+SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10)
 {
   MadeFlight flight;
+  flight.frame_rate = rate;
   flight.odometry_noise = 0.012;
   flight.force_noise = 0.1;
   SensorMonitor monitor(forwardCamera());
-  for (std::size_t i = 0; i < 80; ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(8 * rate); ++i) {
     Frame frame = flight.frame(i);
     damage(frame);
     monitor.process(frame, flight.seen(i));
@@ -104,10 +105,12 @@ std::vector<Fault> faults()
 }
 } // namespace
 
-TEST(SensorMonitor, SensorsThatAgreeRaiseNothing)
+TEST(SensorMonitor, SensorsThatAgreeRaiseNothingAtAnyRate)
 {
-  const SensorMonitor monitor = fly([](Frame &) {});
-  EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
+  for (const double rate : {5, 10, 20, 30, 50}) {
+    const SensorMonitor monitor = fly([](Frame &) {}, rate);
+    EXPECT_TRUE(monitor.verdicts().empty()) << rate << " Hz: " << monitor.verdicts().front().text;
+  }
 }
 
 TEST(SensorMonitor, EachFaultIsNamedWithItsSensor)

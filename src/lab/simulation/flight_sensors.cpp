@@ -3,6 +3,9 @@
 
 #include "geometry/so3.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace bole
 {
 SimulatedImu::SimulatedImu(const SensorOptions &options)
@@ -27,10 +30,12 @@ PoseFilter::PoseFilter(const SensorOptions &options)
 {
 }
 
-Pose PoseFilter::report(const Pose &wMb)
+Pose PoseFilter::report(std::int64_t stamp_ns, const Pose &wMb)
 {
-  const Eigen::Vector3d step_noise = m_random.normal3(m_options.odometry_step_noise);
-  const double walk = m_options.yaw_walk * m_random.normal();
+  constexpr double kUnit_ns = 1e8; // of the walks
+  const double longer = std::sqrt(std::max(0.0, static_cast<double>(stamp_ns - m_last_ns) / kUnit_ns));
+  const Eigen::Vector3d step_noise = longer * m_random.normal3(m_options.odometry_step_noise);
+  const double walk = longer * m_options.yaw_walk * m_random.normal();
   const double height_noise = m_options.height_noise * m_random.normal();
   const Eigen::Vector3d attitude_noise = m_random.normal3(m_options.attitude_noise);
   if (!m_started) {
@@ -43,6 +48,7 @@ Pose PoseFilter::report(const Pose &wMb)
   }
   m_position.z() = wMb.t.z() + (m_started ? height_noise : 0);
   m_last_truth = wMb.t;
+  m_last_ns = stamp_ns;
   m_started = true;
   return {expSo3({0, 0, m_yaw_error}) * wMb.R * expSo3(attitude_noise), m_position};
 }

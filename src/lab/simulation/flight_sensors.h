@@ -16,11 +16,12 @@ struct SensorOptions
   double gyro_bias = 0.006;           ///< standard deviation of the constant bias an axis [rad/s], 0 to 1
   double accelerometer_noise = 0.1;   ///< standard deviation a sample [m/s^2], 0 to 10
   double accelerometer_bias = 0.05;   ///< standard deviation of the constant bias an axis [m/s^2], 0 to 10
-  double odometry_step_noise = 0.012; ///< of a frame's horizontal step, an axis [m], 0 to 1
+  double odometry_step_noise = 0.012; ///< of the horizontal way in 0.1 s, an axis [m], 0 to 1; it walks: as the root
+                                      ///< of the time
   double odometry_scale = 0.02;       ///< standard deviation of the scale error, 0 to 0.5
   double height_noise = 0.019;        ///< of the height in one frame [m], 0 to 1
   double attitude_noise = 0.004;      ///< of roll, pitch and yaw in one frame [rad], 0 to 0.5
-  double yaw_walk = 0.003;            ///< of the heading's drift in one frame [rad], 0 to 0.5
+  double yaw_walk = 0.003;            ///< of the heading's drift in 0.1 s [rad], 0 to 0.5; it walks
 };
 
 class SimulatedImu
@@ -44,7 +45,7 @@ class PoseFilter
 public:
   explicit PoseFilter(const SensorOptions &options);
   /// Pose that the filter reports for the next frame; the first report is at the true position.
-  Pose report(const Pose &wMb);
+  Pose report(std::int64_t stamp_ns, const Pose &wMb);
 
 private:
   SensorOptions m_options;
@@ -52,6 +53,7 @@ private:
   double m_scale;
   double m_yaw_error = 0;
   bool m_started = false;
+  std::int64_t m_last_ns = 0;
   Eigen::Vector3d m_last_truth = Eigen::Vector3d::Zero(), m_position = Eigen::Vector3d::Zero();
 };
 } // namespace bole

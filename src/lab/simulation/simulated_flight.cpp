@@ -60,7 +60,7 @@ void SceneFrames::next(Frame &frame, RenderedFrame &rendered, bool truth_images)
     m_link->pass(rendered.image);
   frame.image = rendered.image;
   frame.wMb_truth = m_path.bodyPose(t);
-  frame.wMb_odometry = m_filter.report(*frame.wMb_truth);
+  frame.wMb_odometry = m_filter.report(frame.stamp_ns, *frame.wMb_truth);
   for (; m_imu_stamp_ns <= frame.stamp_ns; m_imu_stamp_ns += kImuPeriodNs) {
     const double s = 1e-9 * static_cast<double>(m_imu_stamp_ns);
     frame.gyro.push_back(

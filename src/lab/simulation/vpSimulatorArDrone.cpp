@@ -277,7 +277,7 @@ bool vpSimulatorArDrone::next(bole::Frame &frame)
   frame.status = bole::FrameStatus::ok;
   frame.message.clear();
   frame.image = rendered.image;
-  state.reported = state.filter.report(middle);
+  state.reported = state.filter.report(frame.stamp_ns, middle);
   frame.wMb_odometry = state.reported;
   frame.wMb_truth = middle;
   const auto later = std::find_if(state.gyro.begin(), state.gyro.end(),

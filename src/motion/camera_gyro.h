@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// \file
+/// Whether what is stated of camera and gyro can be true: focal lengths, attitude of the camera on the body, scale of
+/// the rates.
+
+#include "input/frame_builder.h"
+#include "motion/gyro_path.h"
+
+namespace bole::calibration
+{
+/// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of \p turns; empty
+/// where they do as it is. Nothing is corrected: the numbers are the user's. SensorVerdict::since_s is left at 0.
+/// \param path the gyro less its bias
+/// \param bRc attitude of the camera on the body, as stated
+/// \param overlap turns that share an interval of time
+std::vector<SensorVerdict> judgeCamera(const GyroPath &path, const std::vector<Turn> &turns, const Eigen::Matrix3d &bRc,
+                                       double overlap);
+} // namespace bole::calibration
