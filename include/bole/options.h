@@ -19,12 +19,14 @@ enum class MapPolicy
 /// All options of the pipeline; `bole options` prints them with unit, range and default.
 struct Options
 {
+  static constexpr double kUsualRate_hz = 10; ///< at which times that are counted in frames are stated
+
   /// What the camera does to the picture.
   struct Camera
   {
     double height = 0;       ///< over the ground [m]; 0: not known. Gives a video without odometry its scale
     bool focal_known = true; ///< false: the focal length is a guess
-    double rate = 10;        ///< frames a second
+    double rate = 0;         ///< frames a second; 0: that of the first frames
     bool compressed = false; ///< the pictures went through a lossy codec
   } camera;                  ///< what the camera does to the picture
 

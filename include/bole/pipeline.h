@@ -67,6 +67,8 @@ public:
   Graph graph() const;                   ///< of the smoother
 
 private:
+  class Rate;
   std::unique_ptr<class Engine> m_engine;
+  std::unique_ptr<Rate> m_rate; ///< until it is known
 };
 } // namespace bole

@@ -22,6 +22,7 @@ constexpr double kPathSigma = 0.008;  // horizontal [m]
 constexpr double kPathWalk = 0.02;    // horizontal [m/sqrt(s)]
 constexpr double kPathHeight = 0.02;  // of the path [m]
 constexpr double kPathHeading = 0.02; // of the path [rad]
+constexpr double kCompared_s = 0.09;  // errors of the path nearer in time than that are alike
 constexpr double kRemembered_s = 60;  // of the path compared
 } // namespace
 
@@ -213,10 +214,14 @@ std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, do
 {
   Filter filter(m_gyro, log_scale);
   bool is_started = false;
+  double since_s = 0; // it was compared
   for (std::size_t i = 1; i < m_steps.size(); ++i) {
     const Step &step = m_steps[i];
+    since_s += step.duration;
     if (is_started && step.is_known) {
       filter.predict(step);
+      if (since_s < kCompared_s)
+        continue;
       if (step.up)
         filter.compareTilt(*step.up);
       filter.comparePath(path[i]);
@@ -225,6 +230,7 @@ std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, do
       filter.start(path[i - 1], path[i], step);
       is_started = true;
     }
+    since_s = 0;
   }
   return filter.compared() > 0 ? std::optional<double>(filter.logLikelihood()) : std::nullopt;
 }

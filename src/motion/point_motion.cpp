@@ -44,12 +44,15 @@ std::vector<RelativeMotion> PointMotion::process(const Frame &frame)
   std::vector<RelativeMotion> motions;
   if (frame.status != FrameStatus::ok)
     return motions;
-  for (int back : m_options.frames_back)
-    if (static_cast<std::size_t>(back) < m_seen.size())
-      motions.push_back(relativeTo(back));
+  if (m_good_frames % m_options.every == 0)
+    for (int back : m_options.frames_back)
+      if (static_cast<std::size_t>(back) < m_seen.size())
+        motions.push_back(relativeTo(back));
   judgeShear(motions);
   if (!m_fault.empty())
     motions.clear();
+  else
+    ++m_good_frames;
   return motions;
 }
 

@@ -37,6 +37,8 @@ struct PointMotionOptions
   bool use_gyro = true;
   bool use_odometry = true;
   std::vector<int> frames_back{1, 3}; ///< each 1 to PointTracker::kHistory - 1
+  int every = 1; ///< good frames from one whose motions are told to the next, 1 to 20: those of frames between are no
+                 ///< news, as the same errors of the same points are in them
   /// The pose filter's errors. Measured on the rendered flights (120 frames of 0.1 s, three seeds):
   /// in the horizontal plane they walk, 11 mm a frame; the height has white noise, 27 mm between
   /// any two frames; and the same holds of the attitude (roll, pitch 0.006 rad between any two
@@ -65,8 +67,8 @@ class PointMotion
 public:
   PointMotion(const PinholeCamera &camera, const Pose &bMc, const PointMotionOptions &options = {});
 
-  /// One RelativeMotion for each entry of frames_back that the video reaches. Frames that are not
-  /// ok, and those that fault() names, are passed over: the next one is tracked from the last good one.
+  /// One RelativeMotion for each entry of frames_back that the video reaches, in every so many frames. Frames that
+  /// are not ok, and those that fault() names, are passed over: the next one is tracked from the last good one.
   std::vector<RelativeMotion> process(const Frame &frame);
   /// Learns the bias of the gyro from the last result of process(), once nothing speaks against it.
   void learn(const std::vector<RelativeMotion> &motions);
@@ -103,6 +105,7 @@ private:
   std::deque<Seen> m_seen;                ///< oldest first, the current frame last
   std::vector<GyroSample> m_gyro;         ///< since the oldest frame of m_seen
   std::optional<GyroRotation> m_turned;   ///< from the good frame before to the newest
+  int m_good_frames = 0;                  ///< that were processed
   std::size_t m_frames = 0;               ///< that came, good or not
   std::int64_t m_bias_until_ns = 0;       ///< end of the last interval that taught the bias
   std::string m_fault;                    ///< of the newest image

@@ -13,6 +13,8 @@ using Eigen::Vector3d;
 
 namespace
 {
+constexpr double kStep_s = 0.1; // of the walks that the options state
+
 /// Height, roll and pitch of \p wMb, with the yaw of \p wRb_yaw: x, y and yaw stay free.
 PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sigma, double tilt_sigma)
 {
@@ -53,6 +55,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
 {
   MotionStep step;
   const double dt = 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns);
+  const double longer = dt / kStep_s, walked = std::sqrt(longer); // than what the options are stated for
   const GyroRotation gyro = integrateGyro(frame.gyro, m_stamp_ns, frame.stamp_ns, bias, m_gyro);
   const bool odometry = m_odometry && frame.wMb_odometry;
   const Pose filter = odometry ? m_odometry->inverse() * *frame.wMb_odometry : Pose();
@@ -61,7 +64,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
   if (gyro.complete && !frame.gyro.empty() && !(odometry && m_options.relative_alone)) {
     step.turn_from_gyro = true;
     step.aMb.R = gyro.R;
-    turn_covariance = gyro.covariance() + std::pow(m_options.gyro_turn_sigma, 2) * Matrix3d::Identity();
+    turn_covariance = gyro.covariance() + std::pow(walked * m_options.gyro_turn_sigma, 2) * Matrix3d::Identity();
   }
   else if (odometry) {
     step.aMb.R = filter.R;
@@ -69,27 +72,27 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
   }
   else {
     step.aMb.R = expSo3(velocity.tail<3>() * dt);
-    turn_covariance = std::pow(m_options.free_turn_sigma, 2) * Matrix3d::Identity();
+    turn_covariance = std::pow(longer * m_options.free_turn_sigma, 2) * Matrix3d::Identity();
   }
 
   Vector3d sigma;
   if (odometry) {
     step.is_step_measured = true;
     step.aMb.t = filter.t;
-    const double along = m_options.step_scale_sigma * filter.t.norm();
-    sigma << std::hypot(m_options.step_sigma, along), std::hypot(m_options.step_sigma, along),
-        std::hypot(m_options.step_sigma_vertical, along);
+    const double along = m_options.step_scale_sigma * filter.t.norm() / walked;
+    const double across = std::hypot(walked * m_options.step_sigma, along);
+    sigma << across, across, std::hypot(m_options.step_sigma_vertical, along);
     if (!m_options.relative_alone)
       step.absolute = levelPrior(*frame.wMb_odometry, wMa.R * step.aMb.R, m_options.height_sigma, m_options.tilt_sigma);
   }
-  else if (inertial && inertial->sigma < m_options.free_step_sigma) {
+  else if (inertial && inertial->sigma < longer * m_options.free_step_sigma) {
     step.is_step_measured = true;
     step.aMb.t = inertial->moved;
     sigma.setConstant(inertial->sigma);
   }
   else {
     step.aMb.t = velocity.head<3>() * dt;
-    sigma.setConstant(m_options.free_step_sigma);
+    sigma.setConstant(longer * m_options.free_step_sigma);
   }
   step.covariance.setZero();
   // the tangent rho stands in b: turned by aRb from the steps measured in a, equal to first order for small turns

@@ -95,7 +95,8 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"camera.height", &o.camera.height, 0, 100, "m",
        "camera over the ground, 0 unknown: the scale of a video without odometry"},
       {"camera.focal_known", &o.camera.focal_known, 0, 1, "", "false: the focal length is a guess"},
-      {"camera.rate", &o.camera.rate, 1, 100, "1/s", "frames a second: pairs of frames are as far apart in time"},
+      {"camera.rate", &o.camera.rate, 0, 100, "1/s",
+       "frames a second, by which pairs of frames are chosen; 0: measured"},
       {"camera.compressed", &o.camera.compressed, 0, 1, "",
        "the pictures went through a lossy codec: points are believed less"},
 
@@ -150,9 +151,10 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"map.lag", &o.map.lag, 0, 1e5, "s",
        "older poses are fixed, which bounds time and memory of a long flight; 0: never"},
 
-      {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal noise of the pose filter between two frames"},
-      {"odometry.step_vertical", &o.odometry.step_vertical, 1e-4, 1, "m", "vertical noise between two frames"},
-      {"odometry.scale", &o.odometry.scale, 0, 1, "", "its error in proportion to the path"},
+      {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal walk of the pose filter in 0.1 s"},
+      {"odometry.step_vertical", &o.odometry.step_vertical, 1e-4, 1, "m",
+       "noise of the difference of two of its heights"},
+      {"odometry.scale", &o.odometry.scale, 0, 1, "", "its error in proportion to the way"},
       {"odometry.height", &o.odometry.height, 1e-3, 10, "m", "noise of its height about the truth"},
       {"odometry.tilt", &o.odometry.tilt, 1e-4, 1, "rad", "noise of its roll and pitch about the truth"},
       {"odometry.turn", &o.odometry.turn, 1e-5, 1, "rad",

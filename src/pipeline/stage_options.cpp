@@ -13,7 +13,7 @@ namespace
 constexpr double kCompressedSigma_px = 0.2;
 
 /// What the thresholds on the picture are held for.
-constexpr double kFocal_px = 200, kRate_hz = 10;
+constexpr double kFocal_px = 200;
 
 constexpr double kUpright = 1e-4; ///< standard deviation of the lean of what does not lean [tan]
 
@@ -51,11 +51,14 @@ void scaleToCamera(StageOptions &o, double s)
   o.saliency.window_height_px = oddNear(std::ldexp(o.saliency.window_height_px * s, -halved), 31);
 }
 
+double rateOf(const Options &options) { return options.camera.rate > 0 ? options.camera.rate : Options::kUsualRate_hz; }
+
 /// What is counted in frames, for \p k times 10 frames a second.
 void scaleToRate(StageOptions &o, double k)
 {
-  const int shorter = std::max(1, static_cast<int>(1 * k));
-  o.points.frames_back = {shorter, std::max(shorter + 1, static_cast<int>(3 * k))};
+  o.points.every = std::max(1, static_cast<int>(std::ceil(k - 0.5)));
+  const int times = static_cast<int>(3 * k / o.points.every + 0.01);
+  o.points.frames_back = {o.points.every, std::max(2, times) * o.points.every};
   o.saliency.max_frames_apart = std::clamp(static_cast<int>(std::lround(o.saliency.max_frames_apart * k)), 1, 20);
 }
 
@@ -99,7 +102,7 @@ void setMap(StageOptions &o, const Options &options)
   o.map.confirm_position_sigma = map.confirm_sigma;
   o.map.merge_distance = map.merge_distance;
   o.map.candidate_memory_s = map.candidate_memory;
-  const auto poses = static_cast<int>(std::lround(map.lag * options.camera.rate));
+  const auto poses = static_cast<int>(std::lround(map.lag * rateOf(options)));
   o.smoothing.fixed_lag = map.lag > 0 ? std::max(2, poses) : 0;
 }
 
@@ -169,7 +172,7 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   o.focal_known = options.camera.focal_known;
   if (options.camera.compressed)
     o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
-  scaleToRate(o, options.camera.rate / kRate_hz);
+  scaleToRate(o, rateOf(options) / Options::kUsualRate_hz);
   setTrunks(o, options.trunks);
   setRange(o, options.range);
   o.detection.window = options.detection.window;

@@ -44,6 +44,23 @@ TEST(Pipeline, MapsFromFramesFilledByHandWithImageStampAndOdometry)
   EXPECT_FALSE(report.map.empty());
 }
 
+TEST(Pipeline, MeasuresTheRateOfItsFrames)
+{
+  Options told;
+  told.camera.rate = 30;
+  Pipeline measures(kCamera, kMount), knows(kCamera, kMount, told);
+  for (int k = 0; k < 20; ++k) {
+    Frame frame = byHand(k);
+    frame.stamp_ns = k * 33'333'333LL;
+    const FrameReport by_measure = measures.process(frame), by_option = knows.process(frame);
+    EXPECT_EQ(by_measure.index, static_cast<std::size_t>(k));
+    if (k >= 4) { // intervals have been seen
+      EXPECT_LT((by_measure.wMb.t - by_option.wMb.t).norm(), 1e-12) << k;
+    }
+  }
+  EXPECT_EQ(measures.smoothedTrajectory().size(), 20U);
+}
+
 /// In flight its borders are smeared over the upright lines of the detector, and nothing that stands there is
 /// confirmed.
 TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown)

@@ -106,6 +106,7 @@ TEST(StageOptions, WhatIsCountedInFramesFollowsTheRate)
   options.map.lag = 30;
   const StageOptions fast = stageOptions(options, cameraWith(200));
   EXPECT_THAT(fast.points.frames_back, testing::ElementsAre(3, 9));
+  EXPECT_EQ(fast.points.every, 3);
   EXPECT_EQ(fast.smoothing.fixed_lag, 900);
   EXPECT_EQ(fast.saliency.max_frames_apart, 15);
   options.camera.rate = 15;
