@@ -98,6 +98,8 @@ class Campaign:
     def simulate_command(self, flight):
         words = [os.path.abspath(self.bole_path), "simulate"]
         for key, value in self.flights[flight].items():
+            if key == "scene":
+                value = os.path.join(ROOT, os.path.expanduser(value))
             if value is True:
                 words.append("--" + key)
             elif value not in (None, False):

@@ -53,6 +53,14 @@ void everyStamp(Table &table, const std::function<std::string(std::int64_t)> &wr
     row[0] = write(std::stoll(row[0]));
 }
 
+/// In every row.
+void multiply(Table &table, std::initializer_list<std::size_t> columns, double factor)
+{
+  for (std::size_t i = 0; i < table.rows.size(); ++i)
+    for (const std::size_t column : columns)
+      table.set(i, column, factor * table.number(i, column));
+}
+
 std::string replaced(std::string text, char from, const std::string &to)
 {
   std::string out;
@@ -241,9 +249,7 @@ std::vector<Fault> units()
               [](SpoiltFlight &flight) { flight.odometry.rows[kAt][1] = "nan"; }),
       refused("odometry_mm", "poses in millimetres", "must be at most 300 m/s",
               [](SpoiltFlight &flight) {
-                for (std::size_t i = 0; i < flight.odometry.rows.size(); ++i)
-                  for (const std::size_t axis : {1, 2, 3})
-                    flight.odometry.set(i, axis, 1000 * flight.odometry.number(i, axis));
+                multiply(flight.odometry, {1, 2, 3}, 1000);
               }),
       refused("odometry_ms", "its stamps in milliseconds", "data.csv",
               [](SpoiltFlight &flight) {
@@ -253,15 +259,11 @@ std::vector<Fault> units()
               [](SpoiltFlight &flight) { flight.replace(kOdometry, replaced(flight.text(kOdometry), ',', ";")); }),
       refused("gyro_degrees", "a gyro in degrees a second", "looks like degrees per second",
               [](SpoiltFlight &flight) {
-                for (std::size_t i = 0; i < flight.imu.rows.size(); ++i)
-                  for (const std::size_t axis : {1, 2, 3})
-                    flight.imu.set(i, axis, 180 / M_PI * flight.imu.number(i, axis));
+                multiply(flight.imu, {1, 2, 3}, 180 / M_PI);
               }),
       refused("force_in_g", "an accelerometer in g", "looks like g",
               [](SpoiltFlight &flight) {
-                for (std::size_t i = 0; i < flight.imu.rows.size(); ++i)
-                  for (const std::size_t axis : {4, 5, 6})
-                    flight.imu.set(i, axis, flight.imu.number(i, axis) / 9.80665);
+                multiply(flight.imu, {4, 5, 6}, 1 / 9.80665);
               }),
       refused("imu_ms", "stamps of the gyro in milliseconds", "imu0/data.csv",
               [](SpoiltFlight &flight) {
