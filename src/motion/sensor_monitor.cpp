@@ -322,14 +322,17 @@ void SensorMonitor::checkStandingStill(double time_s)
 /// White noise on the positions, by the change from step to step.
 void SensorMonitor::checkScatter()
 {
-  constexpr std::size_t kSteps = 12;
-  if (m_steps.size() < kSteps)
-    return;
+  constexpr std::size_t kLeast = 12; // steps
+  constexpr double kLeast_s = 1.05;
   std::vector<double> scatters;
-  for (auto step = m_steps.end() - kSteps; step != m_steps.end(); ++step)
+  auto step = m_steps.rbegin();
+  for (; step != m_steps.rend(); ++step) {
+    if (scatters.size() >= kLeast && inSeconds(m_steps.back().stamp_ns - step->stamp_ns) > kLeast_s)
+      break;
     scatters.push_back(step->scatter);
-  if (medianOf(scatters) > std::pow(m_options.noise_factor, 2))
-    raise(Sensor::odometry, "noise", inSeconds(m_steps[m_steps.size() - kSteps].stamp_ns),
+  }
+  if (scatters.size() >= kLeast && medianOf(scatters) > std::pow(m_options.noise_factor, 2))
+    raise(Sensor::odometry, "noise", inSeconds((step - 1)->stamp_ns),
           "odometry: its positions scatter from frame to frame");
 }
 

@@ -55,7 +55,7 @@ struct SensorMonitorOptions
   double odometry_height_sigma = 0.03; ///< of the difference of two heights [m]
   double odometry_relative = 0.03;     ///< of its translation, in proportion
   double jump = 0.3;                   ///< of the odometry between two frames beyond what its velocity explains [m]
-  double noise_factor = 4;             ///< scatter of the odometry over what odometry_walk says
+  double noise_factor = 2.5;           ///< scatter of the odometry over what odometry_walk says
   double height_low = -2, height_high = 10; ///< of the odometry over the ground where it begins [m]: it may count from
                                             ///< the body at take-off, and above the crowns no trunk is seen
   double tilt_limit = 0.06;                 ///< of the odometry's gravity against the accelerometer's, over 3 s [rad]
