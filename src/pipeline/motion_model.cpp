@@ -4,6 +4,7 @@
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace bole
@@ -13,7 +14,8 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr double kStep_s = 0.1; // of the walks that the options state
+constexpr double kStep_s = 0.1;   // of the walks that the options state
+constexpr double kLeast_s = 1e-3; // between two frames; those of one stamp are no step without noise
 
 /// Height, roll and pitch of \p wMb, with the yaw of \p wRb_yaw: x, y and yaw stay free.
 PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sigma, double tilt_sigma)
@@ -55,7 +57,8 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
 {
   MotionStep step;
   const double dt = 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns);
-  const double longer = dt / kStep_s, walked = std::sqrt(longer); // than what the options are stated for
+  const double longer = std::max(dt, kLeast_s) / kStep_s,
+               walked = std::sqrt(longer); // than what the options are stated for
   const GyroRotation gyro = integrateGyro(frame.gyro, m_stamp_ns, frame.stamp_ns, bias, m_gyro);
   const bool odometry = m_odometry && frame.wMb_odometry;
   const Pose filter = odometry ? m_odometry->inverse() * *frame.wMb_odometry : Pose();
