@@ -3,10 +3,12 @@
 
 #include "geometry/median.h"
 #include "geometry/so3.h"
+#include "motion/sensor_monitor.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 
 namespace bole
 {
@@ -204,6 +206,15 @@ void MonocularMotion::addBacklog(Motion &motion) const
     add(last, newest);
 }
 
+/// An odometry that the first frame does not have.
+std::vector<SensorVerdict> MonocularMotion::verdicts() const
+{
+  if (!m_odometry_from_s)
+    return {};
+  return {{toString(Sensor::odometry), "time", *m_odometry_from_s,
+           fmt::format("odometry: begins at {:.1f} s, after the images, and is not used", *m_odometry_from_s)}};
+}
+
 MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
 {
   const MotionStep step = m_model.step(frame, wMa, m_points.gyroBias(), velocity);
@@ -215,6 +226,8 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
 {
   Motion motion;
   ++m_frame;
+  if (frame.wMb_odometry && !m_odometry_from_s)
+    m_odometry_from_s = 1e-9 * static_cast<double>(frame.stamp_ns);
   motion.is_rotation_seen = true;
   motion.step = expected(frame, wMa, velocity);
   motion.step.is_step_measured = false;

@@ -32,6 +32,7 @@ public:
   /// By the height over the ground: that of the options where it is known, else one that is usual.
   ScaleEstimate scale() const override;
   WorldReference reference() const override;
+  std::vector<SensorVerdict> verdicts() const override;
 
 private:
   MotionStep expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity);
@@ -61,6 +62,7 @@ private:
   std::optional<Eigen::Vector3d> m_first_up; ///< up in the last camera while m_vertical is not known
   std::optional<double> m_height_seen;       ///< of the camera over the ground in the last frame, where it was seen
   std::optional<double> m_ground_z;
+  std::optional<double> m_odometry_from_s; ///< first stamp of an odometry that began too late
   double m_unit = 1; ///< of this motion, for one of m_odometry
   int m_frames_with_up = 0;
   bool m_has_unit = false;

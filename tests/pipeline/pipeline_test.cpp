@@ -61,6 +61,21 @@ TEST(Pipeline, MeasuresTheRateOfItsFrames)
   EXPECT_EQ(measures.smoothedTrajectory().size(), 20U);
 }
 
+TEST(Pipeline, AnOdometryThatBeginsAfterTheImagesIsNamed)
+{
+  Pipeline pipeline(kCamera, kMount);
+  FrameReport report;
+  for (int k = 0; k < 8; ++k) {
+    Frame frame = byHand(k);
+    if (k < 5)
+      frame.wMb_odometry.reset();
+    report = pipeline.process(frame);
+    EXPECT_EQ(report.verdicts.size(), k < 5 ? 0U : 1U);
+  }
+  ASSERT_EQ(report.verdicts.size(), 1U);
+  EXPECT_EQ(report.verdicts[0].text, "odometry: begins at 0.5 s, after the images, and is not used");
+}
+
 /// In flight its borders are smeared over the upright lines of the detector, and nothing that stands there is
 /// confirmed.
 TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown)
