@@ -63,7 +63,7 @@ private:
   std::optional<double> m_height_seen;       ///< of the camera over the ground in the last frame, where it was seen
   std::optional<double> m_ground_z;
   std::optional<double> m_odometry_from_s; ///< first stamp of an odometry that began too late
-  double m_unit = 1; ///< of this motion, for one of m_odometry
+  double m_unit = 1;                       ///< of this motion, for one of m_odometry
   int m_frames_with_up = 0;
   bool m_has_unit = false;
 };
