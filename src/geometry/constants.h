@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Physical and mathematical constants that more than one stage needs.
+/// Constants and units that more than one stage needs.
+
+#include <cstdint>
 
 namespace bole
 {
 constexpr double kDegree = 3.14159265358979323846 / 180; ///< one degree [rad]
 constexpr double kGravity = 9.81;                        ///< of the Earth, to half a per cent everywhere [m/s^2]
+
+/// [s] of a time in [ns]
+inline double secondsOf(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 } // namespace bole

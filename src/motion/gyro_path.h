@@ -17,7 +17,6 @@
 namespace bole::calibration
 {
 inline std::int64_t nsOf(double s) { return static_cast<std::int64_t>(std::llround(s * 1e9)); }
-inline double secondsOf(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
 /// The gyro integrated once: its rotation between any two times costs two lookups.
 class GyroPath

@@ -23,8 +23,6 @@ constexpr double kOdometryWalk = 0.038;         // horizontal [m/sqrt(s)]
 constexpr double kHeightSigma = 0.03;           // of the difference of two heights by the odometry [m]
 constexpr double kGate = 30;                    // squared innovation over its variance: not of this model
 
-double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
-
 /// Two rows that span what is across \p unit.
 Eigen::Matrix<double, 2, 3> across(const Vector3d &unit)
 {
@@ -49,7 +47,7 @@ void InertialScale::process(const Frame &frame, const std::vector<RelativeMotion
     restart(frame);
     return;
   }
-  const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
+  const double duration = secondsOf(frame.stamp_ns - m_anchor->stamp_ns);
   const auto seen = std::find_if(motions.begin(), motions.end(), [this](const RelativeMotion &motion) {
     return motion.a_index == m_anchor->index && motion.points.hasRotation();
   });
@@ -113,7 +111,7 @@ void InertialScale::begin(const Frame &frame)
 /// Attitude and velocity at the anchor from the odometry: the velocity loosely, since its scale is what is asked for.
 void InertialScale::start(const Frame &frame)
 {
-  const double duration = seconds(frame.stamp_ns - m_anchor->stamp_ns);
+  const double duration = secondsOf(frame.stamp_ns - m_anchor->stamp_ns);
   m_wRb = m_anchor->wMb->R;
   m_velocity = (frame.wMb_odometry->t - m_anchor->wMb->t) / duration;
   const double tilt2 = std::pow(accelerometer::kTiltSigma, 2), velocity_sigma = 0.3 + 0.3 * m_velocity.norm();
@@ -130,18 +128,18 @@ bool InertialScale::predict(std::int64_t to_ns)
   for (const GyroSample &sample : m_samples) {
     const std::int64_t end_ns = std::min(sample.stamp_ns, to_ns);
     if (end_ns > at_ns) {
-      if (seconds(end_ns - at_ns) > kMostGap_s)
+      if (secondsOf(end_ns - at_ns) > kMostGap_s)
         return false;
       const GyroSample &first = before != nullptr ? *before : sample;
-      propagate(0.5 * (first.rate + sample.rate), 0.5 * (*first.force + *sample.force), seconds(end_ns - at_ns));
+      propagate(0.5 * (first.rate + sample.rate), 0.5 * (*first.force + *sample.force), secondsOf(end_ns - at_ns));
       at_ns = end_ns;
     }
     before = &sample;
   }
-  if (before == nullptr || seconds(to_ns - at_ns) > kMostGap_s)
+  if (before == nullptr || secondsOf(to_ns - at_ns) > kMostGap_s)
     return false;
   if (to_ns > at_ns)
-    propagate(before->rate, *before->force, seconds(to_ns - at_ns));
+    propagate(before->rate, *before->force, secondsOf(to_ns - at_ns));
   m_wRb = orthonormalized(m_wRb);
   return true;
 }
@@ -261,12 +259,12 @@ std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64
   Vector3d velocity = m_velocity, moved = Vector3d::Zero(), moved_from = Vector3d::Zero();
   std::int64_t at_ns = m_anchor->stamp_ns;
   for (const GyroSample &sample : samples) {
-    if (!sample.force || seconds(std::min(sample.stamp_ns, frame.stamp_ns) - at_ns) > kMostGap_s)
+    if (!sample.force || secondsOf(std::min(sample.stamp_ns, frame.stamp_ns) - at_ns) > kMostGap_s)
       return std::nullopt;
     for (const std::int64_t end_ns : {std::min(from_ns, sample.stamp_ns), std::min(frame.stamp_ns, sample.stamp_ns)}) {
       if (end_ns <= at_ns)
         continue;
-      const double dt = seconds(end_ns - at_ns);
+      const double dt = secondsOf(end_ns - at_ns);
       const Vector3d acceleration = R * (*sample.force - m_force_bias) + kGravityVector;
       moved += dt * velocity + 0.5 * dt * dt * acceleration;
       velocity += dt * acceleration;
@@ -278,9 +276,9 @@ std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64
       }
     }
   }
-  if (seconds(frame.stamp_ns - at_ns) > kMostGap_s)
+  if (secondsOf(frame.stamp_ns - at_ns) > kMostGap_s)
     return std::nullopt;
-  const double since = seconds(frame.stamp_ns - m_anchor->stamp_ns), dt = seconds(frame.stamp_ns - from_ns);
+  const double since = secondsOf(frame.stamp_ns - m_anchor->stamp_ns), dt = secondsOf(frame.stamp_ns - from_ns);
   const double tilt2 = m_covariance.diagonal().segment<2>(kAttitude).mean();
   const double speed2 =
       m_covariance.diagonal().segment<3>(kVelocity).mean() + kGravity * kGravity * tilt2 * since * since;

@@ -75,16 +75,22 @@ std::vector<Frame> corrected(const std::vector<Frame> &frames, const SensorCalib
   return result;
 }
 
+std::vector<GyroSample> samplesOf(const std::vector<Frame> &frames)
+{
+  std::vector<GyroSample> samples;
+  for (const Frame &frame : frames)
+    samples.insert(samples.end(), frame.gyro.begin(), frame.gyro.end());
+  return samples;
+}
+
 /// The estimation itself.
 class Estimation
 {
 public:
   Estimation(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions, const Pose &bMc,
              const GyroOptions &gyro)
-      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_gyro(gyro)
+      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_gyro(gyro), m_samples(samplesOf(frames))
   {
-    for (const Frame &frame : frames)
-      m_samples.insert(m_samples.end(), frame.gyro.begin(), frame.gyro.end());
     for (const RelativeMotion &motion : motions) {
       if (!motion.points.hasRotation())
         continue;
@@ -307,15 +313,12 @@ void Estimation::calibrateRotation()
     SensorCalibration tried = m_result;
     tried.bRo = bRo;
     const std::vector<Frame> frames = corrected(m_frames, tried);
-    std::vector<GyroSample> samples;
-    for (const Frame &frame : frames)
-      samples.insert(samples.end(), frame.gyro.begin(), frame.gyro.end());
     std::vector<Row> rows;
     addDirections(frames, rows);
     if (rows.size() < kLeastMotions) // the images must bear witness
       return;
     addGravity(frames, rows);
-    addTurns(frames, GyroPath(samples, Vector3d::Zero()), 0, rows);
+    addTurns(frames, GyroPath(samplesOf(frames), Vector3d::Zero()), 0, rows);
     fit = solve(rows, kWideMount * kWideMount);
     bRo = expSo3(fit.value) * bRo;
   }
@@ -340,10 +343,7 @@ void Estimation::calibrateOdometryClock()
   SensorCalibration tried = m_result;
   tried.odometry_late_s = 0;
   const std::vector<Frame> frames = corrected(m_frames, tried);
-  std::vector<GyroSample> samples;
-  for (const Frame &frame : frames)
-    samples.insert(samples.end(), frame.gyro.begin(), frame.gyro.end());
-  const GyroPath path(samples, Vector3d::Zero());
+  const GyroPath path(samplesOf(frames), Vector3d::Zero());
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)
     if (path.between(frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
@@ -445,7 +445,7 @@ void SensorCalibrator::add(const Frame &frame, const std::optional<RelativeMotio
 
 double SensorCalibrator::duration_s() const
 {
-  return m_frames.empty() ? 0 : calibration::secondsOf(m_frames.back().stamp_ns - m_frames.front().stamp_ns);
+  return m_frames.empty() ? 0 : secondsOf(m_frames.back().stamp_ns - m_frames.front().stamp_ns);
 }
 
 SensorCalibration SensorCalibrator::estimate() const
@@ -480,7 +480,7 @@ SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_
       tracked.push_back({frame.stamp_ns, index});
       int back = 1;
       while (back < std::min<int>(PointTracker::kHistory, static_cast<int>(tracked.size())) - 1 &&
-             calibration::secondsOf(frame.stamp_ns - (tracked.rbegin() + back)->stamp_ns) < calibration::kBaseline_s)
+             secondsOf(frame.stamp_ns - (tracked.rbegin() + back)->stamp_ns) < calibration::kBaseline_s)
         ++back;
       if (back < static_cast<int>(tracked.size())) {
         const Tracked &a = *(tracked.rbegin() + back);

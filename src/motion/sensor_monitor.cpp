@@ -19,7 +19,6 @@ namespace
 {
 constexpr double kMemory_s = 4;
 
-double inSeconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &covariance)
@@ -101,13 +100,13 @@ void SensorMonitor::checkReturn(Sensor sensor)
                 : !c->odometry || c->odometry_points > 0.5 * m_options.limit_odometry)
       return;
   const std::int64_t back_ns = (m_comparisons.end() - static_cast<std::ptrdiff_t>(window))->a_ns;
-  if (is_gyro && (!m_gyro_changed_ns || inSeconds(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * m_options.stuck_s))
+  if (is_gyro && (!m_gyro_changed_ns || secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * m_options.stuck_s))
     return;
   if (!is_gyro && std::any_of(m_steps.begin(), m_steps.end(),
                               [back_ns](const Step &step) { return step.stamp_ns > back_ns && step.is_held; }))
     return;
   m_distrusted[s] = false;
-  m_verdicts[*m_may_return[s]].text += fmt::format(" until {:.1f} s", inSeconds(back_ns));
+  m_verdicts[*m_may_return[s]].text += fmt::format(" until {:.1f} s", secondsOf(back_ns));
   m_may_return[s].reset();
 }
 
@@ -204,7 +203,7 @@ void SensorMonitor::checkStamps()
       if (c.gyro && next.gyro && next.a_ns == c.b_ns)
         together += c.error.dot(c.rate_b) * next.error.dot(next.rate_a);
   if (together < 0)
-    raise(Sensor::gyro, "stamps", inSeconds(m_comparisons.front().a_ns),
+    raise(Sensor::gyro, "stamps", secondsOf(m_comparisons.front().a_ns),
           fmt::format("gyro: the stamps of the images scatter against it, by {:.0f} ms or more", 1e3 * best_sigma_s));
 }
 
@@ -223,24 +222,24 @@ void SensorMonitor::checkGyroSamples(const Frame &frame)
   }
   if (!m_had_gyro)
     return;
-  if (inSeconds(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
-    raise(Sensor::gyro, "ended", inSeconds(m_last_gyro_ns),
-          fmt::format("gyro: nothing since {:.1f} s", inSeconds(m_last_gyro_ns)), Lasts::until_agree);
+  if (secondsOf(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
+    raise(Sensor::gyro, "ended", secondsOf(m_last_gyro_ns),
+          fmt::format("gyro: nothing since {:.1f} s", secondsOf(m_last_gyro_ns)), Lasts::until_agree);
   const bool moves = std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.parallax_px > 1; });
-  if (moves && m_gyro_changed_ns && inSeconds(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
-    raise(Sensor::gyro, "stuck", inSeconds(*m_gyro_changed_ns),
-          fmt::format("gyro: repeats its value since {:.1f} s", inSeconds(*m_gyro_changed_ns)), Lasts::until_agree);
+  if (moves && m_gyro_changed_ns && secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
+    raise(Sensor::gyro, "stuck", secondsOf(*m_gyro_changed_ns),
+          fmt::format("gyro: repeats its value since {:.1f} s", secondsOf(*m_gyro_changed_ns)), Lasts::until_agree);
 }
 
 /// The odometry from frame to frame.
 void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
-  const double time_s = inSeconds(frame.stamp_ns);
+  const double time_s = secondsOf(frame.stamp_ns);
   bool &is_wrong = m_wrong_now[static_cast<int>(Sensor::odometry)];
   if (!frame.wMb_odometry) {
-    if (m_had_odometry && inSeconds(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
-      raise(Sensor::odometry, "ended", inSeconds(m_last_odometry_ns),
-            fmt::format("odometry: nothing since {:.1f} s", inSeconds(m_last_odometry_ns)), Lasts::until_agree);
+    if (m_had_odometry && secondsOf(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
+      raise(Sensor::odometry, "ended", secondsOf(m_last_odometry_ns),
+            fmt::format("odometry: nothing since {:.1f} s", secondsOf(m_last_odometry_ns)), Lasts::until_agree);
     m_steps.clear();
     return;
   }
@@ -256,7 +255,7 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
       step.parallax_px = std::max(step.parallax_px, motion.points.parallax_px);
   if (!m_steps.empty()) {
     const Step &before = m_steps.back();
-    const double dt = std::max(1e-3, inSeconds(step.stamp_ns - before.stamp_ns));
+    const double dt = std::max(1e-3, secondsOf(step.stamp_ns - before.stamp_ns));
     step.velocity = (step.wMb.t - before.wMb.t) / dt;
     step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
     is_wrong = step.is_held || before.is_held; // the step after a pause makes up for it
@@ -298,7 +297,7 @@ void SensorMonitor::raiseJump(double extent, double time_s)
     raise(Sensor::odometry, "jump", time_s, fmt::format("odometry: jump of {:.1f} m at {:.1f} s", extent, time_s),
           Lasts::no);
   else
-    raise(Sensor::odometry, "noise", inSeconds(first->stamp_ns), "odometry: jumps again and again");
+    raise(Sensor::odometry, "noise", secondsOf(first->stamp_ns), "odometry: jumps again and again");
 }
 
 /// An odometry that stays where it is while the points move.
@@ -312,7 +311,7 @@ void SensorMonitor::checkStandingStill(double time_s)
       break;
     ++frames;
     moves = moves || step->parallax_px > 1;
-    since_s = inSeconds((step + 1)->stamp_ns);
+    since_s = secondsOf((step + 1)->stamp_ns);
   }
   if (frames >= 3 && moves)
     raise(Sensor::odometry, "stuck", since_s, fmt::format("odometry: frozen since {:.1f} s", since_s),
@@ -327,12 +326,12 @@ void SensorMonitor::checkScatter()
   std::vector<double> scatters;
   auto step = m_steps.rbegin();
   for (; step != m_steps.rend(); ++step) {
-    if (scatters.size() >= kLeast && inSeconds(m_steps.back().stamp_ns - step->stamp_ns) > kLeast_s)
+    if (scatters.size() >= kLeast && secondsOf(m_steps.back().stamp_ns - step->stamp_ns) > kLeast_s)
       break;
     scatters.push_back(step->scatter);
   }
   if (scatters.size() >= kLeast && medianOf(scatters) > std::pow(m_options.noise_factor, 2))
-    raise(Sensor::odometry, "noise", inSeconds((step - 1)->stamp_ns),
+    raise(Sensor::odometry, "noise", secondsOf((step - 1)->stamp_ns),
           "odometry: its positions scatter from frame to frame");
 }
 
@@ -341,7 +340,7 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
   Comparison now;
   now.a_ns = motion.a_ns;
   now.b_ns = motion.b_ns;
-  const double dt = inSeconds(now.b_ns - now.a_ns);
+  const double dt = secondsOf(now.b_ns - now.a_ns);
   now.points = Matrix3d(m_bMc.R * motion.points.aRb * m_bMc.R.transpose());
   now.points_covariance = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose();
   const Matrix3d one = Matrix3d::Identity();
@@ -399,13 +398,13 @@ void SensorMonitor::checkRotations()
   if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
     return;
   int gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
-  double since_s = inSeconds(m_comparisons.back().a_ns);
+  double since_s = secondsOf(m_comparisons.back().a_ns);
   for (auto c = windowBegin(); c != m_comparisons.end(); ++c) {
     gyro_points += c->gyro_points > m_options.limit_points;
     gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
     odometry_points += c->odometry_points > m_options.limit_odometry;
     if (c->gyro_points > m_options.limit_points || c->odometry_points > m_options.limit_odometry)
-      since_s = std::min(since_s, inSeconds(c->a_ns));
+      since_s = std::min(since_s, secondsOf(c->a_ns));
   }
   const int enough = m_options.of_window;
   const bool gyro_failed = gyro_points >= enough && !has(Sensor::gyro);
@@ -437,7 +436,7 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
     const auto turned = gyroBetween(c.a_ns + offset, c.b_ns + offset);
     if (!turned || c.gyro_points <= 0.5 * m_options.limit_points)
       continue;
-    const double dt = inSeconds(c.b_ns - c.a_ns);
+    const double dt = secondsOf(c.b_ns - c.a_ns);
     const Vector3d error = logSo3(orthonormalized(turned->transpose() * *c.points)) / dt;
     const Matrix3d weight = (c.points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).inverse();
     information += weight;
@@ -449,7 +448,7 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
   *bias = -information.ldlt().solve(sum);
   double total = 0;
   for (const auto &[error, c] : errors) {
-    const double dt = inSeconds(c->b_ns - c->a_ns);
+    const double dt = secondsOf(c->b_ns - c->a_ns);
     const Vector3d left = error + *bias;
     total += left.dot((c->points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).ldlt().solve(left));
   }
@@ -483,7 +482,7 @@ void SensorMonitor::nameGyro()
     verdict.kind = "time";
     verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(best_offset));
   }
-  else if (verdict.since_s < inSeconds(m_comparisons.front().b_ns)) {
+  else if (verdict.since_s < secondsOf(m_comparisons.front().b_ns)) {
     verdict.text = "gyro: axes, sign or units wrong";
   }
 }
@@ -508,7 +507,7 @@ void SensorMonitor::checkDirection()
   const Vector3d askew(medianOf(x), medianOf(y), medianOf(z));
   const double sigma = std::sqrt(1.6 * kTogether / information); // 1.6: of a median
   if (askew.norm() > std::max(m_options.direction_limit, 5 * sigma))
-    raise(Sensor::odometry, "direction", inSeconds(m_comparisons.front().a_ns),
+    raise(Sensor::odometry, "direction", secondsOf(m_comparisons.front().a_ns),
           fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
 }
 
@@ -516,10 +515,10 @@ void SensorMonitor::checkDirection()
 void SensorMonitor::checkTilt(const Frame &frame)
 {
   constexpr double kLeast_s = 1.8, kVelocity_s = 0.3; // of the memory, and that a velocity is taken over
-  if (m_steps.size() < 2 || inSeconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns) < kLeast_s ||
+  if (m_steps.size() < 2 || secondsOf(m_steps.back().stamp_ns - m_steps[1].stamp_ns) < kLeast_s ||
       !frame.wMb_odometry || m_samples.empty() ||
-      inSeconds(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
-      inSeconds(m_samples.front().stamp_ns - m_steps[1].stamp_ns) > kMostGap_s ||
+      secondsOf(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
+      secondsOf(m_samples.front().stamp_ns - m_steps[1].stamp_ns) > kMostGap_s ||
       std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.is_held; }))
     return; // force and velocity would be of different times
   Vector3d sum = Vector3d::Zero();
@@ -529,7 +528,7 @@ void SensorMonitor::checkTilt(const Frame &frame)
   const Vector3d *first = nullptr;
   std::int64_t before_ns = m_samples.front().stamp_ns;
   for (const GyroSample &sample : m_samples) {
-    if (inSeconds(sample.stamp_ns - before_ns) > kMostGap_s)
+    if (secondsOf(sample.stamp_ns - before_ns) > kMostGap_s)
       return;
     before_ns = sample.stamp_ns;
     while (step != m_steps.end() && step->stamp_ns < sample.stamp_ns)
@@ -545,12 +544,12 @@ void SensorMonitor::checkTilt(const Frame &frame)
   }
   if (count < 40 || !varies)
     return;
-  const double dt = inSeconds(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
+  const double dt = secondsOf(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
   const auto velocity = [this](std::int64_t around_ns) {
     Vector3d total = Vector3d::Zero();
     int steps = 0;
     for (auto one = m_steps.begin() + 1; one != m_steps.end(); ++one)
-      if (std::abs(inSeconds(one->stamp_ns - around_ns)) < kVelocity_s - 0.01) {
+      if (std::abs(secondsOf(one->stamp_ns - around_ns)) < kVelocity_s - 0.01) {
         total += one->velocity;
         ++steps;
       }
@@ -561,7 +560,7 @@ void SensorMonitor::checkTilt(const Frame &frame)
   constexpr double kLongest = 0.2; // beyond it the limit does not grow
   const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));
   if (tilt > allowed)
-    raise(Sensor::odometry, "tilt", inSeconds(m_steps.front().stamp_ns),
+    raise(Sensor::odometry, "tilt", secondsOf(m_steps.front().stamp_ns),
           fmt::format("odometry: its roll and pitch are {:.0f} degrees off gravity", tilt / kDegree));
 }
 } // namespace bole

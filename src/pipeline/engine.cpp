@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/engine.h"
 
+#include "geometry/constants.h"
 #include "geometry/horizontal_view.h"
 #include "pipeline/paper_policy.h"
 #include "pipeline/scene_points.h"
@@ -39,8 +40,6 @@ const vpImage<float> *background(const std::optional<Saliency> &saliency)
 {
   return saliency ? &saliency->p_background : nullptr;
 }
-
-double seconds(std::int64_t stamp_ns) { return 1e-9 * static_cast<double>(stamp_ns); }
 
 std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
 {
@@ -157,8 +156,8 @@ Viewpoint Engine::extend(const Frame &frame, const Motion &motion)
     m_smoother.optimize(kJointlySettled); // full smoothing, and no step that the energies do not bear out
   else
     m_smoother.update();
-  refreshMap(seconds(frame.stamp_ns) - kLately_s);
-  return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), seconds(frame.stamp_ns)};
+  refreshMap(secondsOf(frame.stamp_ns) - kLately_s);
+  return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), secondsOf(frame.stamp_ns)};
 }
 
 std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motion &motion)
@@ -318,7 +317,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
 {
   const Pose wMb = m_smoother.pose(newest());
   if (newest() > 0) {
-    const double dt = seconds(frame.stamp_ns - m_online.back().stamp_ns);
+    const double dt = secondsOf(frame.stamp_ns - m_online.back().stamp_ns);
     m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / std::max(dt, 1e-3);
     followScale(dt);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/monocular_motion.h"
 
+#include "geometry/constants.h"
 #include "geometry/median.h"
 #include "geometry/so3.h"
 #include "motion/sensor_monitor.h"
@@ -227,7 +228,7 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
   Motion motion;
   ++m_frame;
   if (frame.wMb_odometry && !m_odometry_from_s)
-    m_odometry_from_s = 1e-9 * static_cast<double>(frame.stamp_ns);
+    m_odometry_from_s = secondsOf(frame.stamp_ns);
   motion.is_rotation_seen = true;
   motion.step = expected(frame, wMa, velocity);
   motion.step.is_step_measured = false;

@@ -108,74 +108,56 @@ std::vector<Fault> lies()
   };
 }
 
+/// What is wrong from the first frame on.
+Fault fromTheFirst(const std::string &name, const std::string &what, const std::function<void(SpoiltFlight &)> &spoil)
+{
+  return {"sensors", name, what, Duty::survive, spoil, {}, {}, {}, 0};
+}
+
 /// Poses that stand otherwise from the first to the last.
 Fault poses(const std::string &name, const std::string &what,
             const std::function<void(Eigen::Vector3d &, Eigen::Quaterniond &)> &change)
 {
-  return {"sensors",
-          name,
-          what,
-          Duty::survive,
-          [=](SpoiltFlight &flight) {
-            Table &table = flight.odometry;
-            for (std::size_t i = 0; i < table.rows.size(); ++i) {
-              Eigen::Vector3d t(table.number(i, 1), table.number(i, 2), table.number(i, 3));
-              Eigen::Quaterniond q(table.number(i, 4), table.number(i, 5), table.number(i, 6), table.number(i, 7));
-              change(t, q);
-              const double values[] = {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()};
-              for (std::size_t k = 0; k < 7; ++k)
-                table.set(i, k + 1, values[k]);
-            }
-          },
-          {},
-          {},
-          {},
-          0};
+  return fromTheFirst(name, what, [=](SpoiltFlight &flight) {
+    Table &table = flight.odometry;
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+      Eigen::Vector3d t(table.number(i, 1), table.number(i, 2), table.number(i, 3));
+      Eigen::Quaterniond q(table.number(i, 4), table.number(i, 5), table.number(i, 6), table.number(i, 7));
+      change(t, q);
+      const double values[] = {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()};
+      for (std::size_t k = 0; k < 7; ++k)
+        table.set(i, k + 1, values[k]);
+    }
+  });
 }
 
 /// Rates and forces, likewise.
 Fault samples(const std::string &name, const std::string &what,
               const std::function<void(Eigen::Vector3d &, Eigen::Vector3d &)> &change)
 {
-  return {"sensors",
-          name,
-          what,
-          Duty::survive,
-          [=](SpoiltFlight &flight) {
-            Table &table = flight.imu;
-            for (std::size_t i = 0; i < table.rows.size(); ++i) {
-              Eigen::Vector3d rate(table.number(i, 1), table.number(i, 2), table.number(i, 3)),
-                  force(table.number(i, 4), table.number(i, 5), table.number(i, 6));
-              change(rate, force);
-              for (int k = 0; k < 3; ++k) {
-                table.set(i, static_cast<std::size_t>(k) + 1, rate[k]);
-                table.set(i, static_cast<std::size_t>(k) + 4, force[k]);
-              }
-            }
-          },
-          {},
-          {},
-          {},
-          0};
+  return fromTheFirst(name, what, [=](SpoiltFlight &flight) {
+    Table &table = flight.imu;
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+      Eigen::Vector3d rate(table.number(i, 1), table.number(i, 2), table.number(i, 3)),
+          force(table.number(i, 4), table.number(i, 5), table.number(i, 6));
+      change(rate, force);
+      for (int k = 0; k < 3; ++k) {
+        table.set(i, static_cast<std::size_t>(k) + 1, rate[k]);
+        table.set(i, static_cast<std::size_t>(k) + 4, force[k]);
+      }
+    }
+  });
 }
 
 /// Every \p nth line of a table.
 Fault thinned(const std::string &name, const std::string &what, Table SpoiltFlight::*table, std::size_t nth)
 {
-  return {"sensors",
-          name,
-          what,
-          Duty::survive,
-          [=](SpoiltFlight &flight) {
-            std::vector<SpoiltFlight::Row> rows;
-            for (std::size_t i = 0; i < (flight.*table).rows.size(); i += nth)
-              rows.push_back((flight.*table).rows[i]);
-            (flight.*table).rows = std::move(rows);
-          },
-          {},
-          {},
-          {},
-          0};
+  return fromTheFirst(name, what, [=](SpoiltFlight &flight) {
+    std::vector<SpoiltFlight::Row> rows;
+    for (std::size_t i = 0; i < (flight.*table).rows.size(); i += nth)
+      rows.push_back((flight.*table).rows[i]);
+    (flight.*table).rows = std::move(rows);
+  });
 }
 
 /// What was wrong before the flight began.
@@ -204,17 +186,10 @@ std::vector<Fault> conventions()
       poses("odometry_cm", "poses in centimetres", [](Vector3d &t, Quaterniond &) { t *= 100; }),
       poses("odometry_sea", "heights over the sea", [](Vector3d &t, Quaterniond &) { t.z() += 500; }),
       thinned("odometry_1hz", "a pose a second", &SpoiltFlight::odometry, 10),
-      {"sensors",
-       "odometry_late_2s",
-       "its clock 2 s late",
-       Duty::survive,
-       [](SpoiltFlight &flight) {
-         everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t + 2'000'000'000); });
-       },
-       {},
-       {},
-       {},
-       0},
+      fromTheFirst("odometry_late_2s", "its clock 2 s late",
+                   [](SpoiltFlight &flight) {
+                     everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t + 2'000'000'000); });
+                   }),
       samples("imu_axes", "y, z, x for x, y, z",
               [](Vector3d &rate, Vector3d &force) {
                 rate = Vector3d(rate.y(), rate.z(), rate.x());
@@ -226,17 +201,10 @@ std::vector<Fault> conventions()
       samples("force_down", "an accelerometer that says -9.81 at rest",
               [](Vector3d &, Vector3d &force) { force = -force; }),
       thinned("imu_20hz", "20 samples a second", &SpoiltFlight::imu, 10),
-      {"sensors",
-       "imu_drift",
-       "its clock 1 % slow",
-       Duty::survive,
-       [](SpoiltFlight &flight) {
-         everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(t / 100 * 101); });
-       },
-       {},
-       {},
-       {},
-       0},
+      fromTheFirst("imu_drift", "its clock 1 % slow",
+                   [](SpoiltFlight &flight) {
+                     everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(t / 100 * 101); });
+                   }),
   };
 }
 
