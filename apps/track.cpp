@@ -59,6 +59,18 @@ FieldOfView fieldOfView(const std::string &input, const SourceOptions &options)
   return {2 * std::atan(half) * kDegrees, 2 * estimate.sigma * half / (1 + half * half) * kDegrees};
 }
 
+/// Standard deviation of the log of the focal length of \p source.
+double focalSigma(const FrameSource &source, const RunSummary &made)
+{
+  constexpr double kGiven = 0.03; // of a field of view that the user gives: a degree or two
+  if (source.isCameraKnown())
+    return 0;
+  if (made.field_of_view_sigma_deg == 0)
+    return made.is_camera_known ? kGiven : kGuessedFocalSigma;
+  const PinholeCamera camera = source.camera();
+  return made.field_of_view_sigma_deg * M_PI / 180 / std::sin(2 * std::atan(0.5 * camera.width / camera.fx));
+}
+
 /// A video without a camera file is looked through for turns and curves that tell its field of view.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
@@ -264,7 +276,8 @@ void track(const TrackArguments &asked_for)
   Options options = readOptions(arguments, source->isCompressed());
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   const bool is_live = live != nullptr || dynamic_cast<const LiveVideoSource *>(source.get()) != nullptr;
-  options.camera.focal_known = options.camera.focal_known && source->isCameraKnown();
+  if (options.camera.focal_sigma == 0)
+    options.camera.focal_sigma = focalSigma(*source, made);
   made.preset = arguments.config.empty() ? "default" : arguments.config;
   made.options = toYaml(options);
   widen(options.odometry, calibration);

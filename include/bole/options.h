@@ -25,7 +25,7 @@ struct Options
   struct Camera
   {
     double height = 0;       ///< over the ground [m]; 0: not known. Gives a video without odometry its scale
-    bool focal_known = true; ///< false: the focal length is a guess
+    double focal_sigma = 0;  ///< standard deviation of the log of the focal length; 0: calibrated
     double rate = 0;         ///< frames a second; 0: that of the first frames
     bool compressed = false; ///< the pictures went through a lossy codec
   } camera;                  ///< what the camera does to the picture

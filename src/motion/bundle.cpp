@@ -12,9 +12,9 @@ namespace bole::motion
 {
 Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a, double inverse_depth,
                              const Eigen::Vector2d &xy_b, Eigen::Matrix<double, 2, 6> *J_a,
-                             Eigen::Matrix<double, 2, 6> *J_b, Eigen::Vector2d *J_q)
+                             Eigen::Matrix<double, 2, 6> *J_b, Eigen::Vector2d *J_q, double focal, Eigen::Vector2d *J_f)
 {
-  const Eigen::Vector3d ray = xy_a.homogeneous();
+  const Eigen::Vector3d ray(xy_a.x() / focal, xy_a.y() / focal, 1);
   const Eigen::Matrix3d bRa = wMb.R.transpose() * wMa.R;
   const Eigen::Vector3d step = wMb.R.transpose() * (wMa.t - wMb.t);
   const Eigen::Vector3d y = bRa * ray + inverse_depth * step; // the point times its inverse depth
@@ -23,6 +23,7 @@ Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vect
   if (J_a != nullptr || J_b != nullptr || J_q != nullptr) {
     Eigen::Matrix<double, 2, 3> projection;
     projection << 1 / z, 0, -at.x() / z, 0, 1 / z, -at.y() / z;
+    projection *= focal;
     if (J_a != nullptr) {
       const Eigen::Matrix<double, 2, 3> turned = projection * bRa;
       *J_a << inverse_depth * turned, -turned * skew(ray);
@@ -31,8 +32,10 @@ Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vect
       *J_b << -inverse_depth * projection, projection * skew(y);
     if (J_q != nullptr)
       *J_q = projection * step;
+    if (J_f != nullptr)
+      *J_f = focal * at - projection * bRa * Eigen::Vector3d(ray.x(), ray.y(), 0);
   }
-  return at - xy_b;
+  return focal * at - xy_b;
 }
 
 namespace
@@ -55,15 +58,20 @@ public:
       m_offset.push_back(frame.fixed ? -1 : m_size);
       m_size += frame.fixed ? 0 : 6;
     }
+    m_focal = options.with_focal ? m_size++ : -1;
+    m_log_focal = options.log_focal;
   }
   int size() const { return m_size; }
+  double logFocal() const { return m_log_focal; }
+  void setLogFocal(double log_focal) { m_log_focal = log_focal; }
 
-  double cost(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points) const
+  double cost(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points, double log_focal) const
   {
+    const double focal = std::exp(log_focal);
     double sum = 0;
     for (const BundlePoint &point : points) {
       for (const BundleObservation &seen : point.seen)
-        sum += costOf(residualOf(frames, point, seen).norm() / m_options.sigma, m_options.kernel);
+        sum += costOf(residualOf(frames, point, seen, focal).norm() / m_options.sigma, m_options.kernel);
       const double off = point.inverse_depth - point.prior;
       sum += 0.5 * point.prior_information * off * off;
     }
@@ -93,9 +101,9 @@ public:
     return system;
   }
 
-  /// The poses' step after the points were eliminated; then the points follow.
-  void step(const System &system, double damping, std::vector<BundleFrame> &frames,
-            std::vector<BundlePoint> &points) const
+  /// The poses' step after the points were eliminated; then the points follow. Returns the log of the focal length.
+  double step(const System &system, double damping, std::vector<BundleFrame> &frames,
+              std::vector<BundlePoint> &points) const
   {
     const auto [H, g] = reduced(system, damping);
     const Eigen::VectorXd delta = -H.ldlt().solve(g);
@@ -106,6 +114,7 @@ public:
       const double H_q = system.point_H[k] * (1 + damping) + 1e-12;
       points[k].inverse_depth -= (system.point_g[k] + system.cross[k].dot(delta)) / H_q;
     }
+    return m_focal < 0 ? m_log_focal : m_log_focal + delta[m_focal];
   }
 
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> reduced(const System &system, double damping) const
@@ -123,10 +132,11 @@ public:
 
 private:
   static Eigen::Vector2d residualOf(const std::vector<BundleFrame> &frames, const BundlePoint &point,
-                                    const BundleObservation &seen)
+                                    const BundleObservation &seen, double focal)
   {
     return reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                        frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy);
+                        frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy,
+                        nullptr, nullptr, nullptr, focal);
   }
 
   static Eigen::Vector3d rotationResidual(const std::vector<BundleFrame> &frames, std::size_t i)
@@ -146,13 +156,14 @@ private:
     double H_q = point.prior_information;
     double g_q = point.prior_information * (point.inverse_depth - point.prior);
     const int a = m_offset[static_cast<std::size_t>(point.anchor)];
+    const double focal = std::exp(m_log_focal);
     for (BundleObservation &seen : point.seen) {
       const int b = m_offset[static_cast<std::size_t>(seen.frame)];
       Eigen::Matrix<double, 2, 6> J_a, J_b;
-      Eigen::Vector2d J_q;
+      Eigen::Vector2d J_q, J_f;
       const Eigen::Vector2d e = reprojection(m_frames[static_cast<std::size_t>(point.anchor)].wMc,
                                              m_frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
-                                             point.inverse_depth, seen.xy, &J_a, &J_b, &J_q);
+                                             point.inverse_depth, seen.xy, &J_a, &J_b, &J_q, focal, &J_f);
       seen.weight = weightOf(e.norm() / m_options.sigma, m_options.kernel);
       const double w = seen.weight / (m_options.sigma * m_options.sigma);
       H_q += w * J_q.squaredNorm();
@@ -171,6 +182,20 @@ private:
         const Matrix6d off = w * J_a.transpose() * J_b;
         system.H.block<6, 6>(a, b) += off;
         system.H.block<6, 6>(b, a) += off.transpose();
+      }
+      if (m_focal >= 0) {
+        system.H(m_focal, m_focal) += w * J_f.squaredNorm();
+        system.g[m_focal] += w * J_f.dot(e);
+        cross[m_focal] += w * J_f.dot(J_q);
+        const auto addWith = [&](int pose, const Eigen::Matrix<double, 2, 6> &J) {
+          if (pose < 0)
+            return;
+          const Vector6d off = w * J.transpose() * J_f;
+          system.H.block<6, 1>(pose, m_focal) += off;
+          system.H.block<1, 6>(m_focal, pose) += off.transpose();
+        };
+        addWith(a, J_a);
+        addWith(b, J_b);
       }
     }
     point.information = H_q;
@@ -223,16 +248,18 @@ private:
   const BundleOptions &m_options;
   std::vector<int> m_offset;
   int m_size = 0;
+  int m_focal = -1; ///< where the log of the focal length stands
+  double m_log_focal = 0;
 };
 
-double bulkOf(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points)
+double bulkOf(const std::vector<BundleFrame> &frames, const std::vector<BundlePoint> &points, double log_focal)
 {
   std::vector<double> all;
   for (const BundlePoint &point : points) {
     for (const BundleObservation &seen : point.seen) {
-      const Eigen::Vector2d e =
-          reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                       frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy);
+      const Eigen::Vector2d e = reprojection(
+          frames[static_cast<std::size_t>(point.anchor)].wMc, frames[static_cast<std::size_t>(seen.frame)].wMc,
+          point.xy, point.inverse_depth, seen.xy, nullptr, nullptr, nullptr, std::exp(log_focal));
       all.push_back(e.x());
       all.push_back(e.y());
     }
@@ -246,13 +273,13 @@ BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoi
 {
   BundleResult result;
   Bundle bundle(frames, points, options);
-  double damping = 1e-4, cost = bundle.cost(frames, points);
+  double damping = 1e-4, cost = bundle.cost(frames, points, bundle.logFocal());
   System system = bundle.linearize();
   for (int iteration = 0; iteration < options.iterations && bundle.size() > 0; ++iteration) {
     std::vector<BundleFrame> tried_frames = frames;
     std::vector<BundlePoint> tried_points = points;
-    bundle.step(system, damping, tried_frames, tried_points);
-    const double tried = bundle.cost(tried_frames, tried_points);
+    const double log_focal = bundle.step(system, damping, tried_frames, tried_points);
+    const double tried = bundle.cost(tried_frames, tried_points, log_focal);
     if (!(tried < cost)) {
       damping = std::max(1e-3, damping * 10);
       continue;
@@ -261,9 +288,10 @@ BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoi
     frames = std::move(tried_frames);
     points = std::move(tried_points);
     cost = tried;
+    bundle.setLogFocal(log_focal);
     damping = std::max(1e-7, 0.2 * damping);
     system = bundle.linearize();
-    if (gain < 1e-3 * cost)
+    if (gain < options.settled * cost)
       break;
   }
   double good = 0, all = 0;
@@ -274,9 +302,17 @@ BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoi
     }
   }
   result.inliers = all > 0 ? good / all : 0;
-  result.sigma = std::max(options.min_sigma, bulkOf(frames, points));
+  result.sigma = std::max(options.min_sigma, bulkOf(frames, points, bundle.logFocal()));
   if (bundle.size() >= 6 && std::isfinite(cost)) {
     const Eigen::MatrixXd H = bundle.reduced(system, 0).first;
+    if (options.with_focal) {
+      const Eigen::Index last = H.rows() - 1;
+      const double variance = H.ldlt().solve(Eigen::VectorXd::Unit(H.rows(), last))[last];
+      result.log_focal = bundle.logFocal();
+      result.focal_sigma = std::sqrt(variance) * result.sigma / options.sigma;
+      result.solved = std::isfinite(result.focal_sigma);
+      return result;
+    }
     result.last_covariance = H.bottomRightCorner<6, 6>().ldlt().solve(Matrix6d::Identity());
     result.solved = result.last_covariance.allFinite();
   }

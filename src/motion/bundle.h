@@ -46,6 +46,9 @@ struct BundleOptions
   double sigma = 1e-3;                  ///< of an observation, one coordinate [normalised]
   double min_sigma = 2e-4;              ///< floor when sigma is measured anew
   std::optional<double> first_baseline; ///< distance of the frames 0 and 1 that fixes the scale
+  double settled = 1e-3;                ///< share of the cost that an iteration must gain for another
+  bool with_focal = false;              ///< the focal length by which all was normalised is unknown, too
+  double log_focal = 0;                 ///< where it starts
 };
 
 struct BundleResult
@@ -54,13 +57,17 @@ struct BundleResult
   double sigma = 0;                                ///< of the bulk of the observations
   double inliers = 0;                              ///< share of observations of weight above 1/2
   Matrix6d last_covariance = Matrix6d::Identity(); ///< of the last frame, the other poses taken as known, per sigma
+  double log_focal = 0;                            ///< of the focal length over that by which all was normalised
+  double focal_sigma = 0;                          ///< of log_focal, of independent observations
 };
 
 /// Residual (predicted - seen) of a point in a frame, derivatives by the tangents (rho, phi) of
-/// both poses and by the inverse depth (each may be nullptr).
+/// both poses and by the inverse depth (each may be nullptr). \p focal: the camera's focal length over that by which
+/// both positions were normalised; J_f: by its logarithm.
 Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vector2d &xy_a, double inverse_depth,
                              const Eigen::Vector2d &xy_b, Eigen::Matrix<double, 2, 6> *J_a = nullptr,
-                             Eigen::Matrix<double, 2, 6> *J_b = nullptr, Eigen::Vector2d *J_q = nullptr);
+                             Eigen::Matrix<double, 2, 6> *J_b = nullptr, Eigen::Vector2d *J_q = nullptr,
+                             double focal = 1, Eigen::Vector2d *J_f = nullptr);
 
 BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                          const BundleOptions &options);

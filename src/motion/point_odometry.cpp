@@ -70,7 +70,7 @@ constexpr double kPlacingInflation = 3;         // as RelativePoseOptions::infla
 struct PointOdometry::State
 {
   PinholeCamera camera;
-  bool is_focal_known = true;
+  double focal_sigma = 0;            ///< of its log
   RelativePoseOptions relative_pose; ///< of the start
   std::deque<KeyFrame> window;
   std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
@@ -102,10 +102,10 @@ struct PointOdometry::State
 
 const char *toString(PointOdometryStatus status) { return nameOf(status, {"starting", "ok", "rotation_only", "lost"}); }
 
-PointOdometry::PointOdometry(const PinholeCamera &camera, bool is_focal_known) : m_state(new State)
+PointOdometry::PointOdometry(const PinholeCamera &camera, double focal_sigma) : m_state(new State)
 {
   m_state->camera = camera;
-  m_state->is_focal_known = is_focal_known;
+  m_state->focal_sigma = focal_sigma;
 }
 PointOdometry::~PointOdometry() = default;
 PointOdometry::PointOdometry(PointOdometry &&) noexcept = default;
@@ -169,7 +169,7 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   const auto estimate = estimateRelativePose(matches, camera, prior, relative_pose);
   const double wanted_px = kStartParallax * focal();
   const bool translates =
-      is_focal_known || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
+      focal_sigma == 0 || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
   if ((!translates || !estimate.hasRotation()) && matches.size() >= 6) {
     // What looks like a flight past a wall is taken for a pan, and so is what cannot be told from one.
     wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
@@ -216,7 +216,8 @@ void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
 double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> &matches) const
 {
   double least = 1e9;
-  for (const double factor : {0.7, 0.85, 1.0, 1.3, 1.7, 2.2, 3.0}) {
+  for (int sigmas = -3; sigmas <= 3; ++sigmas) {
+    const double factor = std::exp(sigmas * focal_sigma);
     PinholeCamera other = camera;
     other.fx *= factor;
     other.fy *= factor;

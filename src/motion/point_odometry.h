@@ -67,9 +67,9 @@ struct PlacedFrame
 class PointOdometry
 {
 public:
-  /// \p is_focal_known: false where the focal length is a guess. A pan past a wall then looks like a sideways flight,
-  /// so a start also needs flow that no rotation explains under any focal length from 0.7 to 3 times the guess.
-  explicit PointOdometry(const PinholeCamera &camera, bool is_focal_known = true);
+  /// \p focal_sigma: of the log of the focal length, 0 where it is calibrated. Under a wrong one a pan past a wall looks
+  /// like a sideways flight, so a start also needs flow that no rotation explains under any within three sigmas.
+  explicit PointOdometry(const PinholeCamera &camera, double focal_sigma = 0);
   ~PointOdometry();
   PointOdometry(PointOdometry &&) noexcept;
   PointOdometry &operator=(PointOdometry &&) noexcept;

@@ -53,9 +53,9 @@ MonocularMotion::MonocularMotion(const PinholeCamera &camera, const Pose &bMc, c
       m_camera(camera),
       m_bMc(bMc),
       m_camera_height(options.camera_height),
-      m_is_focal_known(options.focal_known),
+      m_focal_sigma(options.focal_sigma),
       m_model(options.motion, options.points.gyro),
-      m_odometry(camera, options.focal_known)
+      m_odometry(camera, options.focal_sigma)
 {
 }
 
@@ -178,9 +178,8 @@ Odometry MonocularMotion::toBody(const Pose &caMcb, Matrix6d covariance, bool is
     covariance.leftCols<3>().setZero();
   }
   covariance.topLeftCorner<3, 3>() += (least * least + along * along) * Matrix3d::Identity();
-  constexpr double kFocalSigma = 0.15; // of log f where it is guessed: a rotation is wrong by as much of itself
-  const double guessed = m_is_focal_known ? 0 : kFocalSigma * logSo3(caMcb.R).norm();
-  const double rotation_variance = kTurnSigma * kTurnSigma + guessed * guessed;
+  const double by_focal = m_focal_sigma * logSo3(caMcb.R).norm(); // a rotation is wrong by as much of itself
+  const double rotation_variance = kTurnSigma * kTurnSigma + by_focal * by_focal;
   covariance.bottomRightCorner<3, 3>() += rotation_variance * Matrix3d::Identity();
   const Matrix6d to_body = adjoint(m_bMc);
   return {m_bMc * Pose(caMcb.R, m_unit * caMcb.t) * m_bMc.inverse(), to_body * covariance * to_body.transpose()};

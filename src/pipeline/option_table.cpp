@@ -94,7 +94,8 @@ std::vector<OptionEntry> optionTable(Options &o)
   return {
       {"camera.height", &o.camera.height, 0, 100, "m",
        "camera over the ground, 0 unknown: the scale of a video without odometry"},
-      {"camera.focal_known", &o.camera.focal_known, 0, 1, "", "false: the focal length is a guess"},
+      {"camera.focal_sigma", &o.camera.focal_sigma, 0, 1, "",
+       "standard deviation of the logarithm of the focal length; 0: calibrated"},
       {"camera.rate", &o.camera.rate, 0, 100, "1/s",
        "frames a second, by which pairs of frames are chosen; 0: measured"},
       {"camera.compressed", &o.camera.compressed, 0, 1, "",

@@ -169,7 +169,7 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   if (options.stages.servoing)
     setServoing(o);
   o.camera_height = options.camera.height;
-  o.focal_known = options.camera.focal_known;
+  o.focal_sigma = options.camera.focal_sigma;
   if (options.camera.compressed)
     o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
   scaleToRate(o, rateOf(options) / Options::kUsualRate_hz);

@@ -66,7 +66,7 @@ struct StageOptions
   MotionModelOptions motion;
   PointMotionOptions points = withoutOdometry();
   double camera_height = 0; ///< over the ground, where it is known [m]; 0: unknown
-  bool focal_known = true;  ///< false: a guess, so a sideways flight needs better proof against a pan
+  double focal_sigma = 0;   ///< of the log of the focal length; 0: calibrated
   GradientOptions gradient;
   SaliencyOptions saliency;
   DetectorOptions detection;

@@ -185,7 +185,7 @@ void plainVideo(const std::string &path)
 {
   const auto source = openSource(path);
   PointTracker tracker(source->camera());
-  PointOdometry odometry(source->camera(), false); // openSource() guesses its focal length
+  PointOdometry odometry(source->camera(), kGuessedFocalSigma); // openSource() guesses it
   VerticalFilter vertical;
   std::map<std::string, int> statuses;
   for (Frame frame; source->next(frame);) {

@@ -58,7 +58,8 @@ TEST(FocalLength, AFlightThroughAWoodTellsItFromAGuessThatIsOffByAThird)
     const FocalEstimate estimate = focal.estimate();
     ASSERT_TRUE(estimate.known) << off;
     EXPECT_NEAR(estimate.factor * off, 1, 2.5 * estimate.sigma) << off;
-    EXPECT_LT(estimate.sigma, 0.06) << off;
+    EXPECT_NEAR(estimate.factor * off, 1, 0.02) << off;
+    EXPECT_LT(estimate.sigma, 0.02) << off;
   }
 }
 
