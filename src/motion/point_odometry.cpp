@@ -76,6 +76,7 @@ struct PointOdometry::State
   std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
   std::unordered_map<std::uint64_t, Landmark> landmarks;
   std::vector<Record> records;
+  std::deque<Seen> since_first;       ///< before the start: what the last frames saw, none before the first key frame
   std::optional<GyroRotation> turned; ///< since the last key frame
   Pose wMc, velocity;                 ///< current pose, motion of the last frame
   Seen seen;
@@ -86,7 +87,8 @@ struct PointOdometry::State
   PointOdometryResult begin(const PointTracker &tracker);
   void expectTurn(const std::vector<PointMatch> &matches);
   double unexplainedByTurning(const std::vector<PointMatch> &matches) const;
-  bool start(const PointTracker &tracker, const RelativePoseEstimate &first, int back);
+  std::vector<PointMatch> matchesWithFirst(const PointTracker &tracker) const;
+  bool start(const RelativePoseEstimate &first);
   PointOdometryResult place(bool turned_known);
   void assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                 std::vector<std::uint64_t> &ids) const;
@@ -148,6 +150,7 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   PointOdometryResult result;
   const std::size_t now = records.size() - 1;
   const auto restart = [&] {
+    since_first.clear();
     window.clear();
     window.push_back({now, wMc, seen, std::nullopt});
     key_poses[now] = wMc;
@@ -159,8 +162,11 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     restart();
     return result;
   }
-  const int back = static_cast<int>(now - window.front().frame);
-  const auto matches = tracker.matches(back);
+  constexpr std::size_t kPlacedLater = 300; // frames that a start places: ten seconds of a video
+  since_first.push_back(seen);
+  if (since_first.size() > kPlacedLater)
+    since_first.pop_front();
+  const std::vector<PointMatch> matches = matchesWithFirst(tracker);
   RelativePosePrior prior;
   if (turned) {
     prior.aRb = turned->R;
@@ -186,7 +192,7 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   result.sigma_px = estimate.sigma_px;
   const double direction_sigma = std::sqrt(std::max(estimate.covariance(3, 3), estimate.covariance(4, 4)));
   if (translates && estimate.hasDirection() && direction_sigma < kStartDirection && estimate.parallax_px > wanted_px &&
-      start(tracker, estimate, back)) {
+      start(estimate)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
     result.key_frame = true;
@@ -229,7 +235,18 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
   return least;
 }
 
-bool PointOdometry::State::start(const PointTracker &tracker, const RelativePoseEstimate &first, int back)
+/// Points of the first key frame that are still followed, however long ago it was.
+std::vector<PointMatch> PointOdometry::State::matchesWithFirst(const PointTracker &tracker) const
+{
+  std::vector<PointMatch> matches;
+  const Seen &first = window.front().seen;
+  for (const PointTrack &track : tracker.tracks())
+    if (const auto found = first.find(track.id); found != first.end())
+      matches.push_back({camera.project(found->second.homogeneous()), track.current(), track.id});
+  return matches;
+}
+
+bool PointOdometry::State::start(const RelativePoseEstimate &first)
 {
   const KeyFrame &origin = window.front();
   wMc = origin.wMc * Pose(first.aRb, first.direction);
@@ -272,35 +289,38 @@ bool PointOdometry::State::start(const PointTracker &tracker, const RelativePose
   wMc = window.back().wMc;
   key_poses[now] = wMc;
   // The frames between, each placed on its own against the points.
-  for (int k = back - 1; k >= 1; --k) {
-    const double along = double(back - k) / back;
+  const auto since_origin = static_cast<double>(now - origin.frame);
+  for (std::size_t k = 0; k + 1 < since_first.size(); ++k) {
+    const std::size_t frame = now + 1 - since_first.size() + k;
+    const double along = static_cast<double>(frame - origin.frame) / since_origin;
     std::vector<BundleFrame> pair(2);
     pair[0].wMc = origin.wMc;
     pair[0].fixed = true;
     const Pose step = origin.wMc.inverse() * wMc;
     pair[1].wMc = origin.wMc * Pose(expSo3(along * logSo3(step.R)), along * step.t);
     std::vector<BundlePoint> seen_between;
-    for (const PointTrack &track : tracker.tracks()) {
-      const auto landmark = landmarks.find(track.id);
-      if (landmark != landmarks.end() && track.age() >= k) {
-        BundlePoint point;
-        point.xy = landmark->second.xy;
-        point.inverse_depth = point.prior = landmark->second.inverse_depth;
-        point.prior_information = 1e8;
-        point.seen.push_back({1, camera.ray(*(track.positions_px.rbegin() + k)).head<2>(), 1});
-        seen_between.push_back(point);
-      }
+    for (const auto &[id, landmark] : landmarks) {
+      const auto found = since_first[k].find(id);
+      if (found == since_first[k].end())
+        continue;
+      BundlePoint point;
+      point.xy = landmark.xy;
+      point.inverse_depth = point.prior = landmark.inverse_depth;
+      point.prior_information = 1e8;
+      point.seen.push_back({1, found->second, 1});
+      seen_between.push_back(point);
     }
     bundle.first_baseline.reset();
     if (seen_between.size() >= 6 && motion::solveBundle(pair, seen_between, bundle).solved) {
-      Record &record = records[now - static_cast<std::size_t>(k)];
+      Record &record = records[frame];
       record.key = origin.frame;
       record.keyMc = origin.wMc.inverse() * pair[1].wMc;
       record.status = PointOdometryStatus::ok;
     }
   }
   addLandmarks();
-  velocity = Pose(expSo3(logSo3(first.aRb) / back), first.direction / back);
+  velocity = Pose(expSo3(logSo3(first.aRb) / since_origin), first.direction / since_origin);
+  since_first.clear();
   return true;
 }
 

@@ -70,6 +70,26 @@ TEST(PointOdometry, ASwingOfTheCameraCostsItNoUnit)
   EXPECT_NEAR(after / unit, 1, 0.1);
 }
 
+TEST(PointOdometry, AStartThatTakesLongerThanTracksRememberPlacesAllItsFrames)
+{
+  constexpr int kFrames = 2 * PointTracker::kHistory + 16;
+  PointTracker tracker(kCamera);
+  PointOdometry odometry(kCamera);
+  PointOdometryResult result;
+  for (int k = 0; k < kFrames; ++k) {
+    tracker.track(drawWalls(kCamera, {Eigen::Matrix3d::Identity(), {0.004 * k, 0, 0}}));
+    result = odometry.process(tracker);
+    if (k <= PointTracker::kHistory) {
+      EXPECT_EQ(result.status, PointOdometryStatus::starting) << k;
+    }
+  }
+  EXPECT_EQ(result.status, PointOdometryStatus::ok);
+  const auto path = odometry.trajectory();
+  const double whole = path.back().wMc.t.norm();
+  for (std::size_t k = 0; k < path.size(); ++k)
+    EXPECT_NEAR(path[k].wMc.t.norm() / whole, static_cast<double>(k) / (kFrames - 1), 0.05) << k;
+}
+
 TEST(PointOdometry, ACameraThatOnlyTurnsNeverGetsAUnitOfLength)
 {
   PointTracker tracker(kCamera);
