@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "data_files.h"
+#include "geometry/failure.h"
 
 #include "input/suggestion.h"
 
 #include <algorithm>
-#include <bole/visp.h>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <initializer_list>
 #include <vector>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -66,10 +65,8 @@ std::string findPreset(const std::string &name)
       names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
   const std::string meant = nearestWord(fs::path(name).stem().string(), names);
-  throw vpException(vpException::ioError,
-                    fmt::format("--config {}: no such file, and no preset of that name{}; presets: {}", name,
-                                meant.empty() ? "" : fmt::format(" (did you mean {}?)", meant),
-                                fmt::join(names, ", ")));
+  throw ioError("--config {}: no such file, and no preset of that name{}; presets: {}", name,
+                meant.empty() ? "" : fmt::format(" (did you mean {}?)", meant), fmt::join(names, ", "));
 }
 
 std::string findSequence(const std::string &name) { return find(name, "data", {""}); }

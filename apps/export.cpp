@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole export: the map and the trajectory of a run for other tools.
 #include "commands.h"
+#include "geometry/failure.h"
 
 #include "exchange/exchange.h"
 
@@ -9,7 +10,6 @@
 #include <fmt/format.h>
 #include <memory>
 #include <string>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -41,8 +41,7 @@ void addExport(CLI::App &app)
     std::optional<GeoOrigin> origin;
     if (!arguments->origin.empty()) {
       if (arguments->format != "geojson")
-        throw vpException(vpException::badValue, "--origin: %s has metres alone, must be geojson",
-                          arguments->format.c_str());
+        throw badValue("--origin: {} has metres alone, must be geojson", arguments->format);
       origin = parseOrigin(arguments->origin);
     }
     const auto format = std::find_if(kExportFormats.begin(), kExportFormats.end(),

@@ -2,6 +2,7 @@
 // bole follow: vpMbTrunkTracker over a video of one's own, in the map of an earlier flight.
 #include "commands.h"
 #include "data_files.h"
+#include "geometry/failure.h"
 #include "interrupt.h"
 #include "localiser.h"
 #include "overlay_window.h"
@@ -329,11 +330,9 @@ void follow(const FollowArguments &arguments)
   const std::optional<Pose> given = readPose(arguments.init);
   const bool is_click = arguments.init == "click", is_map = arguments.init == "map";
   if (!given && !is_click && !is_map)
-    throw vpException(vpException::badValue,
-                      fmt::format("--init = {}, must be X,Y,Z,YAW, click or map", arguments.init));
+    throw badValue("--init = {}, must be X,Y,Z,YAW, click or map", arguments.init);
   if ((arguments.is_shown || is_click) && std::getenv("DISPLAY") == nullptr)
-    throw vpException(vpException::ioError, fmt::format("{}: DISPLAY is not set, must name an X11 display",
-                                                        is_click ? "--init click" : "--show"));
+    throw ioError("{}: DISPLAY is not set, must name an X11 display", is_click ? "--init click" : "--show");
   const std::unique_ptr<FrameSource> source = LiveVideoSource::accepts(arguments.input)
                                                   ? openStream(arguments.input, arguments.source, arguments.give_up_s)
                                                   : openSource(arguments.input, arguments.source);
@@ -379,7 +378,7 @@ void follow(const FollowArguments &arguments)
   }
   progress.finish();
   if (output.frames() == 0)
-    throw vpException(vpException::ioError, fmt::format("{}: no frames", arguments.input));
+    throw ioError("{}: no frames", arguments.input);
   const bool is_trusted = output.finish();
   if (!arguments.is_quiet)
     fmt::print("{}{}: {}\n", arguments.folder, interrupted() ? " (interrupted)" : "", output.text());

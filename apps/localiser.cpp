@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "localiser.h"
+#include "geometry/failure.h"
 
 #include "geometry/cylinder.h"
 #include "mbt/cao_reader.h"
 #include "output/trunks_csv.h"
 
 #include <filesystem>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -44,8 +44,7 @@ std::vector<TrunkRecord> readKnownMap(const std::string &path)
     }
   }
   if (map.size() < 3)
-    throw vpException(vpException::badValue, "%s: %d trunks, must be at least 3", path.c_str(),
-                      static_cast<int>(map.size()));
+    throw badValue("{}: {} trunks, must be at least 3", path, map.size());
   return map;
 }
 

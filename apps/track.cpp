@@ -2,6 +2,7 @@
 // bole track: from a flight through trees to a map of trunks and a trajectory.
 #include "commands.h"
 #include "data_files.h"
+#include "geometry/failure.h"
 #include "interrupt.h"
 #include "overlay_window.h"
 #include "track_arguments.h"
@@ -263,7 +264,7 @@ void track(const TrackArguments &asked_for)
 {
   TrackArguments arguments = asked_for;
   if (arguments.is_shown && std::getenv("DISPLAY") == nullptr)
-    throw vpException(vpException::ioError, "--show: DISPLAY is not set, must name an X11 display");
+    throw ioError("--show: DISPLAY is not set, must name an X11 display");
   const Options asked = readOptions(arguments, false); // a mistake in them is said before the input is waited for
   RunSummary made = describeRun(arguments);
   SensorCalibration calibration;
@@ -292,7 +293,7 @@ void track(const TrackArguments &asked_for)
   if (fly(arguments, *source, is_live, pipeline, output, flight) == 0) {
     if (interrupted())
       endWith(ExitCode::interrupted);
-    throw vpException(vpException::ioError, "%s: no frames", arguments.input.c_str());
+    throw ioError("{}: no frames", arguments.input);
   }
   const bool is_interrupted = interrupted(); // from here on the run is completed, whoever goes away
   flight.finish();

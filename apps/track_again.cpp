@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole track --again and --resume: a run is repeated or completed from what its folder holds.
+#include "geometry/failure.h"
 #include "track_arguments.h"
 
 #include "output/versions.h"
@@ -9,7 +10,6 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -22,7 +22,7 @@ std::string bytesOf(const fs::path &path)
 {
   std::ifstream file(path, std::ios::binary);
   if (!file)
-    throw vpException(vpException::ioError, "%s: cannot be read", path.c_str());
+    throw ioError("{}: cannot be read", path.string());
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
@@ -32,13 +32,13 @@ Json summaryOf(const fs::path &run)
   Json json = Json::parse(bytesOf(path), nullptr, false);
   try {
     if (json.at("command").size() < 2 || json["command"][1] != "track")
-      throw vpException(vpException::badValue, "%s: command: must be one of `bole track`", path.c_str());
+      throw badValue("{}: command: must be one of `bole track`", path.string());
     json.at("input").at("source").get<std::string>();
     json.at("frames").at("all").get<std::size_t>();
     json.at("working_folder");
   }
   catch (const Json::exception &error) {
-    throw vpException(vpException::badValue, "%s: %s", path.c_str(), error.what());
+    throw badValue("{}: {}", path.string(), error.what());
   }
   return json;
 }
@@ -56,11 +56,10 @@ TrackArguments argumentsOf(const Json &summary, const fs::path &run)
     settle(*track, *arguments);
   }
   catch (const CLI::ParseError &error) {
-    throw vpException(vpException::badValue, "%s/summary.json: command: %s", run.c_str(), error.what());
+    throw badValue("{}/summary.json: command: {}", run.string(), error.what());
   }
   if (ArDroneSource::accepts(arguments->input))
-    throw vpException(vpException::badValue, "%s: a live flight cannot be repeated; `bole record` keeps one",
-                      arguments->input.c_str());
+    throw badValue("{}: a live flight cannot be repeated; `bole record` keeps one", arguments->input);
   arguments->config = (run / "options.yaml").string();
   arguments->settings.clear();
   arguments->camera_height = 0; // among the options
@@ -74,8 +73,7 @@ void requireAlone(const CLI::App &command, const std::string &name)
   for (const CLI::Option *option : command.get_options())
     if (option->count() > 0 && !option->check_lname(name) && !option->check_lname("output") &&
         !option->check_lname("quiet"))
-      throw vpException(vpException::badValue, "--%s repeats a run as it was made: %s does not go with it",
-                        name.c_str(), option->get_name().c_str());
+      throw badValue("--{} repeats a run as it was made: {} does not go with it", name, option->get_name());
 }
 
 /// Paths of the command line are those of the folder in which the run was made.
@@ -87,8 +85,7 @@ void enterFolderOf(const Json &summary)
   std::error_code error;
   fs::current_path(folder, error);
   if (error)
-    throw vpException(vpException::ioError, "%s: the run was made in this folder, which cannot be entered: %s",
-                      folder.c_str(), error.message().c_str());
+    throw ioError("{}: the run was made in this folder, which cannot be entered: {}", folder, error.message());
 }
 
 void sayChanges(const Json &before, const Json &now)
@@ -146,8 +143,7 @@ void resume(const CLI::App &command, const TrackArguments &given)
 {
   requireAlone(command, "resume");
   if (!given.run.empty())
-    throw vpException(vpException::badValue,
-                      "--resume completes a run in its own folder: --output does not go with it");
+    throw badValue("--resume completes a run in its own folder: --output does not go with it");
   const fs::path run = fs::absolute(given.resumed);
   const Json summary = summaryOf(run);
   if (summary.value("complete", true)) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
 #include "commands.h"
+#include "geometry/failure.h"
 #include "interrupt.h"
 
 #include "lab/baseline/comparison_report.h"
@@ -13,7 +14,6 @@
 #include <fmt/format.h>
 #include <iterator>
 #include <memory>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -157,8 +157,7 @@ void run(const CompareArguments &arguments)
   fs::create_directories(arguments.out);
   const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
   if (model.empty())
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m));
+    throw badValue("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m);
   const std::string cao = (fs::path(arguments.out) / "truth.cao").string();
   writeCao(cao, model, "the trunks of " + flight.name + " as they are");
 

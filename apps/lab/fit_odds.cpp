@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole fit-odds: the weights of the final decision, from flights with known trunks.
 #include "commands.h"
+#include "geometry/failure.h"
 
 #include "evaluation/trajectory_metrics.h"
 #include "input/truth.h"
@@ -37,7 +38,7 @@ Rows rowsOf(const std::string &sequence)
   const auto source = openSource(sequence);
   const std::vector<TruthTrunk> truth = readTruthTrunks(sequence);
   if (truth.empty())
-    throw vpException(vpException::badValue, "%s: no trees.csv: nothing to learn from", sequence.c_str());
+    throw badValue("{}: no trees.csv: nothing to learn from", sequence);
   Engine engine(source->camera(), source->bMc(), stageOptions({}, source->camera()));
   Frame frame;
   Trajectory poses;

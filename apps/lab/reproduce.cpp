@@ -3,6 +3,7 @@
 #include "commands.h"
 #include "data_files.h"
 #include "detector_statistics.h"
+#include "geometry/failure.h"
 #include "paper_figures.h"
 
 #include "geometry/median.h"
@@ -23,7 +24,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
-#include <visp3/core/vpException.h>
 
 namespace bole::apps
 {
@@ -202,7 +202,7 @@ void reproduce(const ReproduceArguments &arguments)
     return;
   }
   if (arguments.output.empty())
-    throw vpException(vpException::badValue, "reproduce: -o FOLDER or --statistics FLIGHT, one must be given");
+    throw badValue("reproduce: -o FOLDER or --statistics FLIGHT, one must be given");
   std::vector<std::string> flights = arguments.flights;
   fs::create_directories(arguments.output);
   if (flights.empty()) {

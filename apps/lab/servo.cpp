@@ -2,6 +2,7 @@
 // bole servo: flying by trunks, closed over rendered images and the tracker.
 #include "commands.h"
 #include "data_files.h"
+#include "geometry/failure.h"
 #include "interrupt.h"
 #include "overlay_window.h"
 
@@ -206,7 +207,7 @@ std::string runFolder(const ServoArguments &arguments, std::uint64_t seed)
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
-    throw vpException(vpException::ioError, "%s: cannot be made: %s", folder.c_str(), error.message().c_str());
+    throw ioError("{}: cannot be made: {}", folder, error.message());
   return folder;
 }
 
@@ -277,8 +278,7 @@ void run(ServoArguments &arguments)
   arguments.trial.loop.fault.sensor = fault.sensor;
   arguments.trial.perception = perceptionFromString(arguments.perception);
   if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
-    throw vpException(vpException::badValue, "fault = %s with perception = truth, must be none: no image is looked at",
-                      arguments.fault.c_str());
+    throw badValue("fault = {} with perception = truth, must be none: no image is looked at", arguments.fault);
   arguments.trial.loop.validate();
   OverlayWindow window(arguments.is_shown, "bole servo");
   endAtInterrupt();

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/address.h"
+#include "geometry/failure.h"
 
-#include <bole/visp.h>
 #include <charconv>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -17,8 +16,7 @@ double readNumber(const std::string &address, const std::string &key, const std:
   double number = 0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
   if (error != std::errc() || end != value.data() + value.size() || !(number >= low && number <= high))
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: {} = {}, must be a number from {} to {}", address, key, value, low, high));
+    throw badValue("{}: {} = {}, must be a number from {} to {}", address, key, value, low, high);
   return number;
 }
 } // namespace
@@ -28,8 +26,7 @@ bool ArDroneAddress::accepts(const std::string &text) { return text.rfind(kSchem
 ArDroneAddress ArDroneAddress::parse(const std::string &address)
 {
   if (!accepts(address))
-    throw vpException(vpException::badValue,
-                      fmt::format("address = {}, must be ardrone://HOST[?key=value&...]", address));
+    throw badValue("address = {}, must be ardrone://HOST[?key=value&...]", address);
   ArDroneAddress out;
   const std::size_t question = address.find('?');
   std::string host =
@@ -37,9 +34,7 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
   while (!host.empty() && host.back() == '/')
     host.pop_back();
   if (host.find(':') != std::string::npos)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: host = {}, must be without a port; give ?offset=N, or ?navdata=N&video=N&at=N",
-                                  address, host));
+    throw badValue("{}: host = {}, must be without a port; give ?offset=N, or ?navdata=N&video=N&at=N", address, host);
   if (!host.empty())
     out.host = host;
 
@@ -68,14 +63,12 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
     else if (key == "video_delay_ms")
       out.video_delay_s = readNumber(address, key, value, 0, 500) / 1000;
     else
-      throw vpException(vpException::badValue, fmt::format("{}: key = {}, must be one of offset, navdata, video, at, "
-                                                           "generation, camera, video_delay_ms",
-                                                           address, key));
+      throw badValue("{}: key = {}, must be one of offset, navdata, video, at, generation, camera, video_delay_ms",
+                     address, key);
   }
   for (std::uint16_t *p : {&out.navdata_port, &out.video_port, &out.at_port}) {
     if (*p + offset > 65535)
-      throw vpException(vpException::badValue,
-                        fmt::format("{}: offset = {}, must keep every port below 65536", address, offset));
+      throw badValue("{}: offset = {}, must keep every port below 65536", address, offset);
     *p = static_cast<std::uint16_t>(*p + offset);
   }
   return out;

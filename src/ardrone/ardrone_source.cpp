@@ -3,6 +3,7 @@
 
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 #include "input/frame_health.h"
 #include "input/rectifier.h"
@@ -10,7 +11,6 @@
 #include <atomic>
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -24,9 +24,8 @@ CameraModel fitted(CameraModel camera, int width, int height, const std::string 
 {
   const double factor = static_cast<double>(width) / camera.pinhole.width;
   if (std::abs(factor * camera.pinhole.height - height) > kShapeTolerance * height)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("{}: resolution = {}x{}, must be of the shape of the drone's images, {}x{}", where,
-                                  camera.pinhole.width, camera.pinhole.height, width, height));
+    throw dimensionError("{}: resolution = {}x{}, must be of the shape of the drone's images, {}x{}", where,
+                         camera.pinhole.width, camera.pinhole.height, width, height);
   camera.pinhole = camera.pinhole.scaled(factor);
   camera.pinhole.width = width;
   camera.pinhole.height = height;
@@ -124,7 +123,7 @@ void ArDroneSource::Options::validate() const
   grabber.validate();
   requireRange("give_up_s", give_up_s, 0.5, 86400);
   if (max_width_px != 0 && max_width_px < 64)
-    throw vpException(vpException::badValue, "max_width_px = %d, must be 0 or at least 64 px", max_width_px);
+    throw badValue("max_width_px = {}, must be 0 or at least 64 px", max_width_px);
 }
 
 ArDroneSource::ArDroneSource(const std::string &address) : ArDroneSource(address, Options{}) {}

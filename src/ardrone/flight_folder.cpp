@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/flight_folder.h"
+#include "geometry/failure.h"
 #include "input/asl_text.h"
 #include "input/picture_codec.h"
 
@@ -10,7 +11,6 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <unistd.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -22,7 +22,7 @@ int create(const fs::path &path, const std::string &head)
 {
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor < 0 || ::write(descriptor, head.data(), head.size()) != static_cast<ssize_t>(head.size()))
-    throw vpException(vpException::ioError, fmt::format("{}: {}", path.string(), std::strerror(errno)));
+    throw ioError("{}: {}", path.string(), std::strerror(errno));
   return descriptor;
 }
 
@@ -52,7 +52,7 @@ FlightFolder::~FlightFolder()
 void FlightFolder::append(int descriptor, const std::string &line)
 {
   if (::write(descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
-    throw vpException(vpException::ioError, fmt::format("{}: {}", m_cam0, std::strerror(errno)));
+    throw ioError("{}: {}", m_cam0, std::strerror(errno));
 }
 
 void FlightFolder::write(const LiveFrame &frame)
@@ -77,7 +77,7 @@ void FlightFolder::write(const LiveFrame &frame)
     frame.picture.toGrey(image);
     const std::string part = m_cam0 + "/part.png";
     if (!(std::ofstream(part, std::ios::binary) << encodePng(image)).flush())
-      throw vpException(vpException::ioError, part + ": cannot be written");
+      throw ioError("{}: cannot be written", part);
     fs::rename(part, fs::path(m_cam0) / "data" / name);
   }
   append(m_images_csv, fmt::format("{},{}\n", stamp_ns, name));

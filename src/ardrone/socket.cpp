@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/socket.h"
+#include "geometry/failure.h"
 
 #include <arpa/inet.h>
-#include <bole/visp.h>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <netdb.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -48,8 +46,7 @@ Socket bindTo(const std::string &host, std::uint16_t port, int type)
   setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
   if (!address || descriptor < 0 ||
       bind(descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
-    throw vpException(vpException::ioError, fmt::format("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP",
-                                                        port, host, std::strerror(errno)));
+    throw ioError("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port, host, std::strerror(errno));
   setNonBlocking(descriptor);
   return owner;
 }
@@ -104,7 +101,7 @@ Socket Socket::listenTcp(const std::string &host, std::uint16_t port)
 {
   Socket socket = bindTo(host, port, SOCK_STREAM);
   if (listen(socket.m_descriptor, 4) != 0)
-    throw vpException(vpException::ioError, fmt::format("TCP port {} of {}: {}", port, host, std::strerror(errno)));
+    throw ioError("TCP port {} of {}: {}", port, host, std::strerror(errno));
   return socket;
 }
 

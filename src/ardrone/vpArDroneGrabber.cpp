@@ -3,11 +3,11 @@
 
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 void vpArDroneGrabber::Options::validate() const
 {
@@ -75,9 +75,9 @@ void vpArDroneGrabber::waitForFirstImage()
   } while (bole::steadyNowNs() < end_ns);
   const bool answered = m_state->link->counters().connections > 0;
   close();
-  throw vpException(vpException::ioError, fmt::format("{}: {} within {} s{}{}", m_state->address.toString(),
-                                                      answered ? "no whole image" : "no drone answers",
-                                                      m_state->options.open_timeout_s, why.empty() ? "" : ": ", why));
+  throw bole::ioError("{}: {} within {} s{}{}", m_state->address.toString(),
+                      answered ? "no whole image" : "no drone answers", m_state->options.open_timeout_s,
+                      why.empty() ? "" : ": ", why);
 }
 
 void vpArDroneGrabber::open(vpImage<unsigned char> &I)
@@ -141,6 +141,6 @@ bole::LinkCounters vpArDroneGrabber::getCounters() const
 bole::DroneLink &vpArDroneGrabber::getLink()
 {
   if (!m_state->link)
-    throw vpException(vpException::notInitialized, "the grabber is not open: call open() or connect() first");
+    throw bole::notInitialized("the grabber is not open: call open() or connect() first");
   return *m_state->link;
 }

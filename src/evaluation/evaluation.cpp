@@ -2,6 +2,7 @@
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
 #include "evaluation/visibility.h"
+#include "geometry/failure.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
 #include "output/summary_json.h"
@@ -9,8 +10,6 @@
 #include <bole/evaluation.h>
 
 #include <filesystem>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -80,8 +79,7 @@ Reference readSequence(const std::string &sequence)
 {
   const AslSource source(sequence);
   if (source.truth().empty())
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence));
+    throw ioError("{}: no ground truth (state_groundtruth_estimate0/data.csv)", sequence);
   Reference reference;
   reference.trajectory = source.truth();
   reference.odometry = source.odometry();
@@ -97,7 +95,7 @@ Reference readRun(const std::string &run)
   Reference reference;
   reference.trajectory = readTumTrajectory(run + "/trajectory.tum");
   if (reference.trajectory.empty())
-    throw vpException(vpException::ioError, fmt::format("{}/trajectory.tum: no poses", run));
+    throw ioError("{}/trajectory.tum: no poses", run);
   reference.frames = reference.trajectory.size();
   reference.first_stamp_ns = reference.trajectory.front().stamp_ns;
   for (const TrunkRecord &trunk : readTrunks(run + "/trunks.csv"))
@@ -130,10 +128,9 @@ std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns, co
     pose.stamp_ns += shift_ns;
   std::vector<PosePair> pairs = pairPoses(estimate, truth);
   if (pairs.empty())
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: none of its stamps lies in the ground truth's; if the run was live, "
-                                  "--align-time finds the shift of its clock",
-                                  path));
+    throw badValue("{}: none of its stamps lies in the ground truth's; if the run was live, --align-time finds the "
+                   "shift of its clock",
+                   path);
   return pairs;
 }
 
@@ -142,7 +139,7 @@ std::int64_t shiftOf(const std::string &path, const Reference &reference)
 {
   const Trajectory estimate = readTumTrajectory(path);
   if (estimate.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no poses", path));
+    throw ioError("{}: no poses", path);
   return motionShift(estimate, reference.trajectory, reference.first_stamp_ns - estimate.front().stamp_ns);
 }
 } // namespace
@@ -151,7 +148,7 @@ Evaluation evaluate(const std::string &run, const std::string &sequence, const E
 {
   const auto in_run = [&](const char *name) { return (std::filesystem::path(run) / name).string(); };
   if (!std::filesystem::is_directory(run))
-    throw vpException(vpException::ioError, fmt::format("{}: no such folder", run));
+    throw ioError("{}: no such folder", run);
 
   Evaluation evaluation;
   evaluation.run = run;

@@ -2,6 +2,7 @@
 #include "exchange/exchange.h"
 
 #include "geometry/cylinder.h"
+#include "geometry/failure.h"
 #include "mbt/cao_reader.h"
 #include "output/atomic_file.h"
 #include "output/summary_json.h"
@@ -10,7 +11,6 @@
 #include <bole/graph.h>
 
 #include <filesystem>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -29,8 +29,7 @@ MapOfRun readMapOfRun(const std::string &run)
   MapOfRun map;
   map.reference = readReference(run + "/summary.json");
   if (!map.reference.has_ranges)
-    throw vpException(vpException::badValue, "%s: the camera only rotated, so that there is no map to be exported",
-                      run.c_str());
+    throw badValue("{}: the camera only rotated, so that there is no map to be exported", run);
   map.name = std::filesystem::path(run).lexically_normal().filename().string();
   map.camera = readCameraOfRun(run + "/summary.json");
   map.trunks = readTrunks(run + "/trunks.csv");
@@ -53,14 +52,13 @@ void exportRun(const std::string &run, const std::string &format, const std::str
     std::error_code error;
     std::filesystem::create_directories(file, error);
     if (error)
-      throw vpException(vpException::ioError, "%s: cannot be made: %s", file.c_str(), error.message().c_str());
+      throw ioError("{}: cannot be made: {}", file, error.message());
     writeAtomically(file + "/cameras.txt", toColmapCameras(map));
     writeAtomically(file + "/images.txt", toColmapImages(map));
     writeAtomically(file + "/points3D.txt", toColmapPoints(map));
   }
   else if (map.trunks.empty())
-    throw vpException(vpException::badValue, "%s/trunks.csv: no trunk, so that there is no map to be exported",
-                      run.c_str());
+    throw badValue("{}/trunks.csv: no trunk, so that there is no map to be exported", run);
   else if (format == "cao") {
     std::vector<Cylinder> cylinders;
     for (const TrunkRecord &trunk : map.trunks)

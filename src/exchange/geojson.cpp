@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "exchange/exchange.h"
+#include "geometry/constants.h"
+#include "geometry/failure.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-constexpr double kDegree = M_PI / 180;
-
 /// To one part of \p parts and no farther: what lies behind is noise.
 double rounded(double value, double parts) { return std::round(value * parts) / parts; }
 } // namespace
@@ -25,9 +24,7 @@ GeoOrigin parseOrigin(const std::string &text)
   stream >> origin.latitude >> comma[0] >> origin.longitude >> comma[1] >> origin.heading;
   const bool is_read = !stream.fail() && comma[0] == ',' && comma[1] == ',' && !(stream >> rest);
   if (!is_read || std::abs(origin.latitude) > 89 || std::abs(origin.longitude) > 180 || std::abs(origin.heading) > 360)
-    throw vpException(vpException::badValue,
-                      "--origin %s: must be LATITUDE,LONGITUDE,HEADING in degrees, within 89, 180 and 360",
-                      text.c_str());
+    throw badValue("--origin {}: must be LATITUDE,LONGITUDE,HEADING in degrees, within 89, 180 and 360", text);
   return origin;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include "geometry/names.h"
 #include "input/camera_plausibility.h"
 #include "input/sensor_yaml.h"
@@ -145,8 +146,7 @@ std::set<std::string> cameraNames(const std::string &path)
     names.insert(name.substr(first, name.find_last_not_of(blanks) + 1 - first));
   }
   if (names.size() > kMostNames)
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: {} names in it, must be at most {}", path, names.size(), kMostNames));
+    throw ioError("{}: {} names in it, must be at most {}", path, names.size(), kMostNames);
   return names;
 }
 
@@ -180,20 +180,20 @@ MountedCamera readXml(const std::string &path, int width, int height)
       found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
   }
   catch (const vpException &error) { // ViSP refuses what it reads, without the name of the file
-    throw vpException(vpException::badValue, fmt::format("{}: {}", path, error.getStringMessage()));
+    throw badValue("{}: {}", path, error.getStringMessage());
   }
   const std::string size = width > 0 ? fmt::format(" for {}x{} images", width, height) : "";
   if (found != 1)
-    throw vpException(vpException::ioError, fmt::format("{}: {} ViSP cameras{} in it, must be one", path, found, size));
+    throw ioError("{}: {} ViSP cameras{} in it, must be one", path, found, size);
   PinholeCamera &pinhole = camera.model.pinhole;
   if (pinhole.width == 0 || pinhole.height == 0) {
     pinhole.width = width;
     pinhole.height = height;
   }
   if (!(pinhole.fx > 0) || !(pinhole.fy > 0) || pinhole.width <= 0 || pinhole.height <= 0)
-    throw vpException(vpException::ioError, fmt::format("{}: px, py, image_width and image_height must be > 0", path));
+    throw ioError("{}: px, py, image_width and image_height must be > 0", path);
   if (const Implausibility fault = implausibility(camera); fault.part != Implausibility::Part::none)
-    throw vpException(vpException::badValue, fmt::format("{}: {}", path, fault.text));
+    throw badValue("{}: {}", path, fault.text);
   return camera;
 }
 } // namespace
@@ -208,10 +208,10 @@ Pose forwardCamera()
 MountedCamera readCamera(const std::string &path, int width, int height)
 {
   if (!std::filesystem::is_regular_file(path))
-    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+    throw ioError("{}: no such file", path);
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension != ".xml" && extension != ".yaml" && extension != ".yml")
-    throw vpException(vpException::ioError, fmt::format("{}: a camera file must end in .yaml, .yml or .xml", path));
+    throw ioError("{}: a camera file must end in .yaml, .yml or .xml", path);
   return extension == ".xml" ? readXml(path, width, height) : readYaml(path);
 }
 

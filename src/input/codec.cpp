@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/codec.h"
+#include "geometry/failure.h"
 #include "input/libav.h"
 
 #include <algorithm>
@@ -7,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -26,7 +26,7 @@ LibavPtr<AVCodecContext> allocateContext(const AVCodec *codec)
 {
   LibavPtr<AVCodecContext> context(avcodec_alloc_context3(codec));
   if (!context)
-    throw vpException(vpException::memoryAllocationError, "no memory for a codec");
+    throw memoryAllocationError("no memory for a codec");
   context->thread_count = 1; // frame threads would delay by a frame each
   return context;
 }
@@ -39,7 +39,7 @@ const AVCodec *findEncoder(const PictureEncoder::Settings &settings)
   if (codec == nullptr && settings.may_be_mpeg4)
     codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
   if (codec == nullptr)
-    throw vpException(vpException::fatalError, "libavcodec was built without an H.264 encoder");
+    throw fatalError("libavcodec was built without an H.264 encoder");
   return codec;
 }
 } // namespace
@@ -58,7 +58,7 @@ void checkLibav(int code, const std::string &what)
     return;
   std::array<char, AV_ERROR_MAX_STRING_SIZE> reason{};
   av_strerror(code, reason.data(), reason.size());
-  throw vpException(vpException::ioError, fmt::format("{}: {}", what, reason.data()));
+  throw ioError("{}: {}", what, reason.data());
 }
 
 PictureDecoder::PictureDecoder(LibavPtr<AVCodecContext> context)
@@ -73,7 +73,7 @@ PictureDecoder::PictureDecoder(const AVCodecParameters &stream)
     : PictureDecoder([&stream] {
         const AVCodec *codec = avcodec_find_decoder(stream.codec_id);
         if (codec == nullptr)
-          throw vpException(vpException::ioError, "the codec is not known");
+          throw ioError("the codec is not known");
         LibavPtr<AVCodecContext> context = allocateContext(codec);
         avcodec_parameters_to_context(context.get(), &stream);
         context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
@@ -87,7 +87,7 @@ PictureDecoder PictureDecoder::h264()
 {
   const AVCodec *codec = avcodec_find_decoder(AV_CODEC_ID_H264);
   if (codec == nullptr)
-    throw vpException(vpException::fatalError, "libavcodec was built without an H.264 decoder");
+    throw fatalError("libavcodec was built without an H.264 decoder");
   LibavPtr<AVCodecContext> context = allocateContext(codec);
   context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   context->err_recognition = AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_AGGRESSIVE | AV_EF_EXPLODE;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/csv_reader.h"
+#include "geometry/failure.h"
 
-#include <bole/visp.h>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -81,10 +80,10 @@ bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
 CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_path(path), m_format(std::move(format))
 {
   if (!std::filesystem::is_regular_file(path))
-    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+    throw ioError("{}: no such file", path);
   m_file.open(path, std::ios::binary);
   if (!m_file)
-    throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
+    throw ioError("{}: cannot be read", path);
   if (m_format.header.empty())
     return;
   std::string line;
@@ -96,10 +95,7 @@ CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_path(path), 
     fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(trimmed(line)), m_format.header));
 }
 
-void CsvReader::fail(const std::string &message) const
-{
-  throw vpException(vpException::ioError, fmt::format("{}:{}: {}", m_path, m_line, message));
-}
+void CsvReader::fail(const std::string &message) const { throw ioError("{}:{}: {}", m_path, m_line, message); }
 
 void CsvReader::split(const std::string &line)
 {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
+#include "geometry/failure.h"
 
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -86,11 +86,10 @@ void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int6
 {
   if (odometry.empty() || (odometry.front().stamp_ns <= last_ns && odometry.back().stamp_ns >= first_ns))
     return;
-  throw vpException(vpException::badValue,
-                    fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s "
-                                "(odometry_offset_s, --odometry-offset, shifts them)",
-                                odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9,
-                                source, first_ns * 1e-9, last_ns * 1e-9));
+  throw badValue("{}: its stamps {:.3f} to {:.3f} s never meet those of {}, {:.3f} to {:.3f} s (odometry_offset_s, "
+                 "--odometry-offset, shifts them)",
+                 odometry_path, odometry.front().stamp_ns * 1e-9, odometry.back().stamp_ns * 1e-9, source,
+                 first_ns * 1e-9, last_ns * 1e-9);
 }
 
 MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note)
@@ -106,9 +105,8 @@ MountedCamera cameraFor(const SourceOptions &options, int width, int height, std
   const MountedCamera camera = readCamera(options.camera_path, width, height);
   const PinholeCamera &pinhole = camera.model.pinhole;
   if (pinhole.width != width || pinhole.height != height)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("{}: resolution = {}x{}, must be {}x{} as the images are", options.camera_path,
-                                  pinhole.width, pinhole.height, width, height));
+    throw dimensionError("{}: resolution = {}x{}, must be {}x{} as the images are", options.camera_path, pinhole.width,
+                         pinhole.height, width, height);
   return camera;
 }
 } // namespace bole

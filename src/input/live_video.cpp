@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/live_video.h"
+#include "geometry/failure.h"
 #include "input/video_source.h"
 
 #include <bole/visp.h>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
-#include <fmt/format.h>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -39,7 +39,7 @@ PictureReader openCamera(const std::string &device)
 {
 #ifdef VISP_HAVE_V4L2
   if (!std::filesystem::exists(device))
-    throw vpException(vpException::ioError, fmt::format("{}: no camera: there is no such device", device));
+    throw ioError("{}: no camera: there is no such device", device);
   auto grabber = std::make_shared<vpV4l2Grabber>();
   grabber->setDevice(device);
   grabber->setScale(1);
@@ -48,7 +48,7 @@ PictureReader openCamera(const std::string &device)
     grabber->open(image);
   }
   catch (const vpException &error) {
-    throw vpException(vpException::ioError, fmt::format("{}: no camera: {}", device, error.getStringMessage()));
+    throw ioError("{}: no camera: {}", device, error.getStringMessage());
   }
   return [grabber, first_ns = std::int64_t(-1)](Picture &picture) mutable {
     timeval stamp{};
@@ -60,8 +60,7 @@ PictureReader openCamera(const std::string &device)
     return true;
   };
 #else
-  throw vpException(vpException::notImplementedError,
-                    fmt::format("{}: this ViSP was built without V4L2, no camera can be read", device));
+  throw notImplementedError("{}: this ViSP was built without V4L2, no camera can be read", device);
 #endif
 }
 
@@ -114,7 +113,7 @@ struct LiveVideoSource::State
     for (int i = 0; i < kMostDamaged && reader(picture); ++i)
       if (!picture.is_damaged)
         return picture;
-    throw vpException(vpException::ioError, fmt::format("{}: no picture that can be decoded", address));
+    throw ioError("{}: no picture that can be decoded", address);
   }
 
   /// Takes every picture, and connects again when none comes any more.
@@ -131,7 +130,7 @@ struct LiveVideoSource::State
         }
         Picture picture;
         if (!reader(picture))
-          throw vpException(vpException::ioError, fmt::format("{}: the stream ended", address));
+          throw ioError("{}: the stream ended", address);
         const std::int64_t arrived_ns = now_ns();
         if (std::exchange(is_first, false))
           offset_ns = arrived_ns - begun_ns - picture.stamp_ns;
@@ -176,10 +175,9 @@ LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions
 {
   options.validate();
   if (!(give_up_s > 0 && give_up_s <= 86400))
-    throw vpException(vpException::badValue, "give_up_s = %g, must be in (0, 86400]", give_up_s);
+    throw badValue("give_up_s = {:g}, must be in (0, 86400]", give_up_s);
   if (!options.odometry_path.empty())
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: a live stream has no odometry file ({})", address, options.odometry_path));
+    throw badValue("{}: a live stream has no odometry file ({})", address, options.odometry_path);
   m_name = address;
   m_state = std::make_unique<State>();
   State &state = *m_state;

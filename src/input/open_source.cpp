@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 #include "input/asl_source.h"
 #include "input/live_video.h"
@@ -7,8 +8,6 @@
 #include <bole/open_source.h>
 
 #include <filesystem>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -31,8 +30,7 @@ std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOp
     return std::make_unique<AslSource>(input, options);
   if (std::filesystem::is_directory(input)) {
     if (SequenceSource::patternOf(input).empty())
-      throw vpException(vpException::ioError,
-                        fmt::format("{}: must be an ASL folder (cam0/data.csv) or hold numbered images", input));
+      throw ioError("{}: must be an ASL folder (cam0/data.csv) or hold numbered images", input);
     return std::make_unique<SequenceSource>(input, options);
   }
   if (std::filesystem::path(input).filename().string().find('%') != std::string::npos)

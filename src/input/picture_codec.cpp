@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/picture_codec.h"
+#include "geometry/failure.h"
 #include "input/codec.h"
 
 #include <algorithm>
@@ -8,7 +9,6 @@
 #include <cstdint>
 #include <cstring>
 #include <functional>
-#include <visp3/core/vpException.h>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -116,7 +116,7 @@ std::string encoded(AVCodecID id, AVPixelFormat format, int width, int height, i
   const LibavPtr<AVFrame> frame(av_frame_alloc());
   const LibavPtr<AVPacket> packet(av_packet_alloc());
   if (codec == nullptr || !context || !frame || !packet)
-    throw vpException(vpException::fatalError, "libavcodec was built without %s", avcodec_get_name(id));
+    throw fatalError("libavcodec was built without {}", avcodec_get_name(id));
   context->width = frame->width = width;
   context->height = frame->height = height;
   context->pix_fmt = format;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/rectifier.h"
+#include "geometry/failure.h"
 
-#include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -105,8 +104,8 @@ void Rectifier::apply(vpImage<unsigned char> &image) const
   Map &map = *m_map;
   const int width = static_cast<int>(image.getWidth()), height = static_cast<int>(image.getHeight());
   if (width != map.input_width || height != map.input_height)
-    throw vpException(vpException::dimensionError, fmt::format("image size = {}x{}, must be {}x{} as the camera's",
-                                                               width, height, map.input_width, map.input_height));
+    throw dimensionError("image size = {}x{}, must be {}x{} as the camera's", width, height, map.input_width,
+                         map.input_height);
   if (isIdentity())
     return;
   const cv::Size size(map.output.width, map.output.height);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/sensor_yaml.h"
 
+#include "geometry/failure.h"
 #include "input/yaml_file.h"
 
 #include <Eigen/LU>
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -14,7 +14,7 @@ namespace
 {
 [[noreturn]] void failAt(const std::string &path, const YAML::Mark &mark, const std::string &message)
 {
-  throw vpException(vpException::ioError, fmt::format("{}: {}", placeOf(path, mark), message));
+  throw ioError("{}: {}", placeOf(path, mark), message);
 }
 
 std::string dumped(const YAML::Node &node)
@@ -58,7 +58,7 @@ YAML::Node SensorYaml::at(const std::string &key) const
 {
   const YAML::Node node = m_root[key];
   if (!node)
-    throw vpException(vpException::ioError, fmt::format("{}: the key \"{}\" is missing", m_path, key));
+    throw ioError("{}: the key \"{}\" is missing", m_path, key);
   return node;
 }
 
@@ -71,7 +71,7 @@ void SensorYaml::fail(const std::string &key, const std::string &must_be) const
 void SensorYaml::refuse(const std::string &key, const std::string &message) const
 {
   if (!has(key))
-    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, message));
+    throw ioError("{}: {}", m_path, message);
   failAt(m_path, m_root[key].Mark(), fmt::format("{}: {}", key, message));
 }
 

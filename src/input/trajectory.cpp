@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/trajectory.h"
+#include "geometry/failure.h"
 #include "input/csv_reader.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -52,15 +52,14 @@ Trajectory checked(Trajectory trajectory, const std::string &path, const char *u
   constexpr double kSlowest_Hz = 0.05, kFastest_Hz = 20000;
   constexpr std::size_t kFewest = 10; // poses that have a rate
   if (trajectory.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no pose in it", path));
+    throw ioError("{}: no pose in it", path);
   if (trajectory.size() < kFewest)
     return trajectory;
   const double rate_Hz = 1e9 * static_cast<double>(trajectory.size() - 1) /
                          static_cast<double>(trajectory.back().stamp_ns - trajectory.front().stamp_ns);
   if (rate_Hz < kSlowest_Hz || rate_Hz > kFastest_Hz)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: {:.3g} poses a second, must be {:g} to {:g}: stamps must be in {}", path,
-                                  rate_Hz, kSlowest_Hz, kFastest_Hz, unit));
+    throw badValue("{}: {:.3g} poses a second, must be {:g} to {:g}: stamps must be in {}", path, rate_Hz, kSlowest_Hz,
+                   kFastest_Hz, unit);
   return trajectory;
 }
 } // namespace

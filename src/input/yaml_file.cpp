@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/yaml_file.h"
+#include "geometry/failure.h"
 
-#include <bole/visp.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <iterator>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -16,7 +15,7 @@ constexpr int kDeepest = 32;
 constexpr int kMostNodes = 100000;
 constexpr std::uintmax_t kMostBytes = 1000000; ///< of a file that people write
 
-[[noreturn]] void fail(const std::string &message) { throw vpException(vpException::ioError, "%s", message.c_str()); }
+[[noreturn]] void fail(const std::string &message) { throw ioError("{}", message); }
 
 /// The encoding, and brackets that the parser would follow into the depth.
 void checkText(const std::string &path, std::string &text)

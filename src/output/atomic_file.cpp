@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/atomic_file.h"
+#include "geometry/failure.h"
 
-#include <bole/visp.h>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -18,7 +17,7 @@ namespace
 {
 [[noreturn]] void failWith(const std::string &path, const char *what)
 {
-  throw vpException(vpException::ioError, fmt::format("{}: {}: {}", path, what, std::strerror(errno)));
+  throw ioError("{}: {}: {}", path, what, std::strerror(errno));
 }
 
 fs::path folderOf(const std::string &path)
@@ -44,7 +43,7 @@ AtomicFile::AtomicFile(std::string path) : m_path(std::move(path))
   m_temporary =
       (folderOf(m_path) / fmt::format(".{}.partial{}", target.stem().string(), target.extension().string())).string();
   if (fs::is_directory(target))
-    throw vpException(vpException::ioError, fmt::format("{}: is a folder, must be a file", m_path));
+    throw ioError("{}: is a folder, must be a file", m_path);
   const int descriptor = ::open(m_temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0)
     failWith(m_path, "cannot be written");

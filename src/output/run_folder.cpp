@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/run_folder.h"
 
+#include "geometry/failure.h"
 #include "output/atomic_file.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
@@ -9,7 +10,6 @@
 #include <filesystem>
 #include <sys/file.h>
 #include <unistd.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -20,13 +20,13 @@ RunFolder::RunFolder(std::string path) : m_path(std::move(path))
   std::error_code error;
   fs::create_directories(m_path, error);
   if (error)
-    throw vpException(vpException::ioError, "%s: cannot be made: %s", m_path.c_str(), error.message().c_str());
+    throw ioError("{}: cannot be made: {}", m_path, error.message());
   m_lock = ::open(m_path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (m_lock < 0)
-    throw vpException(vpException::ioError, "%s: cannot be opened", m_path.c_str());
+    throw ioError("{}: cannot be opened", m_path);
   if (::flock(m_lock, LOCK_EX | LOCK_NB) != 0) {
     ::close(m_lock);
-    throw vpException(vpException::ioError, "%s: another run writes into this folder", m_path.c_str());
+    throw ioError("{}: another run writes into this folder", m_path);
   }
   for (const auto &entry : fs::directory_iterator(m_path, error))
     if (AtomicFile::isTemporary(entry.path().filename().string()))

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/summary_json.h"
+#include "geometry/failure.h"
 #include "geometry/median.h"
 #include "geometry/names.h"
 #include "output/atomic_file.h"
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -155,8 +155,7 @@ template <typename Source> Source sourceOf(const std::string &path, const Json &
     return static_cast<Source>(0);
   if (const auto source = valueNamed(json.value(key, ""), last))
     return *source;
-  throw vpException(vpException::badValue, "%s: %s = \"%s\", is no known source", path.c_str(), key,
-                    json.value(key, "").c_str());
+  throw badValue("{}: {} = \"{}\", is no known source", path, key, json.value(key, ""));
 }
 
 double numberOrZero(const Json &json, const char *key)
@@ -169,7 +168,7 @@ Json readObject(const std::string &path)
   std::ifstream file(path);
   Json json = Json::parse(file, nullptr, false);
   if (!json.is_object())
-    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+    throw badValue("{}: is no summary of a run", path);
   return json;
 }
 } // namespace
@@ -195,7 +194,7 @@ PinholeCamera readCameraOfRun(const std::string &path)
             camera.at("cy_px"), camera.at("width_px"), camera.at("height_px")};
   }
   catch (const Json::exception &error) {
-    throw vpException(vpException::badValue, "%s: camera: %s", path.c_str(), error.what());
+    throw badValue("{}: camera: {}", path, error.what());
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/video_writer.h"
+#include "geometry/failure.h"
 #include "input/codec.h"
 #include "output/atomic_file.h"
 
@@ -63,7 +64,7 @@ void VideoWriter::Libav::open(int w, int h, const std::string &name)
     encoder.emplace(settings);
   }
   catch (const vpException &error) {
-    throw vpException(vpException::ioError, fmt::format("{}: {}", file.path(), error.getStringMessage()));
+    throw ioError("{}: {}", file.path(), error.getStringMessage());
   }
 
   AVStream *stream = avformat_new_stream(context, nullptr);
@@ -105,9 +106,8 @@ void VideoWriter::write(const vpImage<vpRGBa> &picture, std::int64_t stamp_ns)
     libav.open(static_cast<int>(libav.width) & ~1, static_cast<int>(libav.height) & ~1, libav.file.temporaryPath());
   }
   if (picture.getWidth() != libav.width || picture.getHeight() != libav.height)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("{}: picture of {}x{} px, must be {}x{}", libav.file.path(), picture.getWidth(),
-                                  picture.getHeight(), libav.width, libav.height));
+    throw dimensionError("{}: picture of {}x{} px, must be {}x{}", libav.file.path(), picture.getWidth(),
+                         picture.getHeight(), libav.width, libav.height);
   const std::int64_t pts = av_rescale_q(stamp_ns - libav.first_ns, {1, 1'000'000'000}, kTimeBase);
   if (pts <= libav.last_pts)
     return;

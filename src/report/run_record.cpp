@@ -2,6 +2,7 @@
 #include "report/run_record.h"
 
 #include "evaluation/trajectory_metrics.h"
+#include "geometry/failure.h"
 #include "input/asl_source.h"
 #include "input/csv_reader.h"
 #include "output/summary_json.h"
@@ -11,7 +12,6 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -35,7 +35,7 @@ void readSummaryInto(RunRecord &run, const std::string &path)
 {
   const Json json = Json::parse(bytesOf(path), nullptr, false);
   if (!json.is_object() || !json.contains("input") || !json.contains("facts"))
-    throw vpException(vpException::badValue, "%s: is no summary of a run", path.c_str());
+    throw badValue("{}: is no summary of a run", path);
   try {
     run.input = textOf(json["input"], "source");
     run.sha256 = textOf(json["input"], "sha256");
@@ -52,7 +52,7 @@ void readSummaryInto(RunRecord &run, const std::string &path)
           {textOf(sensor, "sensor"), textOf(sensor, "kind"), sensor.value("since_s", 0.0), textOf(sensor, "text")});
   }
   catch (const Json::exception &error) {
-    throw vpException(vpException::badValue, "%s: %s", path.c_str(), error.what());
+    throw badValue("{}: {}", path, error.what());
   }
 }
 
@@ -73,7 +73,7 @@ TimingTable readTiming(const std::string &path)
       timing.stages.push_back(name);
   }
   if (total == 0)
-    throw vpException(vpException::badValue, "%s: has no column \"total [ms]\"", path.c_str());
+    throw badValue("{}: has no column \"total [ms]\"", path);
   CsvReader csv(path, {columns, ',', header});
   while (csv.next()) {
     FrameTiming frame;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/emulator/h264_encoder.h"
+#include "geometry/failure.h"
 
 #include <cmath>
 #include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 extern "C" {
 #include <libavcodec/packet.h>
@@ -57,8 +57,8 @@ H264Encoder::H264Encoder(int width, int height, double rate_hz, double bit_rate,
 H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, bool force_key)
 {
   if (static_cast<int>(image.getWidth()) != m_width || static_cast<int>(image.getHeight()) != m_height)
-    throw vpException(vpException::dimensionError, "image size = %ux%u, must be %dx%d as the first", image.getWidth(),
-                      image.getHeight(), m_width, m_height);
+    throw dimensionError("image size = {}x{}, must be {}x{} as the first", image.getWidth(), image.getHeight(), m_width,
+                         m_height);
   m_encoder.fill(image);
   Packet packet;
   const auto take = [&packet](const AVPacket &encoded) {
@@ -67,7 +67,7 @@ H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, boo
   };
   m_encoder.encode(std::llround(1000.0 * static_cast<double>(++m_count) / m_rate_hz), take, force_key);
   if (packet.bytes.empty())
-    throw vpException(vpException::fatalError, "libavcodec did not encode the frame");
+    throw fatalError("libavcodec did not encode the frame");
   int type = 0;
   const std::size_t first = packet.is_key ? nalSize(packet.bytes, 0, type) : 0;
   if (first > 0 && type == 7) {

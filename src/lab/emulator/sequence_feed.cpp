@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 
 #include "geometry/constants.h"
@@ -8,8 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -81,15 +80,13 @@ private:
       m_frames.push_back({time_s, frame.image, frame.wMb_odometry});
       bytes += frame.image.getSize();
       if (bytes > m_options.max_bytes)
-        throw vpException(vpException::badValue,
-                          fmt::format("{}: more than {} MB of images, must fit; give fewer frames", source.name(),
-                                      m_options.max_bytes >> 20));
+        throw badValue("{}: more than {} MB of images, must fit; give fewer frames", source.name(),
+                       m_options.max_bytes >> 20);
       if (m_frames.size() == m_options.max_frames)
         break;
     }
     if (m_frames.size() < 2)
-      throw vpException(vpException::badValue,
-                        fmt::format("{}: {} frames, must be at least 2", source.name(), m_frames.size()));
+      throw badValue("{}: {} frames, must be at least 2", source.name(), m_frames.size());
   }
 
   // Frame k of the flight: there, back, there, ...; the turning frames are shown once.
@@ -159,7 +156,7 @@ private:
 void SequenceFeedOptions::validate() const
 {
   if (generation != 1 && generation != 2)
-    throw vpException(vpException::badValue, "generation = %d, must be 1 or 2", generation);
+    throw badValue("generation = {}, must be 1 or 2", generation);
   requireRange("navdata_rate_hz", navdata_rate_hz, 1, 1000);
   requireRange("video_delay_s", video_delay_s, 0, 0.5);
 }

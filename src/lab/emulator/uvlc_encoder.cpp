@@ -2,13 +2,13 @@
 // The encoder is written from the published facts alone, by the definitions (direct cosine sums, a
 // walk along the diagonals), so that it can disagree with the decoder.
 #include "ardrone/uvlc.h"
+#include "geometry/failure.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -152,9 +152,8 @@ Size sizeCode(unsigned width, unsigned height)
     if (width == 88u << (resolution - 1) && height == 72u << (resolution - 1))
       return {1, resolution};
   }
-  throw vpException(vpException::dimensionError,
-                    "image size = %ux%u, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
-                    height);
+  throw dimensionError("image size = {}x{}, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
+                       height);
 }
 
 Block pixelsAt(const vpImage<unsigned char> &image, int left, int top)

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/faults/image_fault.h"
 
+#include "geometry/failure.h"
 #include "geometry/names.h"
 
 #include <algorithm>
 #include <random>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -30,8 +30,7 @@ FaultKind faultKindFromString(const std::string &word)
 {
   if (const auto kind = valueNamed(word, FaultKind::wrong_size))
     return *kind;
-  throw vpException(vpException::badValue, "fault = %s, must be none, black, noise, smear, freeze or wrong size",
-                    word.c_str());
+  throw badValue("fault = {}, must be none, black, noise, smear, freeze or wrong size", word);
 }
 
 void spoil(vpImage<unsigned char> &image, FaultKind kind, const vpImage<unsigned char> &last_good, unsigned seed)

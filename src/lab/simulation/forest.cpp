@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/forest.h"
 
+#include "geometry/failure.h"
 #include "lab/simulation/random.h"
 
 #include <bole/trunk_record.h>
@@ -8,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -160,7 +160,7 @@ Forest Forest::plant(const ForestOptions &options, const std::vector<Eigen::Vect
                      const std::vector<SimulatedTrunk> &wanted)
 {
   if (path.empty())
-    throw vpException(vpException::badValue, "path = (no points), must be at least one point");
+    throw badValue("path = (no points), must be at least one point");
   Forest forest;
   forest.options = options;
   forest.terrain = Terrain(options.seed, options.ground_amplitude);

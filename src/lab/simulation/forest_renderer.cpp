@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/forest_renderer.h"
 
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 
 #include "lab/simulation/light_maps.h"
@@ -11,8 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -49,9 +48,8 @@ private:
       residual = u_px - camera.distort(xy);
     }
     if (!(residual.norm() < 0.01)) {
-      throw vpException(vpException::badValue,
-                        fmt::format("distortion = no ray reaches pixel ({}, {}), must be a lens that covers the image",
-                                    u_px.x(), u_px.y()));
+      throw badValue("distortion = no ray reaches pixel ({}, {}), must be a lens that covers the image", u_px.x(),
+                     u_px.y());
     }
     return xy;
   }

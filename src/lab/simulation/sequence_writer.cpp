@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/sequence_writer.h"
+#include "geometry/failure.h"
 #include "input/asl_text.h"
 
 #include <bole/trunk_record.h>
@@ -9,7 +10,6 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <visp3/core/vpException.h>
 
 namespace fs = std::filesystem;
 
@@ -20,7 +20,7 @@ namespace
 void writePng(const std::string &path, const cv::Mat &image)
 {
   if (!cv::imwrite(path, image))
-    throw vpException(vpException::ioError, fmt::format("{}: cannot write", path));
+    throw ioError("{}: cannot write", path);
 }
 
 std::uint16_t rounded(std::uint16_t depth_mm)
@@ -37,19 +37,19 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
     : m_folder(folder), m_partial(folder + ".partial"), m_overwrite(overwrite)
 {
   if (folder.empty())
-    throw vpException(vpException::badValue, "output = '', must be the name of a folder");
+    throw badValue("output = '', must be the name of a folder");
   while (m_folder.size() > 1 && m_folder.back() == '/') {
     m_folder.pop_back();
     m_partial = m_folder + ".partial";
   }
   if (fs::exists(m_folder) && !overwrite)
-    throw vpException(vpException::ioError, fmt::format("{}: exists already; --overwrite replaces it", m_folder));
+    throw ioError("{}: exists already; --overwrite replaces it", m_folder);
   std::error_code error;
   fs::remove_all(m_partial, error);
   for (const char *name : {"mav0/cam0/data", "mav0/imu0", "mav0/odom0", "mav0/state_groundtruth_estimate0"}) {
     fs::create_directories(path(name), error);
     if (error)
-      throw vpException(vpException::ioError, fmt::format("{}: {}", path(name), error.message()));
+      throw ioError("{}: {}", path(name), error.message());
   }
   writeText("mav0/cam0/sensor.yaml", asl::sensorYaml({camera, bMc}, "simulated front camera", rate_hz));
   m_images.open(path("mav0/cam0/data.csv"));
@@ -114,7 +114,7 @@ void SequenceWriter::writeText(const std::string &name, const std::string &text)
   std::ofstream file(path(name));
   file << text;
   if (!file.flush())
-    throw vpException(vpException::ioError, fmt::format("{}: cannot write", path(name)));
+    throw ioError("{}: cannot write", path(name));
 }
 
 void SequenceWriter::finish()
@@ -122,7 +122,7 @@ void SequenceWriter::finish()
   for (std::ofstream *file : {&m_images, &m_imu, &m_odometry, &m_truth}) {
     file->close();
     if (file->fail())
-      throw vpException(vpException::ioError, fmt::format("{}: cannot write", m_partial));
+      throw ioError("{}: cannot write", m_partial);
   }
   if (m_overwrite)
     fs::remove_all(m_folder);

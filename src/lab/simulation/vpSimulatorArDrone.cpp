@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/simulation/vpSimulatorArDrone.h"
 #include "geometry/body_velocity.h"
+#include "geometry/failure.h"
 #include "geometry/require_range.h"
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
@@ -168,7 +169,7 @@ void vpSimulatorArDrone::Options::validate() const
   bole::requireRange("video_delay_s", video_delay_s, 0, 1);
   bole::requireRange("h264_kbps", h264_kbps, 0, 20000);
   if (renderer.camera.distortion != bole::Distortion::none)
-    throw vpException(vpException::badValue, "distortion, must be none: frames are taken as a pinhole's");
+    throw bole::badValue("distortion, must be none: frames are taken as a pinhole's");
   body.validate();
   renderer.validate();
 }
