@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/asl_source.h"
+#include "geometry/failure.h"
 #include "geometry/median.h"
 #include "geometry/so3.h"
 #include "input/csv_reader.h"
@@ -7,29 +8,21 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace fs = std::filesystem;
 namespace
 {
-struct Row
-{
-  std::int64_t stamp_ns;
-  std::string image_path;
-};
-
 fs::path sensorRoot(const std::string &folder)
 {
   const fs::path path(folder);
   return fs::is_directory(path / "mav0") ? path / "mav0" : path;
 }
 
-std::vector<Row> readImageRows(const fs::path &cam0)
+std::vector<ImageRow> readImageRows(const fs::path &cam0)
 {
-  std::vector<Row> rows;
+  std::vector<ImageRow> rows;
   const std::string path = (cam0 / "data.csv").string();
   CsvReader csv(path, {2});
   while (csv.next()) {
@@ -39,12 +32,11 @@ std::vector<Row> readImageRows(const fs::path &cam0)
     rows.push_back({stamp_ns, (cam0 / "data" / csv.text(1)).string()});
   }
   if (rows.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no image in it", path));
+    throw ioError("{}: no image in it", path);
   constexpr std::int64_t kFastest_ns = 1'000'000; // 1000 images a second
   if (rows.size() > 2 &&
       (rows.back().stamp_ns - rows.front().stamp_ns) / static_cast<std::int64_t>(rows.size() - 1) < kFastest_ns)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: more than 1000 images a second: stamps must be in nanoseconds", path));
+    throw badValue("{}: more than 1000 images a second: stamps must be in nanoseconds", path);
   return rows;
 }
 
@@ -54,24 +46,20 @@ void requirePlausible(const std::vector<GyroSample> &gyro, const std::string &pa
   constexpr double kFastest_rad_s = 5; // rms over a flight: 290 degrees a second all the time
   constexpr double kSlowest_Hz = 5, kFastest_Hz = 20000;
   if (gyro.empty())
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: no sample in it (without a gyro the folder imu0 must not be there)", path));
+    throw ioError("{}: no sample in it (without a gyro the folder imu0 must not be there)", path);
   double squares = 0;
   for (const GyroSample &sample : gyro)
     squares += sample.rate.squaredNorm() / static_cast<double>(gyro.size());
   if (std::sqrt(squares) > kFastest_rad_s)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: angular rate = {:.3g} rad/s (rms), must be at most {:g}: looks like degrees per "
-                                  "second",
-                                  path, std::sqrt(squares), kFastest_rad_s));
+    throw badValue("{}: angular rate = {:.3g} rad/s (rms), must be at most {:g}: looks like degrees per second", path,
+                   std::sqrt(squares), kFastest_rad_s);
   if (gyro.size() < 10)
     return;
   const double rate_Hz =
       1e9 * static_cast<double>(gyro.size() - 1) / static_cast<double>(gyro.back().stamp_ns - gyro.front().stamp_ns);
   if (rate_Hz < kSlowest_Hz || rate_Hz > kFastest_Hz)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: {:.3g} samples a second, must be {:g} to {:g}: stamps must be in nanoseconds",
-                                  path, rate_Hz, kSlowest_Hz, kFastest_Hz));
+    throw badValue("{}: {:.3g} samples a second, must be {:g} to {:g}: stamps must be in nanoseconds", path, rate_Hz,
+                   kSlowest_Hz, kFastest_Hz);
 }
 
 /// Throws for an accelerometer that does not feel gravity. Columns of zeros are taken for none.
@@ -91,13 +79,11 @@ void requireGravity(std::vector<GyroSample> &gyro, const std::string &path)
     for (GyroSample &sample : gyro)
       sample.force.reset();
   else if (median < kLeast || median > kMost)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: specific force = {:.3g} m/s^2 (median), must be {:g} to {:g}{}", path, median,
-                                  kLeast, kMost,
-                                  median > kLeast_g && median < kMost_g               ? ": looks like g"
-                                  : median > 1e3 * kLeast_g && median < 1e3 * kMost_g ? ": looks like thousandths of g"
-                                  : median < kLeast_g ? ": looks as if gravity were taken out (leave the columns away)"
-                                                      : ""));
+    throw badValue("{}: specific force = {:.3g} m/s^2 (median), must be {:g} to {:g}{}", path, median, kLeast, kMost,
+                   median > kLeast_g && median < kMost_g               ? ": looks like g"
+                   : median > 1e3 * kLeast_g && median < 1e3 * kMost_g ? ": looks like thousandths of g"
+                   : median < kLeast_g ? ": looks as if gravity were taken out (leave the columns away)"
+                                       : "");
 }
 
 /// Throws where the gyro turns some sixty times as far as the odometry, and as it does: degrees per second.
@@ -127,21 +113,19 @@ void requireSameTurns(const std::vector<GyroSample> &gyro, const Trajectory &odo
   if (by_odometry <= 0 || by_gyro <= 0 || both * both < kAlike * by_gyro * by_odometry)
     return;
   if (const double factor = both / by_odometry; factor > kLeast && factor < kMost)
-    throw vpException(vpException::badValue,
-                      fmt::format("{}: angular rate = {:.3g} times that of the odometry, must be the same in rad/s: "
-                                  "looks like degrees per second",
-                                  path, factor));
+    throw badValue("{}: angular rate = {:.3g} times that of the odometry, must be the same in rad/s: looks like "
+                   "degrees per second",
+                   path, factor);
 }
 
 /// Throws where no sample falls into the time of the images: the gyro would be unused without a word.
-void requireOverlap(const std::vector<GyroSample> &gyro, const std::vector<Row> &rows, const std::string &path)
+void requireOverlap(const std::vector<GyroSample> &gyro, const std::vector<ImageRow> &rows, const std::string &path)
 {
   if (gyro.empty() || (gyro.front().stamp_ns <= rows.back().stamp_ns && gyro.back().stamp_ns >= rows.front().stamp_ns))
     return;
-  throw vpException(vpException::badValue,
-                    fmt::format("{}: its stamps {:.3f} to {:.3f} s never meet those of the images, {:.3f} to {:.3f} s",
-                                path, gyro.front().stamp_ns * 1e-9, gyro.back().stamp_ns * 1e-9,
-                                rows.front().stamp_ns * 1e-9, rows.back().stamp_ns * 1e-9));
+  throw badValue("{}: its stamps {:.3f} to {:.3f} s never meet those of the images, {:.3f} to {:.3f} s", path,
+                 gyro.front().stamp_ns * 1e-9, gyro.back().stamp_ns * 1e-9, rows.front().stamp_ns * 1e-9,
+                 rows.back().stamp_ns * 1e-9);
 }
 
 std::vector<GyroSample> readGyro(const fs::path &imu0)
@@ -174,76 +158,48 @@ Trajectory readPoses(const fs::path &sensor)
 }
 
 /// Size of the images: that of the first one that can be read, which must be the camera's.
-void requireCameraSize(const std::vector<Row> &rows, const CameraModel &model, const std::string &camera_path)
+void requireCameraSize(const std::vector<ImageRow> &rows, const CameraModel &model, const std::string &camera_path)
 {
-  std::string first_fault;
-  for (const Row &row : rows) {
-    const ImageFile file = readImageFile(row.image_path);
-    if (file.status != FrameStatus::ok) {
-      first_fault = first_fault.empty() ? file.message : first_fault;
-      continue;
-    }
-    const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
-    if (width != model.pinhole.width || height != model.pinhole.height)
-      throw vpException(vpException::dimensionError,
-                        fmt::format("{}: image of {}x{} px, must be {}x{} as {} says", row.image_path, width, height,
-                                    model.pinhole.width, model.pinhole.height, camera_path));
-    return;
-  }
-  throw vpException(vpException::ioError,
-                    fmt::format("none of the {} images can be read; {}", rows.size(), first_fault));
+  ImageFile file;
+  const ImageRow *row = firstReadable(rows, file);
+  if (row == nullptr)
+    throw ioError("none of the {} images can be read; {}", rows.size(), file.message);
+  const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
+  if (width != model.pinhole.width || height != model.pinhole.height)
+    throw dimensionError("{}: image of {}x{} px, must be {}x{} as {} says", row->path, width, height,
+                         model.pinhole.width, model.pinhole.height, camera_path);
 }
 } // namespace
 
-struct AslSource::State
-{
-  std::vector<Row> rows;
-  std::size_t at = 0;
-};
-
-AslSource::AslSource(const std::string &folder, const SourceOptions &options) : m_state(std::make_unique<State>())
+AslSource::AslSource(const std::string &folder, const SourceOptions &options)
 {
   options.validate();
   if (!accepts(folder))
-    throw vpException(vpException::ioError, fmt::format("{}: no ASL folder (cam0/data.csv is missing)", folder));
+    throw ioError("{}: no ASL folder (cam0/data.csv is missing)", folder);
   const fs::path root = sensorRoot(folder);
   m_name = folder;
-  m_state->rows = readImageRows(root / "cam0");
+  m_rows = readImageRows(root / "cam0");
   const std::string camera_path =
       options.camera_path.empty() ? (root / "cam0" / "sensor.yaml").string() : options.camera_path;
   const MountedCamera camera = readCamera(camera_path);
-  requireCameraSize(m_state->rows, camera.model, camera_path);
+  requireCameraSize(m_rows, camera.model, camera_path);
 
   Recording recording;
   recording.odometry = options.odometry_path.empty() ? readPoses(root / "odom0") : readOdometry(options);
-  requireOverlap(recording.odometry, m_state->rows.front().stamp_ns, m_state->rows.back().stamp_ns,
+  requireOverlap(recording.odometry, m_rows.front().stamp_ns, m_rows.back().stamp_ns,
                  options.odometry_path.empty() ? (root / "odom0" / "data.csv").string() : options.odometry_path,
                  folder);
   recording.truth = readPoses(root / "state_groundtruth_estimate0");
   recording.gyro = readGyro(root / "imu0");
-  requireOverlap(recording.gyro, m_state->rows, (root / "imu0" / "data.csv").string());
+  requireOverlap(recording.gyro, m_rows, (root / "imu0" / "data.csv").string());
   requireSameTurns(recording.gyro, recording.odometry, (root / "imu0" / "data.csv").string());
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 
-AslSource::~AslSource() = default;
-
-bool AslSource::next(Frame &frame)
-{
-  if (m_state->at >= m_state->rows.size())
-    return false;
-  const Row &row = m_state->rows[m_state->at++];
-  m_builder->build(row.stamp_ns, readImageFile(row.image_path, m_builder->inputWidth(), m_builder->inputHeight()),
-                   frame);
-  return true;
-}
-
-std::size_t AslSource::size() const { return m_state->rows.size(); }
-
 std::vector<std::int64_t> AslSource::stamps() const
 {
   std::vector<std::int64_t> stamps;
-  for (const Row &row : m_state->rows)
+  for (const ImageRow &row : m_rows)
     stamps.push_back(row.stamp_ns);
   return stamps;
 }

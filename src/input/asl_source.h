@@ -18,14 +18,10 @@ namespace bole
 ///
 /// Errors: vpException with file:line for a missing or empty folder, rows that are not what they must be, stamps that
 /// go back, a camera file with a fault, or images of another size than the camera's.
-class AslSource : public RecordedSource
+class AslSource : public ImageFilesSource
 {
 public:
   explicit AslSource(const std::string &folder, const SourceOptions &options = {});
-  ~AslSource() override;
-
-  bool next(Frame &frame) override;
-  std::size_t size() const override;
 
   /// Stamps of all frames [ns]; the whole odometry and the whole truth, each may be empty.
   std::vector<std::int64_t> stamps() const;
@@ -34,9 +30,5 @@ public:
 
   /// Whether \p path looks like such a folder.
   static bool accepts(const std::string &path);
-
-private:
-  struct State;
-  std::unique_ptr<State> m_state;
 };
 } // namespace bole

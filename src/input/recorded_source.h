@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace bole
 {
@@ -25,5 +26,29 @@ public:
 protected:
   std::string m_name, m_note;
   std::unique_ptr<FrameBuilder> m_builder; ///< set by the constructor of the source
+};
+
+/// An image file and when it was taken.
+struct ImageRow
+{
+  std::int64_t stamp_ns = 0;
+  std::string path;
+};
+
+/// The first of \p rows that can be read, in \p file; nullptr where none can, and \p file tells why the first cannot.
+const ImageRow *firstReadable(const std::vector<ImageRow> &rows, ImageFile &file);
+
+/// Recorded as one file an image: every row is a frame.
+class ImageFilesSource : public RecordedSource
+{
+public:
+  bool next(Frame &frame) override;
+  std::size_t size() const override { return m_rows.size(); }
+
+protected:
+  std::vector<ImageRow> m_rows;
+
+private:
+  std::size_t m_at = 0;
 };
 } // namespace bole

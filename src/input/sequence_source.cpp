@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/sequence_source.h"
 
+#include "geometry/failure.h"
 #include "input/sensor_yaml.h"
 
 #include <algorithm>
@@ -10,25 +11,19 @@
 #include <fmt/format.h>
 #include <map>
 #include <regex>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace fs = std::filesystem;
 namespace
 {
-struct Numbers
-{
-  long first = 0, last = 0;
-};
-
 /// The one `%d` or `%0Nd` of a pattern.
 std::smatch placeholderOf(const std::string &name)
 {
   static const std::regex kPlaceholder("%(0[0-9]{1,2})?d");
   std::smatch match;
   if (!std::regex_search(name, match, kPlaceholder) || std::count(name.begin(), name.end(), '%') != 1)
-    throw vpException(vpException::badValue, fmt::format("{}: must have one number such as %04d in its name", name));
+    throw badValue("{}: must have one number such as %04d in its name", name);
   return match;
 }
 
@@ -58,18 +53,18 @@ void requireNoHole(const std::vector<long> &sorted, const std::string &pattern)
   constexpr long kLargest = 10000; // images: minutes of a flight
   for (std::size_t i = 1; i < sorted.size(); ++i)
     if (sorted[i] - sorted[i - 1] > kLargest)
-      throw vpException(vpException::badValue,
-                        fmt::format("{}: no image from number {} to {}, must be at most {} in a row", pattern,
-                                    sorted[i - 1] + 1, sorted[i] - 1, kLargest));
+      throw badValue("{}: no image from number {} to {}, must be at most {} in a row", pattern, sorted[i - 1] + 1,
+                     sorted[i] - 1, kLargest);
 }
 
-Numbers numbersOf(const std::string &pattern)
+/// The least and the largest.
+std::pair<long, long> numbersOf(const std::string &pattern)
 {
   const fs::path folder = fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
   const std::string name = fs::path(pattern).filename().string();
   const std::smatch placeholder = placeholderOf(name);
   if (!fs::is_directory(folder))
-    throw vpException(vpException::ioError, fmt::format("{}: no such folder", folder.string()));
+    throw ioError("{}: no such folder", folder.string());
   std::vector<long> all;
   for (const auto &entry : fs::directory_iterator(folder)) {
     const long number = numberOf(entry.path().filename().string(), placeholder);
@@ -78,23 +73,10 @@ Numbers numbersOf(const std::string &pattern)
     all.push_back(number);
   }
   if (all.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no such image", pattern));
+    throw ioError("{}: no such image", pattern);
   std::sort(all.begin(), all.end());
   requireNoHole(all, pattern);
   return {all.front(), all.back()};
-}
-
-/// The first image that can be read gives the size of all.
-ImageFile firstReadable(const std::string &pattern, const Numbers &numbers)
-{
-  std::string fault;
-  for (long number = numbers.first; number <= numbers.last; ++number) {
-    ImageFile file = readImageFile(imagePath(pattern, number));
-    if (file.status == FrameStatus::ok)
-      return file;
-    fault = fault.empty() ? file.message : fault;
-  }
-  throw vpException(vpException::ioError, fmt::format("{}: none of the images can be read; {}", pattern, fault));
 }
 
 bool isImage(const fs::path &path)
@@ -108,56 +90,28 @@ bool isImage(const fs::path &path)
 }
 } // namespace
 
-struct SequenceSource::State
-{
-  Numbers numbers;
-  long at = 0;
-  double rate_hz = 25;
-
-  std::int64_t stampOf(long number) const
-  {
-    return std::llround(static_cast<double>(number - numbers.first) * 1e9 / rate_hz);
-  }
-};
-
 SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &options)
-    : m_state(std::make_unique<State>())
 {
   options.validate();
-  State &state = *m_state;
   m_name = fs::is_directory(pattern) ? patternOf(pattern) : pattern;
   if (m_name.empty())
-    throw vpException(vpException::ioError, fmt::format("{}: no numbered images in it", pattern));
-  state.numbers = numbersOf(m_name);
-  state.at = state.numbers.first;
+    throw ioError("{}: no numbered images in it", pattern);
+  const auto [first_number, last_number] = numbersOf(m_name);
   constexpr double kUsual_hz = 25;
-  state.rate_hz =
+  const double rate_hz =
       options.frame_rate_hz ? *options.frame_rate_hz : readFrameRate(options.camera_path).value_or(kUsual_hz);
-  const ImageFile first = firstReadable(m_name, state.numbers);
+  for (long number = first_number; number <= last_number; ++number)
+    m_rows.push_back(
+        {std::llround(static_cast<double>(number - first_number) * 1e9 / rate_hz), imagePath(m_name, number)});
+  ImageFile first;
+  if (firstReadable(m_rows, first) == nullptr)
+    throw ioError("{}: none of the images can be read; {}", m_name, first.message);
   const MountedCamera camera =
       cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), m_note);
   Recording recording;
   recording.odometry = readOdometry(options);
-  requireOverlap(recording.odometry, 0, state.stampOf(state.numbers.last), options.odometry_path, m_name);
+  requireOverlap(recording.odometry, 0, m_rows.back().stamp_ns, options.odometry_path, m_name);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
-}
-
-SequenceSource::~SequenceSource() = default;
-
-bool SequenceSource::next(Frame &frame)
-{
-  State &state = *m_state;
-  if (state.at > state.numbers.last)
-    return false;
-  const long number = state.at++;
-  m_builder->build(state.stampOf(number),
-                   readImageFile(imagePath(m_name, number), m_builder->inputWidth(), m_builder->inputHeight()), frame);
-  return true;
-}
-
-std::size_t SequenceSource::size() const
-{
-  return static_cast<std::size_t>(m_state->numbers.last - m_state->numbers.first + 1);
 }
 
 std::string SequenceSource::patternOf(const std::string &folder)

@@ -17,20 +17,12 @@ namespace bole
 /// later frame would get the time of an earlier one. Its parser of names (vpIoTools::getIndex) is.
 ///
 /// Errors: vpException when there is no such image, none can be read, or the camera is of another size.
-class SequenceSource : public RecordedSource
+class SequenceSource : public ImageFilesSource
 {
 public:
   explicit SequenceSource(const std::string &pattern, const SourceOptions &options = {});
-  ~SequenceSource() override;
-
-  bool next(Frame &frame) override;
-  std::size_t size() const override;
 
   /// The pattern of a folder of numbered images, or empty.
   static std::string patternOf(const std::string &folder);
-
-private:
-  struct State;
-  std::unique_ptr<State> m_state;
 };
 } // namespace bole

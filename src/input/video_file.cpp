@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/video_file.h"
+#include "geometry/failure.h"
 #include "input/codec.h"
 #include "input/libav.h"
 
@@ -143,7 +144,7 @@ int isOver(void *limit)
 VideoFile::VideoFile(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
 {
   if (!std::filesystem::is_regular_file(path))
-    throw vpException(vpException::ioError, fmt::format("{}: no such file", path));
+    throw ioError("{}: no such file", path);
   open();
 }
 
@@ -186,7 +187,7 @@ void VideoFile::open()
     m_libav->decoder.emplace(*stream.codecpar);
   }
   catch (const vpException &error) {
-    throw vpException(vpException::ioError, fmt::format("{}: {}", path, error.getStringMessage()));
+    throw ioError("{}: {}", path, error.getStringMessage());
   }
   m_libav->quarter_turns = quarterTurns(stream);
 }
@@ -218,6 +219,18 @@ bool VideoFile::next(Picture &picture)
   picture = std::move(m_ready.front());
   m_ready.pop_front();
   return true;
+}
+
+const Picture &VideoFile::firstWhole()
+{
+  for (std::size_t i = 0;; ++i) {
+    while (i == m_ready.size() && !m_is_at_end)
+      decodeMore();
+    if (i == m_ready.size())
+      throw ioError("{}: none of its {} pictures can be decoded", m_path, i);
+    if (!m_ready[i].is_damaged)
+      return m_ready[i];
+  }
 }
 
 /// Feeds one packet of the stream, or the end of it, and takes what comes out.

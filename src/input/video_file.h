@@ -52,6 +52,9 @@ public:
 
   /// False at the end.
   bool next(Picture &picture);
+  /// The first picture that is whole, to be called before next(), which gives it and those before it all the same.
+  /// Throws vpException where none is.
+  const Picture &firstWhole();
   /// By the file's own count, 0 when it does not say.
   std::size_t frames() const;
   /// By the file's own word [ns], 0 when it does not say.

@@ -2,40 +2,10 @@
 #include "input/video_source.h"
 #include "input/video_file.h"
 
-#include <deque>
-#include <fmt/format.h>
 #include <limits>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
-struct VideoSource::State
-{
-  State(const std::string &path, std::unique_ptr<VideoFile> opened) : file(std::move(opened))
-  {
-    Picture picture;
-    while (file->next(picture)) {
-      ahead.push_back(std::move(picture));
-      if (!ahead.back().is_damaged)
-        return;
-    }
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: none of its {} pictures can be decoded", path, ahead.size()));
-  }
-
-  bool take(Picture &picture)
-  {
-    if (ahead.empty())
-      return file->next(picture);
-    picture = std::move(ahead.front());
-    ahead.pop_front();
-    return true;
-  }
-
-  std::unique_ptr<VideoFile> file;
-  std::deque<Picture> ahead; ///< up to the first whole one, whose size is that of the video
-};
-
 VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
     : VideoSource(path, options, std::make_unique<VideoFile>(path))
 {
@@ -45,14 +15,14 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options, 
 {
   options.validate();
   m_name = path;
-  m_state = std::make_unique<State>(path, std::move(file));
-  const vpImage<unsigned char> &first = m_state->ahead.back().image;
+  m_file = std::move(file);
+  const vpImage<unsigned char> &first = m_file->firstWhole().image;
   const MountedCamera camera =
       cameraFor(options, static_cast<int>(first.getWidth()), static_cast<int>(first.getHeight()), m_note);
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
-  const std::int64_t duration_ns = m_state->file->duration_ns();
+  const std::int64_t duration_ns = m_file->duration_ns();
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
@@ -63,7 +33,7 @@ VideoSource::~VideoSource() = default;
 bool VideoSource::next(Frame &frame)
 {
   Picture picture;
-  if (!m_state->take(picture))
+  if (!m_file->next(picture))
     return false;
   ImageFile file;
   file.status = picture.is_missing ? FrameStatus::missing : picture.is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
@@ -73,5 +43,5 @@ bool VideoSource::next(Frame &frame)
   return true;
 }
 
-std::size_t VideoSource::size() const { return m_state->file->frames(); }
+std::size_t VideoSource::size() const { return m_file->frames(); }
 } // namespace bole

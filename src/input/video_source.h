@@ -32,7 +32,6 @@ public:
   bool isCompressed() const override { return true; }
 
 private:
-  struct State;
-  std::unique_ptr<State> m_state;
+  std::unique_ptr<VideoFile> m_file;
 };
 } // namespace bole

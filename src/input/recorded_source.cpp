@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/recorded_source.h"
+
+namespace bole
+{
+const ImageRow *firstReadable(const std::vector<ImageRow> &rows, ImageFile &file)
+{
+  std::string fault;
+  for (const ImageRow &row : rows) {
+    file = readImageFile(row.path);
+    if (file.status == FrameStatus::ok)
+      return &row;
+    fault = fault.empty() ? file.message : fault;
+  }
+  file.message = fault;
+  return nullptr;
+}
+
+bool ImageFilesSource::next(Frame &frame)
+{
+  if (m_at >= m_rows.size())
+    return false;
+  const ImageRow &row = m_rows[m_at++];
+  m_builder->build(row.stamp_ns, readImageFile(row.path, m_builder->inputWidth(), m_builder->inputHeight()), frame);
+  return true;
+}
+} // namespace bole
