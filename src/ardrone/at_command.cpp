@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/at_command.h"
 
-#include "ardrone/socket.h"
-
 #include <charconv>
 #include <cstring>
 #include <fmt/format.h>
@@ -75,16 +73,7 @@ float atFloatValue(const std::string &text)
   return value;
 }
 
-struct AtChannel::Link
-{
-  Socket socket;
-};
-
-AtChannel::AtChannel(const std::string &host, std::uint16_t port) : m_link(std::make_unique<Link>())
-{
-  m_link->socket = Socket::connectUdp(host, port);
-}
-AtChannel::~AtChannel() = default;
+AtChannel::AtChannel(const std::string &host, std::uint16_t port) : m_socket(Socket::connectUdp(host, port)) {}
 
 void AtChannel::send(const std::string &name, const std::string &arguments)
 {
@@ -93,7 +82,7 @@ void AtChannel::send(const std::string &name, const std::string &arguments)
   if (!arguments.empty())
     line += "," + arguments;
   line += "\r";
-  m_link->socket.send(line.data(), line.size());
+  m_socket.send(line.data(), line.size());
 }
 
 void AtChannel::config(const std::string &key, const std::string &value)

@@ -3,8 +3,9 @@
 /// \file
 /// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
 
+#include "ardrone/socket.h"
+
 #include <cstdint>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -32,9 +33,6 @@ class AtChannel
 {
 public:
   AtChannel(const std::string &host, std::uint16_t port);
-  ~AtChannel();
-  AtChannel(const AtChannel &) = delete;
-  AtChannel &operator=(const AtChannel &) = delete;
 
   // Housekeeping: moves nothing.
   void config(const std::string &key, const std::string &value);
@@ -52,8 +50,7 @@ public:
 private:
   void send(const std::string &name, const std::string &arguments);
 
-  struct Link;
-  std::unique_ptr<Link> m_link;
+  Socket m_socket;
   std::mutex m_mutex;
   std::int64_t m_sequence = 0;
 };

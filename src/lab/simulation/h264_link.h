@@ -3,9 +3,7 @@
 /// \file
 /// What a drone's video link does to a picture: H.264 at a low bit rate.
 
-#include <bole/visp.h>
-#include <memory>
-#include <visp3/core/vpImage.h>
+#include "input/codec.h"
 
 namespace bole
 {
@@ -16,17 +14,17 @@ class H264Link
 public:
   /// \param width, height even [px]; \param kbps 50 to 20000. Throws vpException where libavcodec has no H.264 encoder.
   H264Link(int width, int height, double rate_hz, double kbps);
-  ~H264Link();
-  H264Link(H264Link &&) noexcept;
-  H264Link &operator=(H264Link &&) noexcept;
 
   /// Replaces \p image by what arrives.
   void pass(vpImage<unsigned char> &image);
   /// Size of the last encoded picture.
-  std::size_t lastBytes() const;
+  std::size_t lastBytes() const { return m_bytes; }
 
 private:
-  struct State;
-  std::unique_ptr<State> m_state;
+  PictureEncoder m_encoder;
+  PictureDecoder m_decoder = PictureDecoder::h264();
+  double m_rate_hz;
+  std::int64_t m_count = 0;
+  std::size_t m_bytes = 0;
 };
 } // namespace bole
