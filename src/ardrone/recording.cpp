@@ -2,6 +2,7 @@
 #include "ardrone/recording.h"
 
 #include "ardrone/bytes.h"
+#include "geometry/failure.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +15,10 @@
 #include <iterator>
 #include <unistd.h>
 #include <utility>
-#include <visp3/core/vpException.h>
+
+extern "C" {
+#include <libavutil/crc.h>
+}
 
 namespace bole
 {
@@ -24,23 +28,10 @@ const std::string kTitle = "bole raw flight 1\n";
 constexpr std::uint32_t kMagic = 0x45434542;
 constexpr std::size_t kHead = 20, kTail = 4, kLargestPiece = 1 << 20;
 
-/// CRC-32 of IEEE 802.3 (reflected, 0xEDB88320).
+/// CRC-32 of IEEE 802.3.
 std::uint32_t crc32(const std::uint8_t *data, std::size_t size)
 {
-  static const auto table = [] {
-    std::array<std::uint32_t, 256> t{};
-    for (std::uint32_t i = 0; i < 256; ++i) {
-      std::uint32_t value = i;
-      for (int bit = 0; bit < 8; ++bit)
-        value = (value >> 1) ^ ((value & 1) != 0 ? 0xEDB88320u : 0u);
-      t[i] = value;
-    }
-    return t;
-  }();
-  std::uint32_t crc = 0xFFFFFFFFu;
-  for (std::size_t i = 0; i < size; ++i)
-    crc = (crc >> 8) ^ table[(crc ^ data[i]) & 0xff];
-  return ~crc;
+  return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0u, data, size);
 }
 
 std::filesystem::path rawPath(const std::string &folder)
@@ -57,9 +48,9 @@ RecordingWriter::RecordingWriter(const std::string &folder)
   m_path = (std::filesystem::path(folder) / "raw.bin").string();
   m_descriptor = ::open(m_path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
   if (m_descriptor < 0)
-    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, std::strerror(errno)));
+    throw ioError("{}: {}", m_path, std::strerror(errno));
   if (::write(m_descriptor, kTitle.data(), kTitle.size()) != static_cast<ssize_t>(kTitle.size()))
-    throw vpException(vpException::ioError, fmt::format("{}: {}", m_path, std::strerror(errno)));
+    throw ioError("{}: {}", m_path, std::strerror(errno));
   m_bytes = kTitle.size();
 }
 
@@ -104,12 +95,10 @@ RecordingReader::RecordingReader(const std::string &folder)
   const auto path = rawPath(folder);
   std::ifstream file(path, std::ios::binary);
   if (!file)
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: {}, must be a recording", path.string(), std::strerror(errno)));
+    throw ioError("{}: {}, must be a recording", path.string(), std::strerror(errno));
   m_bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   if (m_bytes.size() < kTitle.size() || !std::equal(kTitle.begin(), kTitle.end(), m_bytes.begin()))
-    throw vpException(vpException::ioError, fmt::format("{}:1: the first line must be \"{}\"", path.string(),
-                                                        kTitle.substr(0, kTitle.size() - 1)));
+    throw ioError("{}:1: the first line must be \"{}\"", path.string(), kTitle.substr(0, kTitle.size() - 1));
   m_at = kTitle.size();
 }
 
