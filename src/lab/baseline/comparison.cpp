@@ -71,7 +71,7 @@ FrameError answerOf(Contender &contender, const TestFlight &flight, std::size_t 
 } // namespace
 
 std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                           const Limits &limits, const ComparisonProgress &progress, const ImageAt &image_at)
+                           const Limits &limits, const ImageAt &image_at)
 {
   std::vector<Score> scores(contenders.size());
   for (std::size_t i = 0; i < contenders.size(); ++i) {
@@ -87,8 +87,6 @@ std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path
       const std::size_t i = (j + k) % contenders.size(); // nobody always runs with the cache of the same other
       scores[i].errors.push_back(answerOf(contenders[i], flight, k, image, limits, scores[i]));
     }
-    if (progress)
-      progress(int(k), int(flight.frames.size()) - 1);
   }
   for (Score &score : scores)
     summarise(score);

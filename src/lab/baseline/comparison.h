@@ -49,14 +49,12 @@ struct PoseError
 /// Distance between two poses: of the camera centres [m] and of the attitudes [degrees].
 PoseError poseError(const Pose &cMo, const Pose &truth);
 
-using ComparisonProgress = std::function<void(int frame, int frames)>;
 /// The image that is shown in place of that of frame k.
 using ImageAt = std::function<const vpImage<unsigned char> &(std::size_t k)>;
 
 /// Runs \p contenders over \p flight with the model \p cao_path, on the images of \p image_at where given.
 std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                           const Limits &limits = {}, const ComparisonProgress &progress = {},
-                           const ImageAt &image_at = {});
+                           const Limits &limits = {}, const ImageAt &image_at = {});
 
 /// ViSP's settings by a small sweep on the flight itself, which favours ViSP: mask, range, threshold, step and far
 /// clipping are varied one at a time from the best so far, twice through the list. Best is right in most frames,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/contender.h"
 #include "geometry/names.h"
+#include "geometry/visp_matrix.h"
 #include <bole/vpMbTrunkTracker.h>
 
 #include <ctime>
@@ -60,17 +61,8 @@ void Contender::giveHelp(const TestFlight &flight, std::size_t k, const Pose &pr
     m_tracker->setPose(image, predicted.toVisp());
     return;
   }
-  const vpMatrix before = m_trunk->getPoseCovariance();
-  Matrix6d P;
-  for (unsigned i = 0; i < 6; ++i)
-    for (unsigned j = 0; j < 6; ++j)
-      P(int(i), int(j)) = before[i][j];
-  const Matrix6d covariance = flight.predictedCovariance(predicted, m_cMo, P);
-  vpMatrix Q(6, 6);
-  for (unsigned i = 0; i < 6; ++i)
-    for (unsigned j = 0; j < 6; ++j)
-      Q[i][j] = covariance(int(i), int(j));
-  m_trunk->setMotionPrior(predicted.toVisp(), Q);
+  const Matrix6d covariance = flight.predictedCovariance(predicted, m_cMo, toEigen(m_trunk->getPoseCovariance()));
+  m_trunk->setMotionPrior(predicted.toVisp(), toVisp(covariance));
 }
 
 Answer Contender::track(const TestFlight &flight, std::size_t k, const vpImage<unsigned char> &image)

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/baseline/test_flight.h"
 
+#include "geometry/failure.h"
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
+#include <bole/open_source.h>
 
 #include <Eigen/Dense>
 
@@ -23,14 +25,6 @@ using Eigen::Vector3d;
 namespace
 {
 Eigen::Matrix3d turned(double yaw) { return expSo3({0, 0, yaw}); }
-
-/// Attitude of a body that looks forward along the camera's axis with its z up in a level camera.
-Eigen::Matrix3d forwardBody()
-{
-  Eigen::Matrix3d bRc;
-  bRc << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return bRc;
-}
 
 /// Upright cylinders from 0.1 to 4 m over the ground; far trunks, whose radius is not known, are none.
 std::vector<Cylinder> readTrees(const std::string &folder)
@@ -73,7 +67,7 @@ Pose TestFlight::predicted(std::size_t k, const Pose &cMo) const
     return cMo;
   if (!upright)
     return *now * before->inverse() * cMo;
-  const Eigen::Matrix3d cRb = forwardBody().transpose();
+  const Eigen::Matrix3d cRb = forwardCamera().R.transpose();
   const Pose was = cMo.inverse(), odometry_was = before->inverse(), odometry_is = now->inverse();
   const double yaw_was = yawOf(was.R * cRb), odometry_yaw_was = yawOf(odometry_was.R * cRb);
   const Vector3d step = turned(yaw_was - odometry_yaw_was) * (odometry_is.t - odometry_was.t);
@@ -108,9 +102,9 @@ TestFlight readAslFlight(const std::string &folder)
   Frame frame;
   while (source.next(frame)) {
     if (!frame.wMb_truth)
-      throw vpException(vpException::badValue, fmt::format("{}: frame {} has no true pose", folder, frame.index));
+      throw badValue("{}: frame {} has no true pose", folder, frame.index);
     if (frame.status != FrameStatus::ok)
-      throw vpException(vpException::badValue, fmt::format("{}: frame {}: {}", folder, frame.index, frame.message));
+      throw badValue("{}: frame {}: {}", folder, frame.index, frame.message);
     TestFrame test;
     test.image = frame.image;
     test.cMo = (*frame.wMb_truth * bMc).inverse();
@@ -170,8 +164,7 @@ TestFlight readCubeFlight(const std::string &folder, int max_frames)
     flight.frames.push_back(std::move(frame));
   }
   if (flight.frames.empty())
-    throw vpException(vpException::ioError,
-                      fmt::format("{}: no cube/image0000.pgm that ViSP's tracker can follow", folder));
+    throw ioError("{}: no cube/image0000.pgm that ViSP's tracker can follow", folder);
   flight.upright = false;
   flight.step_sigma << Vector3d::Constant(sigma_m), Vector3d::Constant(sigma_rad);
   return flight;
