@@ -40,7 +40,7 @@ LightGrid emptyGrid(const Eigen::Vector2d &low, const Eigen::Vector2d &high, dou
   LightGrid grid;
   grid.x0 = static_cast<float>(low.x());
   grid.y0 = static_cast<float>(low.y());
-  grid.cells_per_m = static_cast<float>(1 / cell);
+  grid.columns_per_x = grid.rows_per_y = static_cast<float>(1 / cell);
   grid.columns = static_cast<int>((high.x() - low.x()) / cell) + 2;
   grid.rows = static_cast<int>((high.y() - low.y()) / cell) + 2;
   grid.values.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
@@ -51,7 +51,7 @@ template <class Value> void fill(LightGrid &grid, const Value &value)
 {
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
-      const double x = grid.x0 + column / grid.cells_per_m, y = grid.y0 + row / grid.cells_per_m;
+      const double x = grid.x0 + column / grid.columns_per_x, y = grid.y0 + row / grid.rows_per_y;
       grid.values[static_cast<std::size_t>(row) * grid.columns + column] = static_cast<float>(value(x, y));
     }
   }
@@ -75,27 +75,19 @@ LightGrid groundLight(const Forest &forest, const RayScene &scene, const LightMa
   return grid;
 }
 
-BarkLight emptyBark(int columns, int rows, double height)
+LightGrid emptyBark(int columns, int rows, double height)
 {
-  BarkLight map;
-  map.columns = columns;
-  map.rows = rows;
-  map.rows_per_m = static_cast<float>((rows - 1) / height);
-  map.values.resize(static_cast<std::size_t>(columns) * rows);
-  return map;
+  LightGrid grid;
+  grid.is_round = true;
+  grid.columns = columns;
+  grid.rows = rows;
+  grid.columns_per_x = static_cast<float>(columns);
+  grid.rows_per_y = static_cast<float>((rows - 1) / height);
+  grid.values.resize(static_cast<std::size_t>(columns) * rows);
+  return grid;
 }
 
-template <class Value> void fill(BarkLight &map, const Value &value)
-{
-  for (int row = 0; row < map.rows; ++row) {
-    for (int column = 0; column < map.columns; ++column) {
-      map.values[static_cast<std::size_t>(row) * map.columns + column] =
-          static_cast<float>(value(static_cast<float>(column) / map.columns, static_cast<float>(row) / map.rows_per_m));
-    }
-  }
-}
-
-BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const RayScene &scene, const LightMaps &maps,
+LightGrid barkLight(const Forest &forest, const SimulatedTrunk &trunk, const RayScene &scene, const LightMaps &maps,
                     bool far)
 {
   const auto pointAndNormal = [&trunk](double turn, double height) {
@@ -103,12 +95,12 @@ BarkLight barkLight(const Forest &forest, const SimulatedTrunk &trunk, const Ray
     return std::pair(Eigen::Vector3d(trunk.axisAt(height) + (trunk.radiusAt(height) + 0.02) * normal), normal);
   };
   const double reach = far ? 10 : 8;
-  BarkLight sky = emptyBark(8, far ? 2 : 6, reach);
+  LightGrid sky = emptyBark(8, far ? 2 : 6, reach);
   fill(sky, [&](double turn, double height) {
     const auto [point, normal] = pointAndNormal(turn, std::max(0.1, height));
     return maps.sky * (0.12 + kGroundBounce + 1.0 * skyShare(scene, point, normal)) + kGroundBounce * maps.sun * 0.4;
   });
-  BarkLight map = far ? emptyBark(8, 4, reach) : emptyBark(32, 100, reach);
+  LightGrid map = far ? emptyBark(8, 4, reach) : emptyBark(32, 100, reach);
   fill(map, [&](float turn, float height) {
     double light = sky.at(turn, height);
     const auto [point, normal] = pointAndNormal(turn, height);
@@ -140,18 +132,9 @@ std::vector<float> leafLight(const Forest &forest, const ForestMesh &mesh, const
 
 float LightGrid::at(float x, float y) const
 {
-  const float u = std::clamp((x - x0) * cells_per_m, 0.f, columns - 1.001f);
-  const float v = std::clamp((y - y0) * cells_per_m, 0.f, rows - 1.001f);
-  const int column = static_cast<int>(u), row = static_cast<int>(v);
-  const float fu = u - column, fv = v - row;
-  const float *p = &values[static_cast<std::size_t>(row) * columns + column];
-  return (p[0] * (1 - fu) + p[1] * fu) * (1 - fv) + (p[columns] * (1 - fu) + p[columns + 1] * fu) * fv;
-}
-
-float BarkLight::at(float turn, float height) const
-{
-  const float u = (turn - std::floor(turn)) * columns;
-  const float v = std::clamp(height * rows_per_m, 0.f, rows - 1.001f);
+  const float u =
+      is_round ? (x - std::floor(x)) * columns_per_x : std::clamp((x - x0) * columns_per_x, 0.f, columns - 1.001f);
+  const float v = std::clamp((y - y0) * rows_per_y, 0.f, rows - 1.001f);
   const int column = static_cast<int>(u) % columns, next = (column + 1) % columns, row = static_cast<int>(v);
   const float fu = u - std::floor(u), fv = v - row;
   const float *low = &values[static_cast<std::size_t>(row) * columns], *high = low + columns;

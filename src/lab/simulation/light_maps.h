@@ -7,37 +7,28 @@
 
 namespace bole
 {
-/// A regular grid of values with bilinear look-up, clamped at its borders.
+/// A regular grid of values with bilinear look-up, clamped at its borders. Of the ground: x and y in the world [m]; of
+/// a trunk: x from 0 to 1 round it, y its height above the foot [m].
 struct LightGrid
 {
-  float x0 = 0, y0 = 0, cells_per_m = 1;
+  float x0 = 0, y0 = 0, columns_per_x = 1, rows_per_y = 1;
   int columns = 0, rows = 0;
+  bool is_round = false; ///< the first column stands beside the last
   std::vector<float> values;
 
   bool contains(float x, float y) const
   {
-    const float u = (x - x0) * cells_per_m, v = (y - y0) * cells_per_m;
+    const float u = (x - x0) * columns_per_x, v = (y - y0) * rows_per_y;
     return u >= 0 && v >= 0 && u < columns - 1 && v < rows - 1;
   }
   float at(float x, float y) const;
 };
 
-/// Irradiance of one trunk: columns round it (wrapped), rows up it.
-struct BarkLight
-{
-  int columns = 0, rows = 0;
-  float rows_per_m = 1;
-  std::vector<float> values;
-
-  /// \param turn 0 to 1 round the trunk, \param height above the foot [m].
-  float at(float turn, float height) const;
-};
-
 struct LightMaps
 {
   LightGrid near_ground, far_ground;
-  std::vector<BarkLight> bark;
-  std::vector<float> leaves; ///< one a quad
+  std::vector<LightGrid> bark; ///< one a trunk, near ones first
+  std::vector<float> leaves;   ///< one a quad
   float sun = 0,
         sky = 1; ///< irradiance over pi of a plane that faces the sun, of one that faces the sky
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include "lab/simulation/simulated_flight.h"
 
 #include "geometry/require_range.h"
@@ -123,30 +124,26 @@ public:
   [[noreturn]] void fail(const YAML::Node &node, const std::string &key, const std::string &wanted) const
   {
     const std::string value = node.IsScalar() && node.Scalar() != key ? " = " + node.Scalar() : "";
-    throw vpException(vpException::badValue,
-                      fmt::format("{}:{}: {}{}, must be {}", m_file, node.Mark().line + 1, key, value, wanted));
+    throw badValue("{}:{}: {}{}, must be {}", m_file, node.Mark().line + 1, key, value, wanted);
   }
 
 private:
-  template <class T> void number(const YAML::Node &node, const char *key, T &field, const char *wanted) const
+  template <class T> void assign(const YAML::Node &node, const char *key, T &field) const
   {
-    T value{};
-    if (!node.IsScalar() || !YAML::convert<T>::decode(node, value))
-      fail(node, key, wanted);
-    field = value;
+    constexpr const char *kWanted = std::is_same_v<T, double> ? "a number"
+                                    : std::is_same_v<T, bool> ? "true or false"
+                                    : std::is_unsigned_v<T>   ? "a whole number, 0 or more"
+                                                              : "a whole number";
+    if constexpr (std::is_enum_v<T>)
+      assignWord(node, key, field);
+    else if (T value{}; node.IsScalar() && YAML::convert<T>::decode(node, value))
+      field = value;
+    else
+      fail(node, key, kWanted);
+    if constexpr (std::is_same_v<T, double>)
+      if (!std::isfinite(field))
+        fail(node, key, "a finite number");
   }
-  void assign(const YAML::Node &node, const char *key, double &field) const
-  {
-    number(node, key, field, "a number");
-    if (!std::isfinite(field))
-      fail(node, key, "a finite number");
-  }
-  void assign(const YAML::Node &node, const char *key, int &field) const { number(node, key, field, "a whole number"); }
-  void assign(const YAML::Node &node, const char *key, std::uint64_t &field) const
-  {
-    number(node, key, field, "a whole number, 0 or more");
-  }
-  void assign(const YAML::Node &node, const char *key, bool &field) const { number(node, key, field, "true or false"); }
   void assign(const YAML::Node &node, const char *key, std::array<double, 4> &field) const
   {
     if (!node.IsSequence() || node.size() != 4)
@@ -154,8 +151,7 @@ private:
     for (std::size_t k = 0; k < 4; ++k)
       assign(node[k], key, field[k]);
   }
-  template <class T, class = std::enable_if_t<std::is_enum_v<T>>>
-  void assign(const YAML::Node &node, const char *key, T &field) const
+  template <class T> void assignWord(const YAML::Node &node, const char *key, T &field) const
   {
     std::string wanted;
     for (const auto &[word, value] : wordsOf(field)) {
@@ -216,7 +212,7 @@ SceneOptions readScene(const std::string &path)
   const YAML::Node root = loadYaml(path);
   SceneOptions scene;
   if (!root.IsMap())
-    throw vpException(vpException::badValue, fmt::format("{}:1: a scene must be a mapping of sections", path));
+    throw badValue("{}:1: a scene must be a mapping of sections", path);
   const char *names[] = {"forest", "flight", "camera", "sensors"};
   Section top(path, root, "scene");
   YAML::Node trunks;
@@ -239,7 +235,7 @@ SceneOptions readScene(const std::string &path)
     scene.validate();
   }
   catch (const vpException &error) {
-    throw vpException(vpException::badValue, fmt::format("{}: {}", path, error.getStringMessage()));
+    throw badValue("{}: {}", path, error.getStringMessage());
   }
   return scene;
 }
