@@ -5,7 +5,6 @@
 #include "geometry/horizontal_view.h"
 #include "geometry/median.h"
 #include "input/asl_source.h"
-#include "input/truth.h"
 #include "output/figure.h"
 #include "pipeline/paper_policy.h"
 #include "saliency/saliency.h"
@@ -18,27 +17,13 @@ namespace bole::apps
 {
 namespace
 {
-/// tan of the bearings, from the heading of the camera, of the borders of the true trunks within range.
-struct TrueBorders
+Trunk trunkOf(const TruthTrunk &truth)
 {
-  std::vector<double> left, right;
-
-  TrueBorders(const std::vector<TruthTrunk> &trunks, const Pose &wMc, double range)
-  {
-    const double heading = std::atan2(wMc.R(1, 2), wMc.R(0, 2));
-    for (const TruthTrunk &truth : trunks) {
-      Trunk trunk;
-      trunk.xy = truth.xy;
-      trunk.log_radius = std::log(std::max(truth.radius, 1e-3));
-      const HorizontalView view = horizontalView(wMc, trunk);
-      const double bearing = std::remainder(view.bearing - heading, 2 * M_PI);
-      if (truth.radius <= 0 || view.range > range || std::abs(bearing) > 1)
-        continue;
-      left.push_back(std::tan(bearing + view.half_angle));
-      right.push_back(std::tan(bearing - view.half_angle));
-    }
-  }
-};
+  Trunk trunk;
+  trunk.xy = truth.xy;
+  trunk.log_radius = std::log(std::max(truth.radius, 1e-3));
+  return trunk;
+}
 
 /// The strongest value within 2 px of \p q; nothing outside the profile.
 void addNear(const LevelProfile &profile, double sign, double q, std::vector<double> &values)
@@ -66,9 +51,7 @@ void addMinima(const Gradient &gradient, const PinholeCamera &camera, const Pose
   options.paper_alpha = 1;
   const TrunkEnergy energy(gradient, camera, kWholeLine, {}, {}, options);
   for (const TruthTrunk &truth : trunks) {
-    Trunk trunk;
-    trunk.xy = truth.xy;
-    trunk.log_radius = std::log(std::max(truth.radius, 1e-3));
+    const Trunk trunk = trunkOf(truth);
     const RelativeTrunk relative = relativeTrunk(wMc, Pose(), trunk);
     if (truth.radius <= 0 || horizontalView(wMc, trunk).range > range || relative.cRt(2, 0) <= 0 ||
         borderLine(camera, relative, Border::left, kWholeLine).rows() < camera.height / 2 ||
@@ -84,6 +67,19 @@ void addMinima(const Gradient &gradient, const PinholeCamera &camera, const Pose
   }
 }
 } // namespace
+
+std::vector<TrueView> trueViews(const std::vector<TruthTrunk> &trunks, const Pose &wMc, double range, double widest)
+{
+  const double heading = std::atan2(wMc.R(1, 2), wMc.R(0, 2));
+  std::vector<TrueView> views;
+  for (const TruthTrunk &truth : trunks) {
+    const HorizontalView seen = horizontalView(wMc, trunkOf(truth));
+    const double ahead = std::remainder(seen.bearing - heading, 2 * M_PI);
+    if (truth.radius > 0 && std::abs(ahead) < widest && seen.range < range)
+      views.push_back({ahead, seen.range, seen.half_angle});
+  }
+  return views;
+}
 
 LineQuartiles DetectorStatistics::quartiles() const
 {
@@ -130,17 +126,16 @@ DetectorStatistics detectorStatistics(const std::string &sequence, double range)
     addAll(rising, 1, statistics.gradient.of_all);
     addAll(foreground, 1, statistics.foreground.of_all);
     const std::optional<Pose> truth = interpolate(source.truth(), frame.stamp_ns);
-    if (truth)
-      addMinima(gradient, camera, *truth * source.bMc(), trunks, range, options.tracking.energy, statistics);
-    const TrueBorders borders(truth ? trunks : std::vector<TruthTrunk>(), truth.value_or(Pose()) * source.bMc(), range);
-    for (const double q : borders.left) {
-      addNear(falling, -1, q, statistics.gradient.of_borders);
-      addNear(foreground, 1, q, statistics.foreground.of_borders);
-    }
-    for (const double q : borders.right) {
-      addNear(rising, 1, q, statistics.gradient.of_borders);
-      addNear(foreground, 1, q, statistics.foreground.of_borders);
-    }
+    if (!truth)
+      continue;
+    addMinima(gradient, camera, *truth * source.bMc(), trunks, range, options.tracking.energy, statistics);
+    const std::vector<TrueView> views = trueViews(trunks, *truth * source.bMc(), range, 1);
+    for (const double side : {1.0, -1.0})
+      for (const TrueView &view : views) {
+        const double q = std::tan(view.ahead + side * view.half_angle);
+        addNear(side > 0 ? falling : rising, -side, q, statistics.gradient.of_borders);
+        addNear(foreground, 1, q, statistics.foreground.of_borders);
+      }
   }
   return statistics;
 }

@@ -5,6 +5,7 @@
 /// of the statistics of the data" (Section 6). And how far its energy (Eq. 3) has its minima from true trunks: alpha is
 /// calibrated where those errors are what the curvature says.
 
+#include "input/truth.h"
 #include "pipeline/stage_options.h"
 
 #include <string>
@@ -12,6 +13,16 @@
 
 namespace bole::apps
 {
+/// A true trunk as a camera sees it.
+struct TrueView
+{
+  double ahead = 0; ///< its bearing less the camera's heading [rad]
+  double range = 0; ///< [m]
+  double half_angle = 0;
+};
+/// Those whose radius is known, nearer than \p range [m] and \p widest [rad] from the heading of the camera.
+std::vector<TrueView> trueViews(const std::vector<TruthTrunk> &trunks, const Pose &wMc, double range, double widest);
+
 /// One value a vertical line of each image: all lines, and those nearest to the borders of true trunks.
 struct LineStatistics
 {

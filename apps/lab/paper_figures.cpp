@@ -2,9 +2,9 @@
 #include "paper_figures.h"
 
 #include "basis_flows.h"
+#include "detector_statistics.h"
 
 #include "evaluation/trajectory_metrics.h"
-#include "geometry/horizontal_view.h"
 #include "gradient/border_line.h"
 #include "output/map_svg.h"
 #include "output/palette.h"
@@ -112,30 +112,10 @@ int countRight(const SeenFlight &flight, const SeenFrame &frame)
                     [&](const TrunkInView &tree) { return tree.is_tracked && isRight(flight, tree.id); }));
 }
 
-/// A true trunk as the camera sees it.
-struct TrueView
-{
-  double ahead = 0; ///< its bearing less the camera's heading [rad]
-  double range = 0; ///< [m]
-  double half_angle = 0;
-};
-
 std::vector<TrueView> trueViews(const SeenFlight &flight, std::size_t at)
 {
-  const Pose wMc = flight.trueCamera(at);
-  const double heading = std::atan2(wMc.R(1, 2), wMc.R(0, 2));
-  const double widest = std::atan(0.5 * flight.camera.width / flight.camera.fx);
-  std::vector<TrueView> views;
-  for (const TruthTrunk &truth : flight.trunks) {
-    Trunk trunk;
-    trunk.xy = truth.xy;
-    trunk.log_radius = std::log(std::max(truth.radius, 1e-3));
-    const HorizontalView seen = horizontalView(wMc, trunk);
-    const double ahead = std::remainder(seen.bearing - heading, 2 * M_PI);
-    if (truth.radius > 0 && std::abs(ahead) < widest && seen.range < 3 * kFarthest)
-      views.push_back({ahead, seen.range, seen.half_angle});
-  }
-  return views;
+  return apps::trueViews(flight.trunks, flight.trueCamera(at), 3 * kFarthest,
+                         std::atan(0.5 * flight.camera.width / flight.camera.fx));
 }
 
 double bearingOf(const SeenFrame &frame, const TrunkInView &tree)
