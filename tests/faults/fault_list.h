@@ -49,6 +49,21 @@ struct Fault
   double since_s = kAt / kRate_hz; ///< begins then
 };
 
+/// \p fault as one that is there from the first frame on.
+inline Fault fromTheFirst(Fault fault)
+{
+  fault.since_s = 0;
+  return fault;
+}
+
+inline std::vector<Fault> joined(std::initializer_list<std::vector<Fault>> parts)
+{
+  std::vector<Fault> all;
+  for (const std::vector<Fault> &part : parts)
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 std::vector<Fault> pictureFaults();
 std::vector<Fault> sensorFaults();
 std::vector<Fault> fileFaults();

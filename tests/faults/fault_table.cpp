@@ -230,13 +230,7 @@ private:
   fs::path m_work, m_clean_run;
 };
 
-std::vector<Fault> allFaults()
-{
-  std::vector<Fault> all;
-  for (const auto &part : {pictureFaults(), sensorFaults(), fileFaults(), processFaults()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
+std::vector<Fault> allFaults() { return joined({pictureFaults(), sensorFaults(), fileFaults(), processFaults()}); }
 
 std::string rowOf(const Line &line)
 {

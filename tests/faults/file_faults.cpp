@@ -60,15 +60,8 @@ std::vector<Fault> cameraFiles()
              "resolution: [640, 480]\nintrinsics: [400, 400, 319.5, 239.5]\n"),
   };
   const auto wrong = [&all](const std::string &name, const std::string &what, const std::string &text) {
-    all.push_back({"camera file",
-                   name,
-                   what,
-                   Duty::survive,
-                   [=](SpoiltFlight &flight) { flight.replace(kYaml, text); },
-                   {},
-                   {},
-                   {},
-                   0});
+    all.push_back(fromTheFirst(
+        {"camera file", name, what, Duty::survive, [=](SpoiltFlight &flight) { flight.replace(kYaml, text); }}));
   };
   wrong("focal_5_short", "a focal length 5 % too short", pinhole("190, 190, 159.5, 119.5"));
   wrong("focal_10_long", "one 10 % too long", pinhole("220, 220, 159.5, 119.5"));
@@ -228,11 +221,5 @@ std::vector<Fault> options()
 }
 } // namespace
 
-std::vector<Fault> fileFaults()
-{
-  std::vector<Fault> all = cameraFiles();
-  for (const auto &part : {pictureFiles(), options()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
+std::vector<Fault> fileFaults() { return joined({cameraFiles(), pictureFiles(), options()}); }
 } // namespace bole::faults

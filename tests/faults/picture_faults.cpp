@@ -116,17 +116,15 @@ Fault noised(const std::string &name, const std::string &what, std::size_t count
 /// Stamps of all frames off by a normal error of \p sigma_s.
 Fault jittered(const std::string &name, const std::string &what, double sigma_s)
 {
-  Fault fault{"pictures", name, what};
-  fault.since_s = 0;
-  fault.spoil = [sigma_s](SpoiltFlight &flight) {
-    constexpr double kMost_s = 0.045; // the order is kept
-    std::normal_distribution<double> error(0, sigma_s);
-    for (std::size_t i = 1; i + 1 < flight.frames(); ++i) {
-      const double off = std::clamp(error(flight.random), -kMost_s, kMost_s);
-      flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) + static_cast<std::int64_t>(1e9 * off));
-    }
-  };
-  return fault;
+  return fromTheFirst({"pictures", name, what, Duty::survive, [sigma_s](SpoiltFlight &flight) {
+                         constexpr double kMost_s = 0.045; // the order is kept
+                         std::normal_distribution<double> error(0, sigma_s);
+                         for (std::size_t i = 1; i + 1 < flight.frames(); ++i) {
+                           const double off = std::clamp(error(flight.random), -kMost_s, kMost_s);
+                           flight.camera.rows[i][0] =
+                               std::to_string(flight.camera.stamp(i) + static_cast<std::int64_t>(1e9 * off));
+                         }
+                       }});
 }
 
 std::vector<Fault> lightFaults()
@@ -271,42 +269,22 @@ std::vector<Fault> orderFaults()
       kept("gap_2s", "20 of them", [](std::size_t i) { return i >= 20; }),
       kept("half_rate", "every second picture not in the table from then on", [](std::size_t i) { return i % 2 == 0; }),
       kept("bursts", "a second of pictures, a second without", [](std::size_t i) { return i / 10 % 2 == 0; }),
-      {"pictures",
-       "rows_twice",
-       "each picture once more 50 ms later",
-       Duty::survive,
-       [](SpoiltFlight &flight) {
-         std::vector<SpoiltFlight::Row> rows;
-         for (const SpoiltFlight::Row &row : flight.camera.rows)
-           for (const std::int64_t later_ns : {0, 50'000'000})
-             rows.push_back({std::to_string(std::stoll(row[0]) + later_ns), row[1]});
-         flight.camera.rows = std::move(rows);
-       },
-       {},
-       {},
-       {},
-       0},
-      {"pictures",
-       "stamps_drift",
-       "a clock that is 1 % slow",
-       Duty::survive,
-       [](SpoiltFlight &flight) {
-         for (std::size_t i = 0; i < flight.frames(); ++i)
-           flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) / 100 * 101);
-       },
-       {},
-       {},
-       {},
-       0},
+      fromTheFirst({"pictures", "rows_twice", "each picture once more 50 ms later", Duty::survive,
+                    [](SpoiltFlight &flight) {
+                      std::vector<SpoiltFlight::Row> rows;
+                      for (const SpoiltFlight::Row &row : flight.camera.rows)
+                        for (const std::int64_t later_ns : {0, 50'000'000})
+                          rows.push_back({std::to_string(std::stoll(row[0]) + later_ns), row[1]});
+                      flight.camera.rows = std::move(rows);
+                    }}),
+      fromTheFirst({"pictures", "stamps_drift", "a clock that is 1 % slow", Duty::survive,
+                    [](SpoiltFlight &flight) {
+                      for (std::size_t i = 0; i < flight.frames(); ++i)
+                        flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) / 100 * 101);
+                    }}),
   };
 }
 } // namespace
 
-std::vector<Fault> pictureFaults()
-{
-  std::vector<Fault> all;
-  for (const auto &part : {lightFaults(), lensFaults(), readoutFaults(), orderFaults()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
+std::vector<Fault> pictureFaults() { return joined({lightFaults(), lensFaults(), readoutFaults(), orderFaults()}); }
 } // namespace bole::faults

@@ -108,10 +108,9 @@ std::vector<Fault> lies()
   };
 }
 
-/// What is wrong from the first frame on.
 Fault fromTheFirst(const std::string &name, const std::string &what, const std::function<void(SpoiltFlight &)> &spoil)
 {
-  return {"sensors", name, what, Duty::survive, spoil, {}, {}, {}, 0};
+  return faults::fromTheFirst({"sensors", name, what, Duty::survive, spoil});
 }
 
 /// Poses that stand otherwise from the first to the last.
@@ -275,11 +274,5 @@ std::vector<Fault> dialects()
 }
 } // namespace
 
-std::vector<Fault> sensorFaults()
-{
-  std::vector<Fault> all;
-  for (const auto &part : {lies(), conventions(), units(), dialects()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
-}
+std::vector<Fault> sensorFaults() { return joined({lies(), conventions(), units(), dialects()}); }
 } // namespace bole::faults
