@@ -125,17 +125,9 @@ Bytes paveFrame(std::uint32_t number)
   H264Encoder encoder(160, 120, 20, 1e6, 1);
   const auto encoded = encoder.encode(scene(static_cast<int>(number)), true);
   PaveHeader header;
-  header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
-  header.coded_width = static_cast<std::uint16_t>(encoder.codedWidth());
-  header.coded_height = static_cast<std::uint16_t>(encoder.codedHeight());
-  header.display_width = 160;
-  header.display_height = 120;
   header.frame_number = number;
   header.timestamp_ms = 50 * number;
-  header.frame_type = PaveFrameType::idr;
-  Bytes frame = encodePaveHeader(header);
-  frame.insert(frame.end(), encoded.bytes.begin(), encoded.bytes.end());
-  return frame;
+  return encoder.paveFrame(encoded, header);
 }
 
 /// All of \p bytes, as long as the client stays; false when it goes.

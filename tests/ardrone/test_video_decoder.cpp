@@ -26,16 +26,9 @@ std::vector<Bytes> encodedFlight(std::size_t count)
     const auto packet = encoder.encode(frame.image);
     EXPECT_EQ(packet.is_key, frames.size() % kKeyInterval == 0);
     PaveHeader header;
-    header.payload_size = header.advertised_size = static_cast<std::uint32_t>(packet.bytes.size());
-    header.coded_width = static_cast<std::uint16_t>(encoder.codedWidth());
-    header.coded_height = static_cast<std::uint16_t>(encoder.codedHeight());
-    header.display_width = 160;
-    header.display_height = 120;
     header.frame_number = static_cast<std::uint32_t>(frames.size() + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * frames.size());
-    header.frame_type = packet.is_key ? PaveFrameType::idr : PaveFrameType::p;
-    frames.push_back(encodePaveHeader(header));
-    frames.back().insert(frames.back().end(), packet.bytes.begin(), packet.bytes.end());
+    frames.push_back(encoder.paveFrame(packet, header));
   }
   return frames;
 }

@@ -145,15 +145,10 @@ Bytes paveStream()
   for (int i = 0; i < 6; ++i) {
     const auto encoded = encoder.encode(scene(160, 128, i), i == 0);
     PaveHeader header;
-    header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
-    header.coded_width = header.display_width = 160;
-    header.coded_height = header.display_height = 128;
     header.frame_number = static_cast<std::uint32_t>(i + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * i);
-    header.frame_type = encoded.is_key ? PaveFrameType::idr : PaveFrameType::p;
-    const auto bytes = encodePaveHeader(header);
-    stream.insert(stream.end(), bytes.begin(), bytes.end());
-    stream.insert(stream.end(), encoded.bytes.begin(), encoded.bytes.end());
+    const Bytes frame = encoder.paveFrame(encoded, header);
+    stream.insert(stream.end(), frame.begin(), frame.end());
   }
   return stream;
 }

@@ -59,21 +59,11 @@ std::vector<std::uint8_t> DronePackets::pavePicture(const vpImage<unsigned char>
   const auto encoded = m_encoder->encode(image, m_force_key);
   m_force_key = false;
   PaveHeader header;
-  header.payload_size = header.advertised_size = static_cast<std::uint32_t>(encoded.bytes.size());
-  header.coded_width = static_cast<std::uint16_t>(m_encoder->codedWidth());
-  header.coded_height = static_cast<std::uint16_t>(m_encoder->codedHeight());
-  header.display_width = static_cast<std::uint16_t>(image.getWidth());
-  header.display_height = static_cast<std::uint16_t>(image.getHeight());
   header.frame_number = m_frame_number;
   header.timestamp_ms = static_cast<std::uint32_t>(m_clock_ms + (stamp_ns - m_boot_ns) / 1'000'000);
-  header.frame_type = encoded.is_key ? PaveFrameType::idr : PaveFrameType::p;
   header.stream_position = m_stream_position;
-  header.header1_size = encoded.sps_size;
-  header.header2_size = encoded.pps_size;
-  m_stream_position += header.payload_size;
-  auto bytes = encodePaveHeader(header);
-  bytes.insert(bytes.end(), encoded.bytes.begin(), encoded.bytes.end());
-  return bytes;
+  m_stream_position += static_cast<std::uint32_t>(encoded.bytes.size());
+  return m_encoder->paveFrame(encoded, header);
 }
 
 std::vector<std::uint8_t> DronePackets::status(Navdata navdata, std::int64_t stamp_ns, const Condition &condition)

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 extern "C" {
-#include <libavcodec/packet.h>
+#include <libavcodec/avcodec.h>
 }
 
 namespace bole
@@ -77,5 +77,20 @@ H264Encoder::Packet H264Encoder::encode(const vpImage<unsigned char> &image, boo
       packet.pps_size = static_cast<std::uint8_t>(second);
   }
   return packet;
+}
+
+std::vector<std::uint8_t> H264Encoder::paveFrame(const Packet &packet, PaveHeader header) const
+{
+  header.payload_size = header.advertised_size = static_cast<std::uint32_t>(packet.bytes.size());
+  header.coded_width = static_cast<std::uint16_t>(m_encoder.context().width);
+  header.coded_height = static_cast<std::uint16_t>(m_encoder.context().height);
+  header.display_width = static_cast<std::uint16_t>(m_width);
+  header.display_height = static_cast<std::uint16_t>(m_height);
+  header.frame_type = packet.is_key ? PaveFrameType::idr : PaveFrameType::p;
+  header.header1_size = packet.sps_size;
+  header.header2_size = packet.pps_size;
+  std::vector<std::uint8_t> bytes = encodePaveHeader(header);
+  bytes.insert(bytes.end(), packet.bytes.begin(), packet.bytes.end());
+  return bytes;
 }
 } // namespace bole

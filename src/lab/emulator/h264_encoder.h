@@ -3,6 +3,7 @@
 /// \file
 /// The encoder of an emulated AR.Drone 2.
 
+#include "ardrone/pave.h"
 #include "input/codec.h"
 
 #include <bole/visp.h>
@@ -27,8 +28,8 @@ public:
   H264Encoder(int width, int height, double rate_hz, double bit_rate, int key_interval = 15);
 
   Packet encode(const vpImage<unsigned char> &image, bool force_key = false);
-  int codedWidth() const { return (m_width + 15) / 16 * 16; }   ///< [px]
-  int codedHeight() const { return (m_height + 15) / 16 * 16; } ///< [px]
+  /// \p packet behind its header, \p header, of which number, time and place in the stream are given.
+  std::vector<std::uint8_t> paveFrame(const Packet &packet, PaveHeader header) const;
 
 private:
   int m_width, m_height;
