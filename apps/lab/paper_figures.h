@@ -48,6 +48,8 @@ struct Panel
   std::string caption;
 };
 
+/// The three columns of V (Eq. 14) as arrows over the image, one panel an axis, as SVG: Fig. 5.
+std::string basisFlowsSvg(const PinholeCamera &camera);
 Panel figure5(const PinholeCamera &camera);
 Panel figure6(const SeenFlight &flight);
 /// Three successes, and the two failures that the paper names, each where the flight has it.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole show-saliency: the basis flows (Fig. 5 of the paper) and saliency beside its images (Fig. 8).
-#include "basis_flows.h"
 #include "commands.h"
+#include "paper_figures.h"
 
 #include "output/atomic_file.h"
 #include <bole/open_source.h>
