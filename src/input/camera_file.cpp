@@ -32,13 +32,15 @@ const std::set<std::string> kSensorKeys = {"sensor_type",
                                            "accelerometer_noise_density",
                                            "accelerometer_random_walk"};
 
+/// Of a side of a picture [px].
+bool isSide(double v) { return v >= 8 && v <= 16384 && v == std::floor(v); }
+
 PinholeCamera readPinhole(const SensorYaml &yaml)
 {
   if (yaml.has("camera_model") && yaml.text("camera_model") != "pinhole")
     yaml.fail("camera_model", "pinhole");
   const auto size = yaml.numbers("resolution");
-  const auto is_size = [](double v) { return v >= 8 && v <= 16384 && v == std::floor(v); };
-  if (size.size() != 2 || !is_size(size[0]) || !is_size(size[1]))
+  if (size.size() != 2 || !isSide(size[0]) || !isSide(size[1]))
     yaml.fail("resolution", "width and height in pixels, 8 to 16384");
   const auto k = yaml.numbers("intrinsics");
   if (k.size() != 4 || !(k[0] > 0) || !(k[1] > 0))
@@ -75,7 +77,7 @@ MountedCamera readCalibration(const SensorYaml &yaml)
   PinholeCamera &pinhole = camera.model.pinhole;
   const auto size = [&yaml](const char *key) {
     const auto numbers = yaml.numbers(key);
-    if (numbers.size() != 1 || !(numbers[0] >= 8 && numbers[0] <= 16384 && numbers[0] == std::floor(numbers[0])))
+    if (numbers.size() != 1 || !isSide(numbers[0]))
       yaml.fail(key, "8 to 16384 px");
     return static_cast<int>(numbers[0]);
   };

@@ -3,7 +3,10 @@
 /// \file
 /// Text tables: CSV and the blank-separated lines of TUM trajectories, read strictly.
 
+#include "geometry/names.h"
+
 #include <cstdint>
+#include <fmt/format.h>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -43,6 +46,14 @@ public:
   /// A finite number; \p name is used in the error only.
   double number(std::size_t column, std::string_view name) const;
   std::int64_t integer(std::size_t column, std::string_view name) const;
+  /// A value of an enumeration by its name, \p last being the last one.
+  template <typename Value>
+  Value named(std::size_t column, const char *name, Value last, const char *otherwise = "is not known") const
+  {
+    if (const auto value = valueNamed(text(column), last))
+      return *value;
+    fail(fmt::format("{} = \"{}\", {}", name, text(column), otherwise));
+  }
   /// Whole nanoseconds, later than those of the row before.
   std::int64_t risingStampNs(std::size_t column);
   /// Seconds with up to nine decimals as nanoseconds (exact), later than those of the row before.

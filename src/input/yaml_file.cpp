@@ -15,8 +15,6 @@ constexpr int kDeepest = 32;
 constexpr int kMostNodes = 100000;
 constexpr std::uintmax_t kMostBytes = 1000000; ///< of a file that people write
 
-[[noreturn]] void fail(const std::string &message) { throw ioError("{}", message); }
-
 /// The encoding, and brackets that the parser would follow into the depth.
 void checkText(const std::string &path, std::string &text)
 {
@@ -28,9 +26,9 @@ void checkText(const std::string &path, std::string &text)
     depth += c == '[' || c == '{' ? 1 : 0;
     depth -= (c == ']' || c == '}') && depth > 0 ? 1 : 0;
     if (c == '\0' || c == '\xFE' || c == '\xFF')
-      fail(fmt::format("{}:{}: is no text in UTF-8", path, line));
+      throw ioError("{}:{}: is no text in UTF-8", path, line);
     if (depth > kDeepest)
-      fail(fmt::format("{}:{}: is nested deeper than {}", path, line, kDeepest));
+      throw ioError("{}:{}: is nested deeper than {}", path, line, kDeepest);
   }
 }
 
@@ -45,10 +43,10 @@ public:
     if (node.Mark().line > m_line)
       m_line = node.Mark().line;
     if (depth > kDeepest)
-      fail(fmt::format("{}:{}: is nested deeper than {}, or holds itself by an alias", m_path, node.Mark().line + 1,
-                       kDeepest));
+      throw ioError("{}:{}: is nested deeper than {}, or holds itself by an alias", m_path, node.Mark().line + 1,
+                    kDeepest);
     if (++m_nodes > kMostNodes)
-      fail(fmt::format("{}:{}: aliases make more than {} entries of it", m_path, m_line + 1, kMostNodes));
+      throw ioError("{}:{}: aliases make more than {} entries of it", m_path, m_line + 1, kMostNodes);
     if (!node.IsMap() && !node.IsSequence())
       return;
     for (const auto &child : node) {
@@ -57,7 +55,7 @@ public:
         continue;
       }
       if (!child.first.IsScalar())
-        fail(fmt::format("{}: a key must be one word", placeOf(m_path, child.first.Mark())));
+        throw ioError("{}: a key must be one word", placeOf(m_path, child.first.Mark()));
       into(child.second, depth + 1);
     }
   }
@@ -71,12 +69,12 @@ private:
 std::string readSmallFile(const std::string &path)
 {
   if (!std::filesystem::is_regular_file(path))
-    fail(fmt::format("{}: no such file", path));
+    throw ioError("{}: no such file", path);
   if (std::filesystem::file_size(path) > kMostBytes)
-    fail(fmt::format("{}: is larger than {} bytes", path, kMostBytes));
+    throw ioError("{}: is larger than {} bytes", path, kMostBytes);
   std::ifstream file(path, std::ios::binary);
   if (!file)
-    fail(fmt::format("{}: cannot be read", path));
+    throw ioError("{}: cannot be read", path);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
@@ -95,7 +93,7 @@ YAML::Node loadYaml(const std::string &path)
     return root;
   }
   catch (const YAML::Exception &error) {
-    fail(fmt::format("{}: {}", placeOf(path, error.mark), error.msg));
+    throw ioError("{}: {}", placeOf(path, error.mark), error.msg);
   }
 }
 } // namespace bole

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/flight_trace.h"
 
-#include "geometry/names.h"
 #include "input/csv_reader.h"
 #include "output/atomic_file.h"
 #include "output/trajectory_writer.h"
@@ -27,12 +26,6 @@ std::string oneField(std::string text)
   return text;
 }
 
-FrameStatus statusOf(const CsvReader &csv, std::size_t column)
-{
-  if (const auto status = valueNamed(csv.text(column), FrameStatus::doubtful))
-    return *status;
-  csv.fail(fmt::format("status = \"{}\", is not known", csv.text(column)));
-}
 } // namespace
 
 void GroundEvidence::add(const Eigen::Vector3d &point, int count)
@@ -80,7 +73,7 @@ FlightTrace readTrace(const std::string &folder)
     FrameTrace frame;
     frame.index = static_cast<std::size_t>(frames.integer(0, "frame"));
     frame.stamp_ns = frames.risingStampFromSeconds(1);
-    frame.status = statusOf(frames, 2);
+    frame.status = frames.named(2, "status", FrameStatus::doubtful);
     frame.place = {frames.number(3, "x"), frames.number(4, "y"), frames.number(5, "z")};
     const double xy = frames.number(7, "var_xy");
     frame.covariance_xy << frames.number(6, "var_xx"), xy, xy, frames.number(8, "var_yy");

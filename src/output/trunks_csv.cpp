@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/trunks_csv.h"
-#include "geometry/names.h"
 #include "input/csv_reader.h"
 #include "output/atomic_file.h"
 
@@ -53,25 +52,11 @@ void addRow(std::string &text, const TrunkRecord &trunk)
     fmt::format_to(std::back_inserter(text), ",{:.6e}", trunk.covariance(row, column));
 }
 
-TrunkStatus readStatus(const CsvReader &csv, std::size_t column)
-{
-  if (const auto status = valueNamed(csv.text(column), TrunkStatus::merged))
-    return *status;
-  csv.fail(fmt::format("status = \"{}\", must be candidate, confirmed, lost or merged", csv.text(column)));
-}
-
-TrunkFate readFate(const CsvReader &csv, std::size_t column)
-{
-  if (const auto fate = valueNamed(csv.text(column), TrunkFate::unranged))
-    return *fate;
-  csv.fail(fmt::format("fate = \"{}\", is not known", csv.text(column)));
-}
-
 TrunkRecord readRow(const CsvReader &csv)
 {
   TrunkRecord trunk;
   trunk.id = static_cast<int>(csv.integer(0, "id"));
-  trunk.status = readStatus(csv, 1);
+  trunk.status = csv.named(1, "status", TrunkStatus::merged, "must be candidate, confirmed, lost or merged");
   trunk.xy = {csv.number(2, "x"), csv.number(3, "y")};
   trunk.radius = csv.number(4, "radius");
   if (!(trunk.radius > 0))
@@ -128,7 +113,7 @@ std::vector<TrunkRecord> readTrunks(const std::string &path)
   while (csv.next()) {
     trunks.push_back(readRow(csv));
     if (has_fate)
-      trunks.back().fate = readFate(csv, kColumns);
+      trunks.back().fate = csv.named(kColumns, "fate", TrunkFate::unranged);
   }
   return trunks;
 }
