@@ -27,7 +27,7 @@
 /// eliminations of a front of 50 columns, 250 back-substitutions), see the benchmark
 /// smoothing_flat; covariances O(number of eliminations between the variable and the newest pose).
 /// Limit: fronts hold all trunks that come back later; and now and then a pass goes through the
-/// whole flight. The fixed lag bounds both.
+/// whole flight. The fixed lag bounds both; memory is then a pose a frame (104 bytes).
 ///
 /// Deviations from the paper: trunks may lean; robust loss on summary factors; the paper sums
 /// energies, we drop the part of them that no variable can change.
@@ -142,7 +142,7 @@ public:
   /// As given to the constructor.
   const SmootherOptions &options() const;
 
-  // Growing the graph. Ids count from 0 and stay valid for ever.
+  // Growing the graph. Ids count from 0; with a fixed lag that of a removed trunk is given again.
 
   /// The pose that all others hang on. \return 0
   std::size_t addFirstPose(const Pose &wMb, const Matrix6d &covariance);
@@ -172,6 +172,10 @@ public:
   void removeTrunk(std::size_t trunk);
   /// What was seen of \p gone was \p keep all along; \p gone is forgotten, its prior too.
   void mergeTrunks(std::size_t keep, std::size_t gone);
+  /// Whether a trunk stays open however long ago it was seen: under the fixed lag it then ties the visits of a place
+  /// together as all poses between them would. What the lag closes is a dense quadratic on all that are kept: each
+  /// costs 5 columns of it, so keep tens.
+  void keepTrunk(std::size_t trunk, bool is_kept);
 
   // Solving.
 

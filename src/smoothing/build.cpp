@@ -54,8 +54,7 @@ std::size_t Smoother::State::newPose(const Pose &point)
   pose.point = point;
   pose.point.t += shiftOfPoint(static_cast<int>(poses.size()) - 1);
   variable.delta = point.minus(pose.point);
-  pose.variable = static_cast<int>(variables.size());
-  variables.push_back(std::move(variable));
+  pose.variable = placeVariable(std::move(variable));
   poses.push_back(pose);
   rememberProbe(variables[pose.variable]);
   touch(pose.variable);
@@ -71,13 +70,53 @@ std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prio
   trunk.point = shifted(point, shiftOfPoint(static_cast<int>(poses.size()) - 1));
   trunk.prior = prior;
   trunk.last_pose = std::max<int>(0, static_cast<int>(poses.size()) - 1);
-  trunks.push_back(trunk);
-  reopenTrunk(static_cast<int>(trunks.size()) - 1);
-  Variable &variable = variables[trunks.back().variable];
-  variable.delta.head<5>() = trunks.back().kept = point.minus(trunks.back().point);
+  std::size_t number = trunks.size();
+  if (free_trunks.empty())
+    trunks.push_back(trunk);
+  else {
+    number = static_cast<std::size_t>(free_trunks.back());
+    free_trunks.pop_back();
+    trunks[number] = trunk;
+  }
+  reopenTrunk(static_cast<int>(number));
+  TrunkState &made = trunks[number];
+  Variable &variable = variables[made.variable];
+  variable.delta.head<5>() = made.kept = point.minus(made.point);
   if (!poses.empty())
     rememberProbe(variable);
-  return trunks.size() - 1;
+  return number;
+}
+
+/// Where one was recycled, or at the end.
+int Smoother::State::placeVariable(Variable variable)
+{
+  if (free_variables.empty()) {
+    variables.push_back(std::move(variable));
+    return static_cast<int>(variables.size()) - 1;
+  }
+  const int id = free_variables.back();
+  free_variables.pop_back();
+  variables[id] = std::move(variable);
+  return id;
+}
+
+/// Frees a closed or removed variable that nothing names any more.
+void Smoother::State::recycle(int id)
+{
+  Variable &variable = variables[id];
+  if (variable.in_moved)
+    moved.erase(std::remove(moved.begin(), moved.end(), id), moved.end());
+  if (!variable.is_pose) {
+    open_trunks.erase(std::remove(open_trunks.begin(), open_trunks.end(), id), open_trunks.end());
+    TrunkState &trunk = trunks[variable.number];
+    trunk.variable = -1;
+    if (trunk.removed && options.fixed_lag > 0)
+      free_trunks.push_back(variable.number);
+  }
+  const Life life = variable.life;
+  variable = Variable();
+  variable.life = life;
+  free_variables.push_back(id);
 }
 
 /// Gives a trunk a variable of its own, at its present point.
@@ -87,9 +126,8 @@ void Smoother::State::reopenTrunk(int trunk)
   variable.is_pose = false;
   variable.number = trunk;
   variable.dim = 5;
-  trunks[trunk].variable = static_cast<int>(variables.size());
+  trunks[trunk].variable = placeVariable(std::move(variable));
   trunks[trunk].kept.setZero();
-  variables.push_back(std::move(variable));
   if (options.fixed_lag > 0)
     open_trunks.push_back(trunks[trunk].variable);
   touch(trunks[trunk].variable);
@@ -180,13 +218,8 @@ void Smoother::State::freeDropped()
     free_factors.push_back(id);
   }
   dropped_factors.clear();
-  for (const int id : removed_variables) {
-    Variable &variable = variables[id];
-    for (std::vector<int> *list : {&variable.factors, &variable.children, &variable.separator, &variable.assembled})
-      std::vector<int>().swap(*list);
-    for (std::vector<double> *list : {&variable.columns, &variable.contribution})
-      std::vector<double>().swap(*list);
-  }
+  for (const int id : removed_variables)
+    recycle(id);
   removed_variables.clear();
 }
 
@@ -226,10 +259,14 @@ void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFac
 void Smoother::State::removeTrunk(int trunk)
 {
   TrunkState &gone = trunks[trunk];
-  Variable &variable = variables[gone.variable];
   gone.removed = true;
-  if (variable.life != Life::open)
+  gone.is_kept = false;
+  if (!isOpen(gone.variable)) {
+    if (options.fixed_lag > 0)
+      free_trunks.push_back(trunk);
     return;
+  }
+  Variable &variable = variables[gone.variable];
   const std::vector<int> list = variable.factors;
   bool in_marginal = false;
   for (const int factor : list) {
@@ -249,11 +286,11 @@ void Smoother::State::removeTrunk(int trunk)
 
 void Smoother::State::mergeTrunks(int keep, int gone)
 {
-  const Variable &variable = variables[trunks[gone].variable];
   std::vector<std::pair<int, int>> moving; // pose, data
-  for (const int factor : variable.factors)
-    if (factors[factor].kind == FactorKind::observation)
-      moving.emplace_back(variables[factors[factor].a].number, factors[factor].data);
+  if (isOpen(trunks[gone].variable))
+    for (const int factor : variables[trunks[gone].variable].factors)
+      if (factors[factor].kind == FactorKind::observation)
+        moving.emplace_back(variables[factors[factor].a].number, factors[factor].data);
   removeTrunk(gone);
   for (const auto &[pose, data] : moving) {
     const ObservationData seen = observations[data];

@@ -72,7 +72,7 @@ Matrix6d Smoother::State::poseCovariance(int pose)
 {
   const PoseState &state = poses[pose];
   if (!isOpen(state.variable))
-    return state.closed_covariance;
+    return closed_covariances[static_cast<std::size_t>(pose / kCovarianceEvery)];
   if (!variables[state.variable].eliminated)
     throw vpException(vpException::notInitialized, "pose = %d, must be taken in by update() first", pose);
   const Matrix6d X = Matrix6d::Identity();

@@ -6,21 +6,20 @@
 
 namespace bole
 {
-/// Poses between two whose covariance is taken on closing: it is a walk through the whole lag, and changes slowly.
-constexpr int kCovarianceEvery = 16;
-
 /// A leaf of the tree leaves exactly its contribution behind.
 void Smoother::State::closeVariable(int id)
 {
   Variable &v = variables[id];
   if (v.is_pose) {
-    poses[v.number].closed_covariance =
-        v.number % kCovarianceEvery == 0 ? poseCovariance(v.number) : poses[v.number - 1].closed_covariance;
+    if (v.number % kCovarianceEvery == 0)
+      closed_covariances.push_back(poseCovariance(v.number));
     poses[v.number].point = estimate(poses[v.number]);
+    poses[v.number].variable = -1;
   }
   else {
     trunks[v.number].closed_covariance = trunkCovariance(v.number);
     trunks[v.number].point = estimate(trunks[v.number]);
+    trunks[v.number].variable = -1;
   }
   for (const int f : v.assembled) {
     Factor &factor = factors[f];
@@ -73,11 +72,26 @@ void Smoother::State::closeVariable(int id)
     parent.children.erase(std::remove(parent.children.begin(), parent.children.end(), id), parent.children.end());
   }
   v.life = Life::closed;
-  for (std::vector<int> *list : {&v.factors, &v.assembled, &v.separator})
-    std::vector<int>().swap(*list);
-  std::vector<double>().swap(v.columns);
-  std::vector<double>().swap(v.contribution);
-  v.parent = -1;
+  recycle(id);
+}
+
+/// Trunks that are kept and come to be the oldest that is open are eliminated behind a pose in the middle of the lag
+/// from now on, all at once: a pose before it is closed without them being eliminated again.
+void Smoother::State::moveKept()
+{
+  const auto isBefore = [this](const TrunkState &trunk, int pose) {
+    return trunk.is_kept && std::max(trunk.last_pose, trunk.behind) < pose;
+  };
+  const auto trunkOf = [this](int id) -> TrunkState & { return trunks[variables[id].number]; };
+  if (std::none_of(open_trunks.begin(), open_trunks.end(),
+                   [&](int id) { return isBefore(trunkOf(id), oldest_open_pose); }))
+    return;
+  const int middle = static_cast<int>(poses.size()) - 1 - options.fixed_lag / 2;
+  for (const int id : open_trunks)
+    if (isBefore(trunkOf(id), middle)) {
+      trunkOf(id).behind = middle;
+      touch(id);
+    }
 }
 
 void Smoother::State::closeBehindLag()
@@ -92,16 +106,12 @@ void Smoother::State::closeBehindLag()
     for (std::size_t i = 0; i < open_trunks.size();) {
       const int id = open_trunks[i];
       const TrunkState &trunk = trunks[variables[id].number];
-      if (variables[id].life == Life::open && (trunk.last_pose >= oldest_open_pose || !isLeaf(id))) {
+      if (trunk.is_kept || trunk.last_pose >= oldest_open_pose || !isLeaf(id)) {
         ++i;
         continue;
       }
-      if (variables[id].life == Life::open) {
-        closeVariable(id);
-        closed = true;
-      }
-      open_trunks[i] = open_trunks.back();
-      open_trunks.pop_back();
+      closeVariable(id);
+      closed = true;
     }
     if (oldest_open_pose < keep_from && isLeaf(poses[oldest_open_pose].variable)) {
       closeVariable(poses[oldest_open_pose].variable);
@@ -109,7 +119,8 @@ void Smoother::State::closeBehindLag()
       closed = true;
     }
     if (!closed)
-      return;
+      break;
   }
+  moveKept();
 }
 } // namespace bole

@@ -11,11 +11,11 @@ void Smoother::State::orderAffected()
 {
   const auto key = [this](int id) {
     const Variable &v = variables[id];
-    return v.is_pose ? 2 * v.number : 2 * trunks[v.number].last_pose + 1;
+    return v.is_pose ? 2 * v.number : 2 * std::max(trunks[v.number].last_pose, trunks[v.number].behind) + 1;
   };
   std::sort(affected.begin(), affected.end(), [&](int l, int r) {
     const int kl = key(l), kr = key(r);
-    return kl != kr ? kl < kr : l < r;
+    return kl != kr ? kl < kr : variables[l].number < variables[r].number;
   });
 }
 } // namespace bole

@@ -118,6 +118,8 @@ void Smoother::removeObservation(std::size_t pose, std::size_t trunk)
   m_state->checkPose(pose);
   m_state->checkTrunk(trunk);
   const int seen = m_state->trunks[trunk].variable;
+  if (!m_state->isOpen(m_state->poses[pose].variable))
+    return;
   const std::vector<int> factors = m_state->variables[m_state->poses[pose].variable].factors;
   for (const int id : factors) {
     const Factor &factor = m_state->factors[id];
@@ -172,6 +174,12 @@ void Smoother::mergeTrunks(std::size_t keep, std::size_t gone)
   m_state->checkTrunk(gone);
   require(keep != gone, "mergeTrunks, must be given two trunks");
   m_state->mergeTrunks(static_cast<int>(keep), static_cast<int>(gone));
+}
+
+void Smoother::keepTrunk(std::size_t trunk, bool is_kept)
+{
+  m_state->checkTrunk(trunk);
+  m_state->trunks[trunk].is_kept = is_kept;
 }
 
 UpdateResult Smoother::update() { return m_state->update(); }

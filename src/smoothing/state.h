@@ -130,21 +130,25 @@ struct MarginalData
 
 struct PoseState
 {
-  Pose point; ///< of linearisation; the last estimate once closed
-  int variable = -1;
-  Matrix6d closed_covariance = Matrix6d::Zero();
+  Pose point;        ///< of linearisation; the last estimate once closed
+  int variable = -1; ///< -1: closed
 };
 struct TrunkState
 {
   Trunk point;
   TrunkPrior prior;
-  int variable = -1;
+  int variable = -1;                ///< -1: closed
   Vector5d kept = Vector5d::Zero(); ///< delta when the point was chosen: the common shift of its neighbours
-  int last_pose = 0;
+  int last_pose = 0;                ///< that saw it
+  int behind = 0;                   ///< where it is kept: the pose that it is eliminated behind, at the earliest
   int observations = 0;
   bool removed = false;
+  bool is_kept = false; ///< open whenever it was seen last
   Matrix5d closed_covariance = Matrix5d::Zero();
 };
+
+/// Poses between two whose covariance is taken on closing: it is a walk through the whole lag, and changes slowly.
+constexpr int kCovarianceEvery = 16;
 
 /// The axis moved without a turn.
 Trunk shifted(Trunk trunk, const Eigen::Vector3d &shift);
@@ -156,6 +160,7 @@ public:
   std::deque<Variable> variables;
   std::deque<PoseState> poses;
   std::deque<TrunkState> trunks;
+  std::vector<Matrix6d> closed_covariances; ///< of every kCovarianceEvery-th closed pose
   std::deque<Factor> factors;
   std::deque<PosePriorData> pose_priors;
   std::deque<OdometryData> odometry;
@@ -183,7 +188,9 @@ public:
   void mergeTrunks(int keep, int gone);
   void checkPose(std::size_t pose) const;
   void checkTrunk(std::size_t trunk) const;
-  bool isOpen(int variable) const { return variables[variable].life == Life::open; }
+  bool isOpen(int variable) const { return variable >= 0 && variables[variable].life == Life::open; }
+  int placeVariable(Variable variable);
+  void recycle(int variable);
 
   // linearise.cpp
   void linearise(Factor &factor);
@@ -232,6 +239,7 @@ public:
   // lag.cpp
   void closeBehindLag();
   void closeVariable(int variable);
+  void moveKept();
 
   // optimize.cpp
   void measureDampingScale();
@@ -266,7 +274,8 @@ public:
     int variable, depth, quiet;
   };
   std::vector<int> dropped_factors, removed_variables; ///< still named by what is to be eliminated again
-  std::vector<int> free_factors;
+  std::vector<int> free_factors, free_variables;
+  std::vector<int> free_trunks;              ///< under a lag, which has no end
   std::array<std::vector<int>, 7> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
   std::vector<Descent> stack;

@@ -117,9 +117,9 @@ void Smoother::State::fetchAhead(int pose) const
     for (std::size_t i = 0; i < bytes; i += 64)
       __builtin_prefetch(static_cast<const char *>(from) + i);
   };
-  if (pose >= kFetchNodes)
+  if (pose >= kFetchNodes && isOpen(poses[pose - kFetchNodes].variable))
     fetch(&variables[poses[pose - kFetchNodes].variable], sizeof(Variable));
-  if (pose < kFetchColumns)
+  if (pose < kFetchColumns || !isOpen(poses[pose - kFetchColumns].variable))
     return;
   const Variable &v = variables[poses[pose - kFetchColumns].variable];
   fetch(v.columns.data(), v.columns.size() * sizeof(double));
@@ -219,7 +219,7 @@ void Smoother::State::dropContribution(Variable &v)
 Eigen::Vector3d Smoother::State::shiftBeyondAffected() const
 {
   int seam = static_cast<int>(poses.size()) - 1;
-  while (seam >= 0 && variables[poses[seam].variable].affected == stamp)
+  while (seam >= 0 && isOpen(poses[seam].variable) && variables[poses[seam].variable].affected == stamp)
     --seam;
   return seam < 0 ? Eigen::Vector3d::Zero() : shiftOfPoint(seam);
 }
@@ -306,7 +306,7 @@ UpdateResult Smoother::State::update()
       break;
     reeliminate(result);
     backSubstitute(result);
-    if (const int old = static_cast<int>(poses.size()) - 1 - kRecentPoses; old >= 0)
+    if (const int old = static_cast<int>(poses.size()) - 1 - kRecentPoses; old >= 0 && isOpen(poses[old].variable))
       dropContribution(variables[poses[old].variable]);
     ++result.iterations;
   }

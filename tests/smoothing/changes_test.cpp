@@ -235,7 +235,7 @@ TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
 }
 
 /// Bytes by which a smoother grows from the 100th to the 200th frame, with trunks that are given up a frame later.
-std::size_t growth(int candidates, int fixed_lag)
+double growth(int candidates, int fixed_lag)
 {
   FlightOptions o;
   o.poses = 200;
@@ -261,7 +261,7 @@ std::size_t growth(int candidates, int fixed_lag)
     }
     replay.smoother.update();
   }
-  return replay.smoother.memoryBytes() - at_half;
+  return static_cast<double>(replay.smoother.memoryBytes()) - static_cast<double>(at_half);
 }
 
 TEST(Changes, TrunksThatAreGivenUpGiveTheirMemoryBack) { EXPECT_LT(growth(3, 0), 1.5 * growth(0, 0)); }
@@ -276,6 +276,75 @@ TEST(Changes, AnOptimisationKeepsNoMoreThanTheUpdates)
   const std::size_t online = replay.smoother.memoryBytes();
   replay.smoother.optimize();
   EXPECT_LT(replay.smoother.memoryBytes(), 1.1 * online);
+}
+
+/// Of the last pose of eight rounds past the same trunks, of which the lag spans half a round.
+struct Return
+{
+  Vector6d apart; ///< from all that is open, in its standard deviations
+  Vector6d sigma; ///< over that of all that is open
+};
+
+Return afterRounds(bool is_kept)
+{
+  FlightOptions o;
+  o.lap = 120;
+  o.poses = 8 * o.lap;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions lagged = smootherFor(o);
+  lagged.fixed_lag = o.lap / 2;
+  Replay full(flight, smootherFor(o)), window(flight, lagged);
+  full.run();
+  for (int i = 0; i < o.poses; ++i) {
+    window.step();
+    if (is_kept)
+      for (const auto &[j, summary] : flight.views[static_cast<std::size_t>(i)])
+        window.smoother.keepTrunk(window.trunk_id[j], true);
+  }
+  const std::size_t last = static_cast<std::size_t>(o.poses) - 1;
+  const Eigen::ArrayXd exact = full.smoother.currentPoseCovariance().diagonal().array().sqrt();
+  const Eigen::ArrayXd sigma = window.smoother.currentPoseCovariance().diagonal().array().sqrt();
+  return {window.smoother.pose(last).minus(full.smoother.pose(last)).array() / exact, sigma / exact};
+}
+
+TEST(Changes, KeptTrunksTieTheRoundsTogetherThatTheLagHasClosed)
+{
+  const Return with = afterRounds(true), without = afterRounds(false);
+  EXPECT_LT(with.apart.cwiseAbs().maxCoeff(), 1);
+  EXPECT_LT((with.sigma - Vector6d::Ones()).cwiseAbs().maxCoeff(), 0.1);
+  EXPECT_GT((without.sigma - Vector6d::Ones()).cwiseAbs().maxCoeff(), 0.2); // a closed trunk counts twice what it knows
+}
+
+TEST(Changes, ALongFlightUnderALagKeepsAPoseAFrameAndNothingElse)
+{
+  constexpr std::size_t kPose = 160; // bytes: the pose, and its part of the covariances
+  FlightOptions o;
+  o.lap = 100;
+  o.poses = 12 * o.lap;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions options = smootherFor(o);
+  options.fixed_lag = 40;
+  Replay replay(flight, options);
+  std::size_t before = 0;
+  std::vector<std::size_t> given_up;
+  for (int i = 0; i < o.poses; ++i) {
+    if (i == 4 * o.lap)
+      before = replay.smoother.memoryBytes();
+    replay.add();
+    for (const std::size_t trunk : given_up)
+      replay.smoother.removeTrunk(trunk);
+    given_up.clear();
+    for (const auto &[j, summary] : flight.views[static_cast<std::size_t>(i)])
+      replay.smoother.keepTrunk(replay.trunk_id[j], true);
+    for (int k = 0; k < 2 && i > 0 && !flight.views[static_cast<std::size_t>(i)].empty(); ++k) {
+      const SummaryFactor &summary = flight.views[static_cast<std::size_t>(i)].front().second;
+      const Pose wMc = replay.smoother.pose(static_cast<std::size_t>(i)) * options.bMc;
+      given_up.push_back(replay.smoother.addTrunk(trunkFromRelative(wMc, summary.optimum, 0.15)));
+      replay.smoother.addObservation(static_cast<std::size_t>(i), given_up.back(), summary);
+    }
+    replay.smoother.update();
+  }
+  EXPECT_LT(replay.smoother.memoryBytes(), before + 8 * o.lap * kPose);
 }
 
 TEST(Changes, TheLagGivesMemoryBack) { EXPECT_LT(growth(0, 40), 0.2 * growth(0, 0)); }
