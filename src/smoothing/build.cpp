@@ -158,10 +158,13 @@ int Smoother::State::placeFactor(const Factor &factor)
   return id;
 }
 
-std::size_t Smoother::State::blockSize(const Factor &factor) const
+/// By its kind alone, as its variables may be closed by now.
+std::size_t blockSize(FactorKind kind)
 {
-  const int columns = variables[factor.a].dim + (factor.b >= 0 ? variables[factor.b].dim : 0) + 1;
-  return static_cast<std::size_t>(rowCount(factor.kind)) * columns;
+  const int columns = kind == FactorKind::pose_prior                                      ? 6
+                      : kind == FactorKind::odometry || kind == FactorKind::relative_pose ? 12
+                                                                                          : 11;
+  return static_cast<std::size_t>(rowCount(kind)) * (columns + 1);
 }
 
 int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
@@ -171,7 +174,7 @@ int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
   factor.data = data;
   factor.a = a;
   factor.b = b;
-  factor.linear = store.allocate(blockSize(factor));
+  factor.linear = store.allocate(blockSize(kind));
   const int id = placeFactor(factor);
   variables[a].factors.push_back(id);
   touch(a);
@@ -214,7 +217,7 @@ void Smoother::State::freeDropped()
     if (factor.kind == FactorKind::image)
       images[factor.data].energy = nullptr;
     if (factor.linear != nullptr)
-      store.release(factor.linear, blockSize(factor));
+      store.release(factor.linear, blockSize(factor.kind));
     free_factors.push_back(id);
   }
   dropped_factors.clear();

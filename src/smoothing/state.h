@@ -92,6 +92,8 @@ struct Factor
 
 /// Rows of the whitened residual (not of a marginal).
 int rowCount(FactorKind kind);
+/// Doubles of its linearisation (not of a marginal).
+std::size_t blockSize(FactorKind kind);
 
 struct PosePriorData
 {
@@ -178,7 +180,6 @@ public:
   int newFactor(FactorKind kind, int data, int a, int b);
   int placeFactor(const Factor &factor);
   template <typename Data> int placeData(std::deque<Data> &list, FactorKind kind, Data data);
-  std::size_t blockSize(const Factor &factor) const;
   void dropFactor(int factor);
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
