@@ -33,8 +33,8 @@ FlightPath::FlightPath(const FlightOptions &options) : m_options(options)
     m_wave_length = random.uniform(7.5, 9.5); // seconds a sweep, to and fro, at 1 m/s
     break;
   case PathKind::loop:
-    // One lap in the time there is, if its radius is one that a clearing in a forest has.
-    m_radius = std::clamp(options.speed * options.duration / kTwoPi, 3.0, 15.0);
+    // If its radius is one that a clearing in a forest has.
+    m_radius = std::clamp(options.speed * options.duration / options.laps / kTwoPi, 3.0, 15.0);
     break;
   case PathKind::slalom:
     m_swing = random.uniform(1.6, 2.2);

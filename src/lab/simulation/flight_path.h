@@ -24,6 +24,7 @@ struct FlightOptions
   std::uint64_t seed = 1;
   double speed = 1;        ///< along the path [m/s], 0.05 to 10
   double duration = 12;    ///< [s], 0 to 3600
+  double laps = 1;         ///< of a loop, in the time there is, 0.1 to 1000
   double height = 1.2;     ///< over the ground at the start [m], 0.3 to 10
   double wobble_deg = 1.2; ///< of roll and pitch on top of what the acceleration asks for, 0 to 20
 };

@@ -41,6 +41,7 @@ template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit
   visit("flight", "path", flight.kind);
   visit("flight", "seed", flight.seed);
   visit("flight", "speed", flight.speed, 0.05, 10);
+  visit("flight", "laps", flight.laps, 0.1, 1000);
   visit("flight", "height", flight.height, 0.3, 10);
   visit("flight", "wobble_deg", flight.wobble_deg, 0, 20);
   auto &renderer = scene.renderer;

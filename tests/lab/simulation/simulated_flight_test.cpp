@@ -179,8 +179,12 @@ TEST(FlightPath, LoopEndsWhereItBegan)
   FlightOptions options;
   options.kind = PathKind::loop;
   options.duration = 40;
-  const FlightPath path(options);
-  EXPECT_LT((path.position(40) - path.position(0)).head<2>().norm(), 1e-9);
+  for (const double laps : {1.0, 2.0}) {
+    options.laps = laps;
+    const FlightPath path(options);
+    EXPECT_LT((path.position(40 / laps) - path.position(0)).head<2>().norm(), 1e-9);
+    EXPECT_GT((path.position(20 / laps) - path.position(0)).head<2>().norm(), 5);
+  }
 }
 
 TEST(SimulatedImu, FeelsGravityAtRestAndTurnsWithTheBody)
