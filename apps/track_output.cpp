@@ -104,12 +104,22 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
 void TrackOutput::trace(const Frame &frame, const FrameReport &report)
 {
   constexpr double kFar = 15; // points beyond are no evidence of a trunk of the map [m]
+  constexpr std::size_t kForgottenAtOnce = 64;
   const Eigen::Matrix3d wRb = report.wMb.R;
   const Eigen::Matrix3d place_covariance = wRb * report.pose_covariance.topLeftCorner<3, 3>() * wRb.transpose();
   m_trace.frames.push_back({frame.index, frame.stamp_ns, report.frame_status, report.wMb.t,
                             place_covariance.topLeftCorner<2, 2>(), report.reason});
   for (const Eigen::Vector3d &point : placedPoints(report, kFar))
     m_trace.evidence.add(point);
+  for (const int id : report.given_up) {
+    m_best_views.forget(id);
+    m_given_up.insert(id);
+  }
+  if (m_given_up.size() >= kForgottenAtOnce) {
+    const auto isGone = [this](const TrunkTrace &view) { return m_given_up.count(view.id) > 0; };
+    m_trace.views.erase(std::remove_if(m_trace.views.begin(), m_trace.views.end(), isGone), m_trace.views.end());
+    m_given_up.clear();
+  }
   for (const TrunkInView &view : report.trunks) {
     const KnownTrunk *known = knownTrunk(report, view.id);
     if (!view.is_tracked || known == nullptr)

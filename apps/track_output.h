@@ -14,6 +14,7 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <set>
 #include <string>
 
 namespace bole::apps
@@ -62,6 +63,7 @@ private:
   MapPicture m_picture;
   FlightTrace m_trace; ///< of all hypotheses until the end
   BestViews m_best_views;
+  std::set<int> m_given_up;                                 ///< whose part of m_trace is still to go
   Eigen::Vector2d m_camera_place = Eigen::Vector2d::Zero(); ///< of the first frame [m]
   Pose m_bMc;
   bool m_has_pictures;

@@ -22,7 +22,7 @@
 /// A Frame may be filled by hand: an image and a stamp suffice; the first frame tells whether there is odometry.
 /// Memory: the window of the detector, the graph of the smoother, and for the final pass (`stages.final_pass`) frames
 /// from places apart, at most 256 MB of pictures. With `map.lag` or for servoing there is no final pass and no image is
-/// kept beyond the window.
+/// kept beyond the window; with `map.lag` what a frame leaves for good is its pose and a line for each hypothesis.
 /// Not thread-safe; no globals.
 
 #include <bole/graph.h>

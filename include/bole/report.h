@@ -78,6 +78,7 @@ struct FrameReport
   bool has_ranges = true;                                 ///< false while the camera has only rotated
   std::vector<TrunkInView> trunks;                        ///< known trunks looked for
   std::vector<KnownTrunk> map;                            ///< all that a frame has to reckon with, in view or not
+  std::vector<int> given_up;                              ///< ids that never come back, whatever later frames show
   std::vector<TriangulatedRay> points;                    ///< none where the frame was not ok
   std::vector<SensorVerdict> verdicts;                    ///< all of the flight so far
   std::optional<SaliencyField> saliency;                  ///< where saliency is on

@@ -2,6 +2,8 @@
 // What becomes of a trunk: confirmed, lost, merged with another.
 #include "map/trunk_map.h"
 
+#include "map/constellation.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -211,15 +213,64 @@ void TrunkMap::reviewPairs(MapUpdate &update)
         continue;
       MapTrunk &keep = gone == &a ? b : a;
       const bool is_duplicate = isAnotherVisit(a, b);
-      gone->removed = true;
-      change(update, *gone, TrunkStatus::merged, is_duplicate ? TrunkFate::duplicate : TrunkFate::outdone, keep.id);
       if (is_duplicate) {
-        absorb(keep, *gone);
-        update.merged.push_back({keep.smoother_id, gone->smoother_id});
+        joinVisits(update, keep, *gone);
+        continue;
       }
-      else
-        update.removed.push_back(gone->smoother_id);
+      gone->removed = true;
+      change(update, *gone, TrunkStatus::merged, TrunkFate::outdone, keep.id);
+      update.removed.push_back(gone->smoother_id);
     }
+}
+
+void TrunkMap::joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone)
+{
+  gone.removed = true;
+  change(update, gone, TrunkStatus::merged, TrunkFate::duplicate, keep.id);
+  absorb(keep, gone);
+  update.merged.push_back({keep.smoother_id, gone.smoother_id});
+}
+
+/// Are the trunks in sight those of an earlier visit, all of them shifted by the drift of the path since? Asked when
+/// one of them is confirmed. Those in sight from one moment on are laid on those that were out of sight by then.
+void TrunkMap::reviewPlaces(MapUpdate &update, double now_s)
+{
+  constexpr double kSight_s = 5;     // seen within them, a trunk is in sight
+  constexpr double kMostTurn = 0.35; // the drift of a heading, at most [rad]
+  constexpr std::size_t kLeast = 3;  // trunks that a constellation is made of
+  const bool is_new = std::any_of(update.changes.begin(), update.changes.end(), [](const MapChange &change) {
+    return change.from == TrunkStatus::candidate && change.to == TrunkStatus::confirmed;
+  });
+  if (!is_new)
+    return;
+  std::vector<const MapTrunk *> seen, out_of_sight;
+  for (const std::size_t i : m_active) {
+    const MapTrunk &trunk = m_trunks[i];
+    if (!trunk.removed && trunk.status != TrunkStatus::candidate)
+      (trunk.last_seen_s > now_s - kSight_s ? seen : out_of_sight).push_back(&trunk);
+  }
+  std::sort(seen.begin(), seen.end(),
+            [](const MapTrunk *a, const MapTrunk *b) { return a->first_seen_s < b->first_seen_s; });
+  std::vector<TrunkRecord> earlier;
+  while (seen.size() >= kLeast && earlier.size() < kLeast) {
+    earlier.clear();
+    for (const MapTrunk *trunk : out_of_sight)
+      if (trunk->last_seen_s < seen.front()->first_seen_s)
+        earlier.push_back(recordOf(*trunk, 0, kBreastHeight));
+    if (earlier.size() < kLeast)
+      seen.erase(seen.begin());
+  }
+  if (seen.size() < kLeast)
+    return;
+  std::vector<TrunkRecord> now;
+  for (const MapTrunk *trunk : seen)
+    now.push_back(recordOf(*trunk, 0, kBreastHeight));
+  const auto placement = placeOnMap(now, earlier);
+  if (!placement || std::abs(placement->yaw) > kMostTurn)
+    return;
+  for (const auto &[gone, keep] : placement->matches)
+    if (!at(gone).removed)
+      joinVisits(update, at(keep), at(gone));
 }
 
 /// Candidates that were not seen for long are not looked for any more.
@@ -251,10 +302,12 @@ MapUpdate TrunkMap::review(double now_s, bool has_ranges)
     return update;
   reviewEach(update, has_ranges);
   reviewPairs(update);
+  reviewPlaces(update, now_s);
   deactivate(update, now_s);
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(),
                                 [this](std::size_t i) { return m_trunks[i].removed || m_trunks[i].inactive; }),
                  m_active.end());
+  bury(update, now_s);
   return update;
 }
 
@@ -288,9 +341,9 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
   std::vector<std::size_t> forgotten;
   std::vector<bool> stays(m_trunks.size(), false);
   for (const TrunkDecision &decision : decisions)
-    stays[static_cast<std::size_t>(decision.id)] = decision.is_trunk && !decision.found;
+    stays[place(decision.id)] = decision.is_trunk && !decision.found;
   for (MapTrunk &trunk : m_trunks) {
-    if (stays[static_cast<std::size_t>(trunk.id)])
+    if (stays[place(trunk.id)])
       continue;
     if (!trunk.removed)
       forgotten.push_back(trunk.smoother_id);
@@ -301,7 +354,7 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
     }
   }
   for (const TrunkDecision &decision : decisions) {
-    MapTrunk &trunk = m_trunks[static_cast<std::size_t>(decision.id)];
+    MapTrunk &trunk = at(decision.id);
     trunk.final_odds = decision.log_odds;
     if (!decision.is_trunk) {
       if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.final_odds)

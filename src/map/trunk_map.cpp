@@ -2,6 +2,7 @@
 #include "map/trunk_map.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace bole
@@ -9,7 +10,7 @@ namespace bole
 TrunkMap::TrunkMap(const MapOptions &options) : TrunkMap(options, {}) {}
 
 TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
-    : m_options(options), m_trunks(std::move(trunks))
+    : m_options(options), m_trunks(std::move(trunks)), m_next_id(static_cast<int>(m_trunks.size()))
 {
   for (std::size_t i = 0; i < m_trunks.size(); ++i)
     if (!m_trunks[i].removed && !m_trunks[i].inactive)
@@ -17,6 +18,19 @@ TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
 }
 
 void TrunkMap::setOptions(const MapOptions &options) { m_options = options; }
+
+std::size_t TrunkMap::place(int id) const
+{
+  const auto found = std::lower_bound(m_trunks.begin(), m_trunks.end(), id,
+                                      [](const MapTrunk &trunk, int sought) { return trunk.id < sought; });
+  assert(found != m_trunks.end() && found->id == id);
+  return static_cast<std::size_t>(found - m_trunks.begin());
+}
+
+bool TrunkMap::isActive(int id) const
+{
+  return std::any_of(m_active.begin(), m_active.end(), [&](std::size_t i) { return m_trunks[i].id == id; });
+}
 
 int TrunkMap::count(TrunkStatus status) const
 {
@@ -27,7 +41,7 @@ int TrunkMap::count(TrunkStatus status) const
 int TrunkMap::add(const NewTrunk &found)
 {
   MapTrunk trunk;
-  trunk.id = static_cast<int>(m_trunks.size());
+  trunk.id = m_next_id++;
   trunk.smoother_id = found.smoother_id;
   trunk.trunk = found.trunk;
   trunk.covariance = found.covariance;
@@ -47,7 +61,7 @@ int TrunkMap::add(const NewTrunk &found)
 
 void TrunkMap::refresh(const TrunkEstimate &estimate)
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(estimate.id)];
+  MapTrunk &trunk = at(estimate.id);
   trunk.trunk = estimate.trunk;
   if (estimate.covariance)
     trunk.covariance = *estimate.covariance;
@@ -55,15 +69,15 @@ void TrunkMap::refresh(const TrunkEstimate &estimate)
 
 void TrunkMap::end(int id)
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
+  MapTrunk &trunk = at(id);
   trunk.status = TrunkStatus::lost;
   trunk.inactive = true;
-  m_active.erase(std::remove(m_active.begin(), m_active.end(), static_cast<std::size_t>(id)), m_active.end());
+  m_active.erase(std::remove(m_active.begin(), m_active.end(), place(id)), m_active.end());
 }
 
 void TrunkMap::record(const Sighting &sighting)
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(sighting.id)];
+  MapTrunk &trunk = at(sighting.id);
   trunk.flipped_in_a_row = sighting.is_flipped ? trunk.flipped_in_a_row + 1 : 0;
   if (sighting.kind == Sighting::Kind::missed) {
     if (trunk.status != TrunkStatus::lost) // what hides a trunk lost from sight does not count against it
@@ -79,7 +93,7 @@ void TrunkMap::record(const Sighting &sighting)
 
 void TrunkMap::record(const PointCount &points)
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(points.id)];
+  MapTrunk &trunk = at(points.id);
   trunk.points_on += points.on;
   trunk.points_behind += points.behind;
 }
@@ -87,7 +101,7 @@ void TrunkMap::record(const PointCount &points)
 void TrunkMap::record(const ColumnOdds &odds)
 {
   constexpr double kBackground = 0.25; // beside a border: as much as tells that the trunk goes on, the other way
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(odds.id)];
+  MapTrunk &trunk = at(odds.id);
   trunk.column_odds = odds.log_odds;
   trunk.column_views = odds.views;
   trunk.is_silhouette |= odds.views >= kColumnViews && odds.least_beside > kBackground;
@@ -95,7 +109,7 @@ void TrunkMap::record(const ColumnOdds &odds)
 
 std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
 {
-  MapTrunk &trunk = m_trunks[static_cast<std::size_t>(id)];
+  MapTrunk &trunk = at(id);
   const std::size_t before = trunk.smoother_id;
   trunk.smoother_id = reading.smoother_id;
   trunk.trunk = reading.trunk;
@@ -159,28 +173,88 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
   blendContrast(trunk.right_contrast, view.right_contrast);
 }
 
+TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double breast_z) const
+{
+  TrunkRecord record;
+  record.id = trunk.id;
+  record.xy = trunk.trunk.axisAt(breast_z).head<2>();
+  record.radius = trunk.trunk.radius();
+  record.lean = trunk.trunk.lean;
+  record.probability = 1 / (1 + std::exp(-log_odds));
+  Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
+  J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
+  J(2, 2) = record.radius;
+  record.covariance = J * trunk.covariance * J.transpose();
+  record.observations = trunk.observations;
+  record.first_seen_s = trunk.first_seen_s;
+  record.last_seen_s = trunk.last_seen_s;
+  const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
+  record.status = is_out_of_sight ? TrunkStatus::confirmed : trunk.status;
+  record.fate = trunk.fate;
+  return record;
+}
+
 std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
 {
   std::vector<TrunkRecord> records;
-  for (const MapTrunk &trunk : m_trunks) {
-    TrunkRecord record;
-    record.id = trunk.id;
-    record.xy = trunk.trunk.axisAt(breast_z).head<2>();
-    record.radius = trunk.trunk.radius();
-    record.lean = trunk.trunk.lean;
-    record.probability = 1 / (1 + std::exp(-trunk.final_odds.value_or(evidence(trunk))));
-    Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
-    J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
-    J(2, 2) = record.radius;
-    record.covariance = J * trunk.covariance * J.transpose();
-    record.observations = trunk.observations;
-    record.first_seen_s = trunk.first_seen_s;
-    record.last_seen_s = trunk.last_seen_s;
-    const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
-    record.status = is_out_of_sight ? TrunkStatus::confirmed : trunk.status;
-    record.fate = trunk.fate;
-    records.push_back(record);
+  for (const MapTrunk &trunk : m_trunks)
+    records.push_back(recordOf(trunk, trunk.final_odds.value_or(evidence(trunk)), breast_z));
+  for (const GivenUp &gone : m_given_up) {
+    MapTrunk trunk;
+    trunk.id = gone.id;
+    trunk.observations = gone.observations;
+    trunk.status = gone.status;
+    trunk.fate = gone.fate;
+    trunk.trunk.xy = {gone.trunk[0], gone.trunk[1]};
+    trunk.trunk.log_radius = gone.trunk[2];
+    trunk.trunk.lean = {gone.trunk[3], gone.trunk[4]};
+    const float *element = gone.covariance.data();
+    for (int c = 0; c < 5; ++c)
+      for (int r = c; r < 5; ++r)
+        trunk.covariance(r, c) = trunk.covariance(c, r) = *element++;
+    trunk.first_seen_s = gone.first_seen_s;
+    trunk.last_seen_s = gone.last_seen_s;
+    trunk.removed = true;
+    records.push_back(recordOf(trunk, gone.log_odds, breast_z));
   }
+  std::sort(records.begin(), records.end(), [](const TrunkRecord &a, const TrunkRecord &b) { return a.id < b.id; });
   return records;
+}
+
+/// Of what is given up for good, a record remains.
+void TrunkMap::bury(MapUpdate &update, double now_s)
+{
+  const auto isGone = [&](const MapTrunk &trunk) {
+    return m_options.memory != Memory::all &&
+           (trunk.removed ||
+            (trunk.inactive && m_options.memory == Memory::in_sight && now_s - trunk.last_seen_s > m_options.forget_s));
+  };
+  if (std::none_of(m_trunks.begin(), m_trunks.end(), isGone))
+    return;
+  for (const MapTrunk &trunk : m_trunks) {
+    if (!isGone(trunk))
+      continue;
+    GivenUp gone;
+    gone.id = trunk.id;
+    gone.observations = trunk.observations;
+    gone.status = trunk.status;
+    gone.fate = trunk.fate;
+    gone.log_odds = static_cast<float>(evidence(trunk));
+    gone.trunk = {static_cast<float>(trunk.trunk.xy.x()), static_cast<float>(trunk.trunk.xy.y()),
+                  static_cast<float>(trunk.trunk.log_radius), static_cast<float>(trunk.trunk.lean.x()),
+                  static_cast<float>(trunk.trunk.lean.y())};
+    float *element = gone.covariance.data();
+    for (int c = 0; c < 5; ++c)
+      for (int r = c; r < 5; ++r)
+        *element++ = static_cast<float>(trunk.covariance(r, c));
+    gone.first_seen_s = trunk.first_seen_s;
+    gone.last_seen_s = trunk.last_seen_s;
+    if (!trunk.removed)
+      update.removed.push_back(trunk.smoother_id);
+    update.buried.push_back(trunk.id);
+    m_given_up.push_back(gone);
+  }
+  m_trunks.erase(std::remove_if(m_trunks.begin(), m_trunks.end(), isGone), m_trunks.end());
+  keepActive();
 }
 } // namespace bole

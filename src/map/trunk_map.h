@@ -8,21 +8,34 @@
 /// silhouette, the edge of a shadow on the bark, a gap between two trunks). The one with the best log-odds is
 /// confirmed and the others go, since two trunks cannot stand in the same place (paper, Section 7, which leaves
 /// duplicates in the map). A trunk that comes back as a duplicate hands its views to the one that was there before:
-/// they tie the two visits together. A confirmed trunk that is predicted in view and not found for long is lost from
-/// sight; it stays in the map and comes back under its id.
+/// they tie the two visits together. Where the path has drifted so far that no trunk stands on its former place, those
+/// in sight are recognised by their constellation. A confirmed trunk that is predicted in view and not found for long
+/// is lost from sight; it stays in the map and comes back under its id.
 
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <deque>
 #include <optional>
 #include <vector>
 
 namespace bole
 {
+/// What a map keeps of its hypotheses; of the rest it keeps a record.
+enum class Memory
+{
+  all,       ///< they are judged again at the end of the flight
+  undecided, ///< what was not given up takes part in the last review
+  in_sight   ///< a candidate that is not looked for any more is given up after forget_s: the flight has no end
+};
+
 struct MapOptions
 {
+  Memory memory = Memory::all;
+  double forget_s = 0;  ///< [s] since its last view
   bool at_once = false; ///< what is found is confirmed and stays, as in the paper: nothing is lost, merged or doubted
                         ///< until TrunkMap::end()
   int confirm_observations = 10;        ///< views before a candidate may be confirmed, 2 to 1000
@@ -199,6 +212,19 @@ struct MapUpdate
   std::vector<MapChange> changes;
   std::vector<Merge> merged;        ///< ids of the smoother: the views of the one become the other's
   std::vector<std::size_t> removed; ///< ids of the smoother: to be forgotten with all their views
+  std::vector<int> buried;          ///< ids of which the map keeps a record alone from now on
+};
+
+/// What the map keeps of a hypothesis that it has given up: its line in hypotheses.csv, in single precision.
+struct GivenUp
+{
+  int id = 0, observations = 0;
+  TrunkStatus status = TrunkStatus::lost;
+  TrunkFate fate = TrunkFate::none;
+  float log_odds = 0;
+  std::array<float, 5> trunk{};       ///< x, y, log r, lean x, lean y
+  std::array<float, 15> covariance{}; ///< lower triangle, column by column
+  double first_seen_s = 0, last_seen_s = 0;
 };
 
 /// Writes every field of its trunks; sightings, points and estimates come in, a MapUpdate goes out.
@@ -212,8 +238,12 @@ public:
   /// Options with lengths in another unit.
   void setOptions(const MapOptions &options);
 
+  /// By their ids, without those of which the map keeps a record alone.
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
-  const MapTrunk &trunk(int id) const { return m_trunks[static_cast<std::size_t>(id)]; }
+  /// One of trunks().
+  const MapTrunk &trunk(int id) const { return m_trunks[place(id)]; }
+  /// Whether it is looked for.
+  bool isActive(int id) const;
   /// Places in trunks() of those that are neither removed nor inactive: what a frame has to look at, however long the
   /// flight.
   const std::vector<std::size_t> &active() const { return m_active; }
@@ -264,6 +294,10 @@ public:
   std::vector<TrunkRecord> records(double breast_z = kBreastHeight) const;
 
 private:
+  std::size_t place(int id) const;
+  MapTrunk &at(int id) { return m_trunks[place(id)]; }
+  void bury(MapUpdate &update, double now_s);
+  TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double breast_z) const;
   bool isDisproved(const MapTrunk &trunk, bool has_ranges) const;
   bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;
@@ -273,11 +307,15 @@ private:
   void addView(MapTrunk &trunk, const TrunkView &view) const;
   void reviewEach(MapUpdate &update, bool has_ranges);
   void reviewPairs(MapUpdate &update);
+  void reviewPlaces(MapUpdate &update, double now_s);
+  void joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone);
   void deactivate(MapUpdate &update, double now_s);
   void keepActive();
 
   MapOptions m_options;
-  std::vector<MapTrunk> m_trunks;
+  std::vector<MapTrunk> m_trunks; ///< by id
+  std::deque<GivenUp> m_given_up;
+  int m_next_id = 0;
   std::vector<std::size_t> m_active;
 };
 } // namespace bole

@@ -19,6 +19,7 @@ public:
   /// The trunk \p id as measured in \p image; its borders from \p tan_low to \p tan_high (tangents of elevation).
   void add(int id, const vpImage<unsigned char> &image, const PinholeCamera &camera, const RelativeTrunk &trunk,
            double tan_low, double tan_high);
+  void forget(int id) { m_views.erase(id); }
   /// JPEG with the borders drawn; empty for an id that was never seen whole.
   std::string jpeg(int id) const;
 

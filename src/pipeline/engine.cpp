@@ -112,7 +112,7 @@ FrameReport Engine::process(const Frame &frame)
     lap("detection");
     report.trunks = inView(tracked, m_map, view.has_ranges);
     report.points = points();
-    reviewMap(report.points, view); // Sec. 7
+    report.given_up = reviewMap(report.points, view); // Sec. 7
     lap("map");
     report.map = known(predicted, view);
     report.saliency = fieldOf(std::move(saliency));
@@ -247,11 +247,31 @@ std::vector<TriangulatedRay> Engine::points() const
   return triangulate(points.tracker(), wMc, m_camera);
 }
 
-void Engine::reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view)
+/// Returns the ids of what is given up for good.
+std::vector<int> Engine::reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view)
 {
   for (const PointCount &count : countPoints(points, m_map, view, m_units))
     m_map.record(count);
-  apply(m_map.review(view.time_s, view.has_ranges));
+  MapUpdate update = m_map.review(view.time_s, view.has_ranges);
+  apply(update);
+  if (m_units.smoothing.fixed_lag > 0)
+    keepNearby();
+  return std::move(update.buried);
+}
+
+/// Under a lag: the trunks seen last tie the visits of a place together, also where a visit before is closed.
+void Engine::keepNearby()
+{
+  constexpr std::size_t kMost = 24; // 120 columns of what the lag closes
+  std::vector<const MapTrunk *> trunks;
+  for (const std::size_t i : m_map.active())
+    if (m_map.trunks()[i].status != TrunkStatus::candidate)
+      trunks.push_back(&m_map.trunks()[i]);
+  std::sort(trunks.begin(), trunks.end(), [](const MapTrunk *a, const MapTrunk *b) {
+    return a->last_seen_s != b->last_seen_s ? a->last_seen_s > b->last_seen_s : a->id < b->id;
+  });
+  for (std::size_t i = 0; i < trunks.size(); ++i)
+    m_smoother.keepTrunk(trunks[i]->smoother_id, i < kMost);
 }
 
 /// Covariances are asked for where something was seen lately: that of a trunk farther back costs a walk to where it

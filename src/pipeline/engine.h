@@ -62,7 +62,8 @@ private:
   void readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
   void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
-  void reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
+  std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
+  void keepNearby();
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);

@@ -51,7 +51,7 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
       least_beside = all->leastBeside();
     }
   }
-  m_columns.forgetIf([this](int id) { return m_map.trunk(id).removed || m_map.trunk(id).inactive; });
+  m_columns.forgetIf([this](int id) { return !m_map.isActive(id); });
   if (narrow)
     readWider(*narrow, views, view);
 }

@@ -183,6 +183,9 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
     setPaper(o, options.paper);
   constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
   scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
+  if (!o.flow.final_pass)
+    o.map.memory = o.smoothing.fixed_lag > 0 ? Memory::in_sight : Memory::undecided;
+  o.map.forget_s = options.map.lag; // what was seen of it is closed by then, and stays
   return o;
 }
 } // namespace bole

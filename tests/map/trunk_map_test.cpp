@@ -92,6 +92,110 @@ protected:
 };
 } // namespace
 
+TEST_F(Life, OfWhatIsGivenUpForGoodARecordRemains)
+{
+  for (const Memory memory : {Memory::all, Memory::undecided, Memory::in_sight}) {
+    m_options.memory = memory;
+    m_map = TrunkMap(m_options);
+    m_time_s = 0;
+    const int gone = add(trunkAt(3, 1)), left = add(trunkAt(6, -2)), stays = add(trunkAt(4, 3));
+    see(left, 4);
+    see(stays, 20);
+    miss(gone, m_options.lost_misses);
+    const double far_s = m_time_s + 2 * m_options.candidate_memory_s;
+    see(stays, viewAt(far_s, 0.5, -0.1, 0.1, 0.9, 0.1));
+    const std::vector<TrunkRecord> before = m_map.records();
+
+    const MapUpdate update = m_map.review(far_s);
+
+    const bool keeps_all = memory == Memory::all, keeps_left = memory != Memory::in_sight;
+    EXPECT_EQ(m_map.trunks().size(), keeps_all ? 3u : keeps_left ? 2u : 1u);
+    EXPECT_EQ(update.buried.size(), 3 - m_map.trunks().size());
+    EXPECT_EQ(update.removed.size(), keeps_left ? 1u : 2u); // from the smoother
+    EXPECT_TRUE(m_map.isActive(stays));
+    EXPECT_FALSE(m_map.isActive(gone));
+    EXPECT_FALSE(m_map.isActive(left));
+    const std::vector<TrunkRecord> records = m_map.records();
+    ASSERT_EQ(records.size(), before.size());
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      EXPECT_EQ(records[i].id, static_cast<int>(i));
+      EXPECT_LT((records[i].xy - before[i].xy).norm(), 1e-6);
+      EXPECT_NEAR(records[i].radius, before[i].radius, 1e-7);
+      EXPECT_NEAR(records[i].probability, before[i].probability, 1e-6);
+      EXPECT_TRUE(records[i].covariance.isApprox(before[i].covariance, 1e-6));
+      EXPECT_EQ(records[i].observations, before[i].observations);
+      EXPECT_EQ(records[i].last_seen_s, before[i].last_seen_s);
+    }
+    EXPECT_EQ(records[0].fate, TrunkFate::missed);
+    EXPECT_EQ(records[1].status, TrunkStatus::candidate);
+    EXPECT_EQ(records[2].status, TrunkStatus::confirmed);
+    EXPECT_EQ(add(trunkAt(9, 9)), 3); // no id is given twice
+  }
+}
+
+/// Where trunks stand that make no pattern [m], and the same as a path sees them that has drifted by \p drift and \p
+/// yaw.
+std::vector<Trunk> constellation(double drift, double yaw)
+{
+  std::vector<Trunk> trunks;
+  for (const Eigen::Vector3d &at :
+       {Eigen::Vector3d(3, 1, .15), {6, -2, .11}, {4.5, 3.4, .2}, {8, 1.2, .13}, {9.3, -3.1, .17}, {7.1, 4.9, .24}}) {
+    const Eigen::Vector2d xy = Eigen::Rotation2Dd(yaw) * at.head<2>() + Eigen::Vector2d(drift, -0.6 * drift);
+    trunks.push_back(trunkAt(xy.x(), xy.y(), at.z()));
+  }
+  return trunks;
+}
+
+TEST_F(Life, TrunksAreRecognisedByTheirConstellationWhenThePathHasDrifted)
+{
+  for (const Trunk &trunk : constellation(0, 0)) {
+    const int id = add(trunk);
+    const double began_s = m_time_s;
+    see(id, 20);
+    m_time_s = began_s; // all are in sight together
+  }
+  m_time_s = 3;
+  m_map.review(m_time_s);
+  ASSERT_EQ(m_map.count(TrunkStatus::confirmed), 6);
+  m_time_s = 60;
+  std::vector<int> again;
+  for (const Trunk &trunk : constellation(1.4, 0.05)) {
+    again.push_back(add(trunk));
+    const double began_s = m_time_s;
+    see(again.back(), 20);
+    m_time_s = began_s;
+  }
+  m_time_s = 63;
+
+  const MapUpdate update = m_map.review(m_time_s);
+
+  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 6);
+  ASSERT_EQ(update.merged.size(), 6u);
+  for (const MapUpdate::Merge &merge : update.merged)
+    EXPECT_EQ(merge.gone, merge.keep + 6);
+  for (const int id : again)
+    EXPECT_EQ(m_map.trunk(id).fate, TrunkFate::duplicate);
+}
+
+TEST_F(Life, OtherTrunksAreNotTakenForThoseOfAnEarlierVisit)
+{
+  for (const Trunk &trunk : constellation(0, 0)) {
+    const int id = add(trunk);
+    see(id, 20);
+    m_time_s -= 2;
+  }
+  m_map.review(3);
+  m_time_s = 60;
+  for (const Trunk &trunk :
+       {trunkAt(23, 1, .15), trunkAt(25, -3, .11), trunkAt(26.5, 1.4, .2), trunkAt(29, 2.2, .13)}) {
+    const int id = add(trunk);
+    see(id, 20);
+    m_time_s -= 2;
+  }
+  EXPECT_TRUE(m_map.review(63).merged.empty());
+  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 10);
+}
+
 TEST_F(Life, AHypothesisThatCouldNotBeConfirmedItselfKeepsNoOtherBack)
 {
   const auto seenWith = [this](int trunk, double least) { // the worst innovation that leaves so much evidence
