@@ -17,9 +17,10 @@ constexpr double kChoiceRange = 7;       ///< nor those beyond this [m]
 constexpr double kChoiceEvidence = 2;    ///< nor, at first, those of lower log odds to be one
 constexpr int kChoiceViews = 25;         ///< a trunk seen less often is not chosen yet: what is none is given up sooner
 constexpr double kBearingNoise = 0.0015; ///< of a tracked trunk in one image [rad]: a third of a pixel
-constexpr double kRatioNoise = 0.025;    ///< of its log r/d: half a pixel on a width of 20
-constexpr double kUnrest = 0.15;         ///< of the velocity sideways that nobody ordered [m/s per root of a second]
-constexpr double kApproachUnrest = 0.05; ///< and of that ahead: learnt no faster than delay and lags let it be mended
+constexpr double kMapBearingNoise = 0.006; ///< of one by map and pose: the pose scatters by a pixel and more [rad]
+constexpr double kRatioNoise = 0.025;      ///< of its log r/d: half a pixel on a width of 20
+constexpr double kUnrest = 0.15;           ///< of the velocity sideways that nobody ordered [m/s per root of a second]
+constexpr double kApproachUnrest = 0.05;   ///< and of that ahead: learnt no faster than delay and lags let it be mended
 constexpr double kSwing = 0.69;    ///< to either side, where a distance is asked for [m]: 13 degrees of parallax at 3 m
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
@@ -51,7 +52,8 @@ TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
       m_bMc(bMc),
       m_options(options),
       m_sidestep(0.7, kSidestep_s),
-      m_response(options.response)
+      m_response(options.response),
+      m_bearing_noise(kBearingNoise)
 {
   m_servo.setServo(vpServo::EYEINHAND_L_cVe_eJe);
   m_servo.setInteractionMatrixType(vpServo::CURRENT, vpServo::PSEUDO_INVERSE);
@@ -149,7 +151,9 @@ RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk
 {
   RelativeTrunk seen = relativeTrunk(report.wMb, m_bMc, trunk.trunk);
   const TrunkInView *tracked = trackedTrunk(report, m_target);
-  if (!tracked || !seen.isFinite() || !tracked->relative.isFinite())
+  const bool is_in_image = tracked && seen.isFinite() && tracked->relative.isFinite();
+  m_bearing_noise = is_in_image ? kBearingNoise : kMapBearingNoise;
+  if (!is_in_image)
     return seen;
   seen.cRt = tracked->relative.cRt;
   if (m_options.ratio <= 0)
@@ -272,11 +276,11 @@ void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
     const Eigen::Vector2d moved = interactionOf(feature) * path;
     m_bearing.predict(moved(0), dt, kUnrest / d);
     m_log_ratio.predict(moved(1), dt, kApproachUnrest / d);
-    m_bearing.correct(feature.bearing(), kBearingNoise);
+    m_bearing.correct(feature.bearing(), m_bearing_noise);
     m_log_ratio.correct(feature.logRatio(), kRatioNoise);
   }
   else {
-    m_bearing.start(feature.bearing(), kBearingNoise, kFirstDrift / d);
+    m_bearing.start(feature.bearing(), m_bearing_noise, kFirstDrift / d);
     m_log_ratio.start(feature.logRatio(), kRatioNoise, kFirstDrift / d);
   }
   m_has_feature = true;

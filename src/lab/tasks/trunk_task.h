@@ -97,6 +97,7 @@ private:
   double m_map_log_radius = 0;                       ///< of the target
   double m_time_s = 0, m_ratio = 0;
   std::optional<double> m_log_radius; ///< as seen from here: distance by the map times r/d in the image, over a second
+  double m_bearing_noise;             ///< of the feature seen last [rad]
   int m_misread = 0;                  ///< frames in a row
   double m_turned_back = 1;           ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;                  ///< frames in a row

@@ -277,12 +277,13 @@ protected:
     options.speed = 0.3;
     return options;
   }
-  /// The next frame, 0.1 s later: the trunk 4 m ahead with \p radius in the map, and tracked in the image or not.
-  void see(double radius, bool is_tracked)
+  /// The next frame, 0.1 s later: the trunk 4 m ahead with \p radius in the map, and tracked in the image or not; the
+  /// pose turned to the left by \p yaw [rad].
+  void see(double radius, bool is_tracked, double yaw = 0)
   {
     FrameReport report;
     report.stamp_ns = 100000000LL * m_frame++;
-    report.wMb = Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.2});
+    report.wMb = Pose(expSo3({0, 0, yaw}), {0, 0, 1.2});
     report.wMc = report.wMb * forwardCamera();
     report.has_ranges = true;
     KnownTrunk known;
@@ -301,13 +302,23 @@ protected:
     report.trunks = {in_view};
     m_task.step(report);
   }
-  /// By how much the task believes itself too far from the trunk [%].
-  double distanceError() const
+  double error(const char *wanted) const
   {
     for (const auto &[name, value] : m_task.errors())
-      if (name == "distance [%]")
+      if (name == wanted)
         return value;
     return 1e3;
+  }
+  /// By how much the task believes itself too far from the trunk [%].
+  double distanceError() const { return error("distance [%]"); }
+  /// By how much a pose that is turned for one frame moves the bearing that is believed [degrees].
+  double movedByOneTurn(bool is_tracked)
+  {
+    for (int k = 0; k < 60; ++k)
+      see(0.2, true);
+    const double before = error("bearing [deg]");
+    see(0.2, is_tracked, 0.01);
+    return std::abs(error("bearing [deg]") - before);
   }
 
   TrunkTask m_task{forwardCamera(), circling()};
@@ -324,6 +335,17 @@ TEST_F(OneTrunk, IsAtItsDistanceAlsoWhereTheFirstImageMissedIt)
     see(0.2, true);
     ASSERT_NEAR(distanceError(), 0, 10) << k; // the drone is believed to move a little, as it is told to
   }
+}
+
+/// By map and pose a bearing scatters by several times what it does in the image.
+TEST_F(OneTrunk, ThatIsMissedInAnImageMovesItsBearingByLess)
+{
+  while (m_task.target() < 0 && m_frame < 400)
+    see(0.2, true);
+  ASSERT_EQ(m_task.target(), 7);
+  const double tracked = movedByOneTurn(true), missed = movedByOneTurn(false);
+  EXPECT_GT(tracked, 0.1);
+  EXPECT_LT(missed, 0.5 * tracked);
 }
 
 TEST_F(OneTrunk, ThatIsReadAgainBetweenWiderBordersIsNoDrift)
