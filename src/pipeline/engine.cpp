@@ -101,7 +101,9 @@ FrameReport Engine::process(const Frame &frame)
       report.timing_ms = std::move(lap.times_ms);
       return complete(std::move(report), frame, motion);
     }
-    const std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
+    std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
+    if (m_units.flow.leave_bark)
+      leaveLinesOnBark(predicted);
     const std::vector<TrackedTrunk> tracked =
         trackTrunks(*gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
     add(tracked, view);                                                                // Eq. 9

@@ -60,6 +60,7 @@ private:
   void adopt(const Adoption &adoption);
   NewTrunk hold(const Adoption &adoption);
   void readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
+  void leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const;
   void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
   std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);

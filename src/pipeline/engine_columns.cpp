@@ -20,6 +20,19 @@ Trunk asSeen(const TrackedTrunk &tracked, const Trunk &trunk, const Viewpoint &v
 }
 } // namespace
 
+/// A line beside which the trunk goes on is one of light and shade: the border is not read there, and the other one
+/// tells the bearing.
+void Engine::leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const
+{
+  for (PredictedTrunk &trunk : predicted) {
+    const auto evidence = m_columns.lately(trunk.id);
+    if (!evidence || !goesOnBeside(*evidence))
+      continue;
+    bool &hidden = evidence->left < evidence->right ? trunk.tracking.left_hidden : trunk.tracking.right_hidden;
+    hidden = true;
+  }
+}
+
 /// Depth inside and beside the borders of what was tracked: whether it is a trunk, and whether its borders are those of
 /// the silhouette.
 void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)

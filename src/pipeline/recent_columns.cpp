@@ -7,6 +7,7 @@ namespace
 {
 constexpr std::size_t kFrames = 24; ///< that are compared with a new one
 constexpr double kMemory = 24;      ///< views in which what was seen fades to a third
+constexpr double kShortMemory = 8;  ///< of the borders: on the way round, light and shade walk over the bark
 } // namespace
 
 const LevelImage *RecentColumns::add(const vpImage<unsigned char> &image, std::size_t pose, const Viewpoint &at,
@@ -28,6 +29,8 @@ std::optional<ColumnEvidence> RecentColumns::look(int id, const Trunk &trunk, co
   if (const auto seen = columnsOfView(trunk, views.size() - 1, views, farthest)) {
     known.recent.fade(1 - 1 / kMemory);
     known.recent.add(*seen);
+    known.last.fade(1 - 1 / kShortMemory);
+    known.last.add(*seen);
     known.all.add(*seen);
   }
   return evidenceOf(known.recent);
@@ -40,6 +43,12 @@ std::optional<ColumnEvidence> RecentColumns::sinceReading(int id) const
   if (known == m_known.end() || known->second.all.views < known->second.read_at + kViewsBetween)
     return std::nullopt;
   return evidenceOf(known->second.all);
+}
+
+std::optional<ColumnEvidence> RecentColumns::lately(int id) const
+{
+  const auto known = m_known.find(id);
+  return known == m_known.end() ? std::nullopt : evidenceOf(known->second.last);
 }
 
 void RecentColumns::noteReading(int id) { m_known[id].read_at = m_known[id].all.views; }

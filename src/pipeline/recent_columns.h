@@ -33,6 +33,8 @@ public:
   /// What all views since its borders were last chosen say, where enough came since another reading was tried.
   std::optional<ColumnEvidence> sinceReading(int id) const;
   void noteReading(int id);
+  /// What the last views, some half a metre of them, say of its borders as they are read.
+  std::optional<ColumnEvidence> lately(int id) const;
   /// What was known of it was of another reading.
   void forget(int id) { m_known.erase(id); }
   template <typename IsGone> void forgetIf(const IsGone &is_gone)
@@ -45,6 +47,7 @@ private:
   struct Known
   {
     ColumnCurves recent; ///< of a fading memory
+    ColumnCurves last;   ///< of a shorter one
     ColumnCurves all;    ///< of the present reading
     int read_at = 0;     ///< views when another reading was tried
   };

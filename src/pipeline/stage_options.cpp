@@ -122,6 +122,7 @@ void setSensors(StageOptions &o, const Options &options)
 /// A camera that is steered by what it tracks rests before one trunk or goes round it.
 void setServoing(StageOptions &o)
 {
+  o.flow.leave_bark = true;       // light and shade walk over a trunk that it goes round
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
   o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright

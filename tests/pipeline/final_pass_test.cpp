@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/final_pass.h"
-#include "pipeline/recent_columns.h"
 
 #include <gmock/gmock.h>
 
@@ -96,20 +95,5 @@ TEST(FinalPass, TheAlbumIsBounded)
   for (std::size_t i = 1; i < album.frames().size(); ++i)
     EXPECT_GT(album.frames()[i].pose, album.frames()[i - 1].pose);
   EXPECT_GE(album.frames().back().pose, 30u); // the end of the flight is kept too
-}
-
-TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
-{
-  RecentColumns columns;
-  const vpImage<unsigned char> image(240, 320, 90);
-  Viewpoint at;
-  at.wMc = SmootherOptions::forwardCamera();
-  for (int i = 0; i < 60; ++i) {
-    at.wMc.t.x() = 0.1 * i;
-    EXPECT_NE(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
-    at.wMc.t.x() += 0.04;
-    EXPECT_EQ(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
-  }
-  EXPECT_EQ(columns.frames().size(), 24u);
 }
 } // namespace

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "pipeline/recent_columns.h"
+
+#include "detection/drawn_trunks.h"
+#include "pipeline/final_pass.h"
+
+#include <gmock/gmock.h>
+
+namespace
+{
+using namespace bole;
+
+TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
+{
+  RecentColumns columns;
+  const vpImage<unsigned char> image(240, 320, 90);
+  Viewpoint at;
+  at.wMc = SmootherOptions::forwardCamera();
+  for (int i = 0; i < 60; ++i) {
+    at.wMc.t.x() = 0.1 * i;
+    EXPECT_NE(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
+    at.wMc.t.x() += 0.04;
+    EXPECT_EQ(columns.add(image, 0, at, 0.05, ElevationRange()), nullptr);
+  }
+  EXPECT_EQ(columns.frames().size(), 24u);
+}
+
+/// The drone goes from the evenly lit side of a trunk to one where its left part lies in the sun, and the line between
+/// light and shade is read as the left border.
+TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade)
+{
+  const test::DrawnTrunk sunny{3.55, 0.3, 0.18, 150}, shady{3.5, 0.2, 0.08, 60};
+  std::vector<test::DrawnTrunk> scene{sunny, shady};
+  for (int i = -20; i <= 20; ++i) // a background with texture
+    scene.push_back({16, 0.6 * i, 0.3, 60.0 + (i * 73 + 2000) % 140});
+  const PinholeCamera camera;
+  RecentColumns columns;
+  std::vector<Pose> poses;
+  const auto fly = [&](int from, int to, const Trunk &reading) {
+    for (int i = from; i < to; ++i) {
+      Viewpoint at;
+      at.camera = camera;
+      at.wMc = SmootherOptions::forwardCamera();
+      at.wMc.t = {0, -0.8 + 0.06 * i, 1.2};
+      columns.add(test::draw(scene, at.wMc, camera), poses.size(), at, 0.05, ElevationRange());
+      poses.push_back(at.wMc);
+      std::vector<LevelView> views;
+      for (const RecentColumns::Frame &frame : columns.frames())
+        views.emplace_back(frame.level, poses[frame.pose]);
+      columns.look(7, reading, views, 14);
+    }
+  };
+  EXPECT_FALSE(columns.lately(7));
+  fly(0, 14, test::trunkOf(sunny));
+  ASSERT_TRUE(columns.lately(7));
+  EXPECT_FALSE(goesOnBeside(*columns.lately(7)));
+  fly(14, 22, test::trunkOf(shady));
+  ASSERT_TRUE(columns.lately(7));
+  EXPECT_TRUE(goesOnBeside(*columns.lately(7)));
+  EXPECT_LT(columns.lately(7)->left, columns.lately(7)->right);
+}
+} // namespace
