@@ -15,11 +15,10 @@ using Eigen::Vector3d;
 
 namespace
 {
-// The path's error: white, and walking. On simulated flights among trees half the squared difference of two errors is
-// 40, 150, 310 mm^2 an axis after 0.1, 1 and 4 s of hovering, 45, 270, 500 in flights of 12 s, once the path is laid on
-// the truth, which takes a part of the walk with it.
+// The path's error: white, and walking (kWalkAmongTrees). On simulated flights among trees half the squared difference
+// of two errors is 40, 150, 310 mm^2 an axis after 0.1, 1 and 4 s of hovering, 45, 270, 500 in flights of 12 s, once
+// the path is laid on the truth, which takes a part of the walk with it.
 constexpr double kPathSigma = 0.008;  // horizontal [m]
-constexpr double kPathWalk = 0.02;    // horizontal [m/sqrt(s)]
 constexpr double kPathHeight = 0.02;  // of the path [m]
 constexpr double kPathHeading = 0.02; // of the path [rad]
 constexpr double kCompared_s = 0.09;  // errors of the path nearer in time than that are alike
@@ -90,8 +89,8 @@ class PathScale::Filter
   using Row = Eigen::Matrix<double, 1, kStates>;
 
 public:
-  Filter(const GyroOptions &gyro, double log_scale)
-      : m_gyro(gyro), m_factor(std::exp(log_scale), std::exp(log_scale), 1)
+  Filter(const GyroOptions &gyro, double walk, double log_scale)
+      : m_gyro(gyro), m_walk(walk), m_factor(std::exp(log_scale), std::exp(log_scale), 1)
   {
     m_covariance.diagonal().segment<3>(kGyro).setConstant(std::pow(gyro.bias_sigma, 2));
     m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(accelerometer::kBiasSigma, 2));
@@ -142,7 +141,7 @@ public:
     white(kAttitude, Vector3d::Constant(m_gyro.noise_density * std::sqrt(step.longer)));
     white(kVelocity, force);
     white(kPlace, dt / std::sqrt(3.0) * force);
-    white(kPlace, Vector3d(kPathWalk, kPathWalk, 0));
+    white(kPlace, Vector3d(m_walk, m_walk, 0));
     white(kGyro, Vector3d::Constant(m_gyro.bias_walk));
     white(kForce, Vector3d::Constant(accelerometer::kBiasWalk));
 
@@ -191,7 +190,7 @@ private:
     const double innovation = (H * PHt).value() + variance;
     const Eigen::Matrix<double, kStates, 1> change = PHt * (residual / innovation);
     m_covariance -= PHt * PHt.transpose() / innovation;
-    m_log_likelihood -= 0.5 * (residual * residual / innovation + std::log(innovation));
+    m_log_likelihood -= 0.5 * residual * residual / innovation;
     m_wRb = m_wRb * expSo3(change.segment<3>(kAttitude));
     m_velocity += change.segment<3>(kVelocity);
     m_place += change.segment<3>(kPlace);
@@ -200,6 +199,7 @@ private:
   }
 
   const GyroOptions &m_gyro;
+  double m_walk;     ///< of the path
   Vector3d m_factor; ///< of the path's lengths
   Matrix3d m_wRb = Matrix3d::Identity();
   Vector3d m_velocity = Vector3d::Zero(), m_place = Vector3d::Zero(); ///< on the path
@@ -212,7 +212,7 @@ private:
 /// Of a path of this scale; nothing where it was compared nowhere.
 std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, double log_scale) const
 {
-  Filter filter(m_gyro, log_scale);
+  Filter filter(m_gyro, m_walk, log_scale);
   bool is_started = false;
   double since_s = 0; // it was compared
   for (std::size_t i = 1; i < m_steps.size(); ++i) {
@@ -235,36 +235,53 @@ std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, do
   return filter.compared() > 0 ? std::optional<double>(filter.logLikelihood()) : std::nullopt;
 }
 
-std::optional<LogScale> PathScale::measure(const Path &path, double prior_sigma)
+/// The scale at which likelihood and prior together are greatest, by Newton's steps on a parabola through three scales.
+std::optional<PathScale::Peak> PathScale::findPeak(const std::vector<Pose> &path, double from, double prior) const
 {
   constexpr double kApart = 0.03, kMostStep = 0.2, kSettled = 0.003; // of the log of the scale
   constexpr double kLeast = 4; // information: a slope that does not bend tells a side, not a place
   constexpr int kMostRounds = 6;
+  Peak peak{from, 0, 0, 0};
+  for (int round = 0; round < kMostRounds; ++round) {
+    const auto less = logLikelihood(path, peak.log_scale - kApart), here = logLikelihood(path, peak.log_scale),
+               more = logLikelihood(path, peak.log_scale + kApart);
+    if (!less || !here || !more)
+      return std::nullopt;
+    peak.log_likelihood = *here;
+    peak.information = std::max(kLeast, (2 * *here - *less - *more) / (kApart * kApart));
+    peak.alone = peak.log_scale + (*more - *less) / (2 * kApart) / peak.information;
+    const double step = peak.information * peak.alone / (peak.information + prior) - peak.log_scale;
+    peak.log_scale += std::clamp(step, -kMostStep, kMostStep);
+    if (std::abs(step) < kSettled)
+      return peak;
+  }
+  return std::nullopt;
+}
+
+std::optional<LogScale> PathScale::measure(const Path &path, double prior_sigma)
+{
+  constexpr double kContradiction = 9; // of twice the log of likelihood and prior
   if (!m_force_varies)
     return std::nullopt;
   std::vector<Pose> poses;
   for (const Step &step : m_steps)
     poses.push_back(path(step.frame));
   const double prior = 1 / std::max(1e-12, prior_sigma * prior_sigma);
-  LogScale scale;
-  for (int round = 0; round < kMostRounds; ++round) { // Newton's steps on a parabola through three scales
-    const auto less = logLikelihood(poses, m_log_scale - kApart), here = logLikelihood(poses, m_log_scale),
-               more = logLikelihood(poses, m_log_scale + kApart);
-    if (!less || !here || !more)
-      return std::nullopt;
-    const double slope = (*more - *less) / (2 * kApart);
-    const double information = std::max(kLeast, (2 * *here - *less - *more) / (kApart * kApart));
-    const double alone = m_log_scale + slope / information;
-    scale.contradicts_prior = alone * alone > 9 * (1 / information + 1 / prior);
-    const double known = scale.contradicts_prior ? information : information + prior;
-    scale.mean = information * alone / known;
-    scale.sigma = 1 / std::sqrt(known);
-    const double step = std::clamp(scale.mean - m_log_scale, -kMostStep, kMostStep);
-    m_log_scale += step;
-    if (std::abs(step) < kSettled)
-      return scale;
-  }
+  auto peak = findPeak(poses, m_log_scale, prior);
+  if (!peak && m_log_scale != 0)
+    peak = findPeak(poses, 0, prior);
   m_log_scale = 0;
-  return std::nullopt;
+  if (!peak)
+    return std::nullopt;
+  m_log_scale = peak->log_scale;
+  LogScale scale{peak->log_scale, 1 / std::sqrt(peak->information + prior), false};
+  if (peak->alone * peak->alone <= kContradiction * (1 / peak->information + 1 / prior))
+    return scale;
+  // Far from its peak a likelihood is no parabola: without the prior, is it really so much greater?
+  const auto free = findPeak(poses, peak->log_scale, 0);
+  if (free && 2 * (free->log_likelihood - peak->log_likelihood) + prior * std::pow(peak->log_scale, 2) > kContradiction)
+    scale = {free->log_scale, 1 / std::sqrt(free->information), true};
+  m_log_scale = scale.mean;
+  return scale;
 }
 } // namespace bole

@@ -8,8 +8,11 @@
 /// to a centimetre where the odometry has walked away by ten. Since old poses become better with every new view, the
 /// whole of the last minute is compared anew. For a given scale that is a Kalman filter over one preintegrated
 /// step a frame (Forster et al., 2017) whose states are attitude, velocity and place on the path and both biases, and
-/// the likelihood of its innovations tells that scale from others. As a state of the filter the scale would take the
-/// noise of the accelerometer for a motion that the path has not: a steady flight gave a path 0.7 of its length.
+/// the weighted squares of its innovations tell that scale from others. As a state of the filter the scale would take
+/// the noise of the accelerometer for a motion that the path has not: a steady flight gave a path 0.7 of its length. So
+/// would the whole log-likelihood, whose determinant is least for a short path: it stands for accelerations that were
+/// drawn independently of what was measured. What is fitted is a line between two quantities that both err, and the
+/// squares alone have their minimum at its slope (Deming regression).
 ///
 /// The attitude comes from the gyro and from the roll and pitch of the pose filter, not from the path: where points
 /// take a translation for a rotation, the roll and pitch of the path follow the accelerations, and gravity through
@@ -38,7 +41,10 @@ class PathScale
 public:
   using Path = std::function<Pose(std::size_t)>; ///< wMb by the number of the frame
 
-  explicit PathScale(const GyroOptions &gyro = {}) : m_gyro(gyro) {}
+  static constexpr double kWalkAmongTrees = 0.02; ///< of a path that points hold [m/sqrt(s)]
+
+  /// \param walk horizontal, of the errors of the path [m/sqrt(s)]
+  explicit PathScale(const GyroOptions &gyro = {}, double walk = kWalkAmongTrees) : m_gyro(gyro), m_walk(walk) {}
 
   /// Takes in the next frame, the frames being counted from 0. One without samples of the accelerometer begins anew.
   void add(const Frame &frame);
@@ -58,12 +64,19 @@ private:
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), moved = Eigen::Vector3d::Zero(); ///< without gravity
     std::optional<Eigen::Vector3d> up; ///< at its end, in the body there, by the pose filter
   };
+  struct Peak ///< of the likelihood, or of likelihood and prior
+  {
+    double log_scale = 0, log_likelihood = 0, information = 0;
+    double alone = 0; ///< where the parabola about it has its own peak, without the prior
+  };
   class Filter;
 
   Step stepTo(const Frame &frame);
+  std::optional<Peak> findPeak(const std::vector<Pose> &path, double from, double prior) const;
   std::optional<double> logLikelihood(const std::vector<Pose> &path, double log_scale) const;
 
   GyroOptions m_gyro;
+  double m_walk;
   std::deque<Step> m_steps;
   std::optional<GyroSample> m_last; ///< sample
   std::optional<Eigen::Vector3d> m_first_force;

@@ -41,7 +41,8 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_odometry_alone(options.motion.relative_alone),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
-      m_path_scale(options.points.gyro),
+      m_path_scale(options.points.gyro,
+                   options.flow.use_points ? PathScale::kWalkAmongTrees : options.points.odometry_walk),
       m_inertial(bMc, options.points.gyro),
       m_monitor(bMc)
 {

@@ -17,12 +17,14 @@ struct MadeFlight
 {
   double frame_rate = 10;    ///< [Hz], 5 to 60
   double sway = 1.2;         ///< amplitude of the path from side to side [m]
+  double radius = 0;         ///< of the circle that is flown instead at 1 m/s [m]; 0: none
   double factor = 1;         ///< of the odometry's horizontal lengths
   double odometry_noise = 0; ///< horizontal, a frame [m]
   double force_noise = 0;    ///< a sample [m/s^2]
   Eigen::Vector3d force_bias = Eigen::Vector3d::Zero();
-  double points_turn = 0; ///< error of the points' rotation about the camera's vertical [rad]
-  double points_slip = 0; ///< and of their direction of translation, sideways, for each radian of that
+  double points_noise = 0; ///< of the points' direction [rad], as stated
+  double points_turn = 0;  ///< error of the points' rotation about the camera's vertical [rad]
+  double points_slip = 0;  ///< and of their direction of translation, sideways, for each radian of that
   bool has_constant_force = false;
   std::mt19937 random{1};
   Eigen::Vector3d walked = Eigen::Vector3d::Zero(); ///< of the odometry from the truth
@@ -33,7 +35,15 @@ struct MadeFlight
     return {expSo3({0, 0, lead}) * expSo3({0.1 * std::sin(1.3 * t), 0.05 * std::cos(t), 0}),
             {t, sway * std::sin(w * t), 1.2 + 0.1 * std::sin(0.7 * t)}};
   }
-  Pose truth(double t) const { return truth(t, sway); }
+  Pose truth(double t) const
+  {
+    if (radius <= 0)
+      return truth(t, sway);
+    const double turned = t / radius;
+    return {expSo3({0, 0, turned}) * expSo3({0.03 * std::sin(2.6 * t), 0.03 * std::cos(2.1 * t), 0}),
+            {radius * std::sin(turned), radius * (1 - std::cos(turned)),
+             1.2 + 0.1 * std::sin(0.7 * t) + 0.06 * std::sin(1.9 * t)}};
+  }
 
   static std::int64_t nanoseconds(double t) { return static_cast<std::int64_t>(std::llround(t * 1e9)); }
 
@@ -91,6 +101,11 @@ struct MadeFlight
     motion.points.parallax_px = 3;
     motion.points.covariance = 1e-4 * Matrix5d::Identity();
     motion.points.covariance.topLeftCorner<3, 3>() *= 1e-2;
+    if (points_noise > 0) {
+      const Eigen::Matrix<double, 3, 2> basis = directionBasis(motion.points.direction);
+      motion.points.direction = (motion.points.direction + basis * points_noise * white().head<2>()).normalized();
+      motion.points.covariance.bottomRightCorner<2, 2>() = points_noise * points_noise * Eigen::Matrix2d::Identity();
+    }
     if (points_turn > 0)
       confuse(motion.points);
     return {motion};

@@ -14,7 +14,7 @@ namespace
 using test::MadeFlight;
 
 constexpr double kWide = 10; // of the log of the scale: nothing is expected
-constexpr std::size_t kFrames = 120;
+constexpr std::size_t kFrames = 120, kLongFlight = 600;
 
 /// The path of a flight as a smoother may hold it.
 struct MadePath
@@ -22,11 +22,11 @@ struct MadePath
   double factor = 1, sigma = 0, walk = 0; ///< of horizontal lengths; white [m]; a frame [m]
   double tilt = 0;                        ///< of its attitude, for each m/s^2 to the left [rad]
 
-  std::vector<Pose> poses(MadeFlight &flight) const
+  std::vector<Pose> poses(MadeFlight &flight, std::size_t frames = kFrames) const
   {
     std::vector<Pose> path;
     Eigen::Vector3d off = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < kFrames; ++i) {
+    for (std::size_t i = 0; i < frames; ++i) {
       const double t = 0.1 * static_cast<double>(i), h = 0.01;
       Pose pose = flight.truth(t);
       const double left = (flight.truth(t + h).t - 2 * pose.t + flight.truth(t - h).t).y() / (h * h);
@@ -106,6 +106,24 @@ TEST(PathScale, ASteadyFlightLeavesTheScaleUnknown)
   const auto scale = measure(flight, {1, 0.008, 0.0038}, 0.03);
   ASSERT_TRUE(scale);
   EXPECT_GT(scale->sigma, 0.02);
+}
+
+/// Its acceleration is constant in the body, as a bias is.
+TEST(PathScale, ASteadyCurveLeavesTheScaleUnknown)
+{
+  for (const MadePath &made : {MadePath{1}, MadePath{1, 0.008, 0.0063}}) {
+    MadeFlight flight = noisy();
+    flight.radius = 6.4;
+    PathScale scale;
+    for (std::size_t i = 0; i < kLongFlight; ++i)
+      scale.add(flight.frame(i));
+    const std::vector<Pose> path = made.poses(flight, kLongFlight);
+    const auto measured = scale.measure([&path](std::size_t i) { return path[i]; }, 0.03);
+    ASSERT_TRUE(measured);
+    EXPECT_FALSE(measured->contradicts_prior);
+    EXPECT_NEAR(measured->mean, 0, 0.01);
+    EXPECT_GT(measured->sigma, 0.025);
+  }
 }
 
 TEST(PathScale, AnAccelerometerThatRepeatsOneValueIsNotBelieved)
