@@ -227,25 +227,31 @@ void InertialScale::compareOdometry(const Pose &wMb, double duration)
 void InertialScale::comparePoints(const RelativePoseEstimate &points, double duration)
 {
   constexpr double kLeast = 0.02; // [m]: shorter displacements have no direction
-  const Matrix3d wRa = m_wRb * m_turned.transpose();
+  const Matrix3d wRa = m_wRb * m_turned.transpose(), wRc = wRa * m_bMc.R;
   const Vector3d moved = m_moved + (m_wRb - wRa) * m_bMc.t;
-  const double length = moved.norm();
-  const Eigen::Index rows = points.hasDirection() && length >= kLeast ? 5 : 3;
+  const Vector3d expected = moved.normalized(), direction = wRc * points.direction;
+  const bool has_direction = points.hasDirection() && moved.norm() >= kLeast && direction.dot(expected) > 0;
+  m_directions += has_direction;
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(5, kStates);
   Eigen::VectorXd residual(5);
   H.block<3, 3>(0, kGyro) = -duration * Matrix3d::Identity();
   residual.head<3>() = logSo3(m_turned.transpose() * m_bMc.R * points.aRb * m_bMc.R.transpose());
-  const Vector3d direction = wRa * m_bMc.R * points.direction;
-  const Eigen::Matrix<double, 2, 3> across = (wRa * m_bMc.R * directionBasis(points.direction)).transpose();
-  const Eigen::Matrix<double, 2, 3> by_attitude = across * m_wRb * skew(m_wRb.transpose() * direction);
-  H.block<2, 3>(3, kMoved) = across / std::max(length, kLeast);
-  H.block<2, 3>(3, kAttitude) = by_attitude;
-  H.block<2, 3>(3, kGyro) = duration * by_attitude;
-  residual.tail<2>() = -across * moved / std::max(length, kLeast);
+  if (has_direction) {
+    // In the plane across the expected direction: across the measured one, its error would stand in H and in the
+    // residual, and their product makes each displacement shorter.
+    const Matrix3d to_expected = Eigen::Quaterniond::FromTwoVectors(direction, expected).toRotationMatrix();
+    const Eigen::Matrix<double, 2, 3> across = (to_expected * wRc * directionBasis(points.direction)).transpose();
+    const Eigen::Matrix<double, 2, 3> by_attitude = across * m_wRb * skew(m_wRb.transpose() * expected);
+    H.block<2, 3>(3, kMoved) = across / moved.norm();
+    H.block<2, 3>(3, kAttitude) = by_attitude;
+    H.block<2, 3>(3, kGyro) = duration * by_attitude;
+    residual.tail<2>() = across * direction;
+  }
   Matrix5d to_body = Matrix5d::Identity();
   to_body.topLeftCorner<3, 3>() = m_bMc.R;
   Eigen::MatrixXd noise = to_body * points.covariance * to_body.transpose();
   noise.topLeftCorner(3, 3) += std::pow(m_gyro.noise_density, 2) * duration * Matrix3d::Identity();
+  const Eigen::Index rows = has_direction ? 5 : 3;
   update(H.topRows(rows), residual.head(rows), noise.topLeftCorner(rows, rows));
 }
 
@@ -293,7 +299,7 @@ std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64
 
 std::optional<LogScale> InertialScale::scale(double prior_sigma) const
 {
-  if (m_compared == 0 || !m_force_varies)
+  if (m_compared == 0 || 2 * m_directions < m_compared || !m_force_varies)
     return std::nullopt;
   const double variance = m_covariance(kScale, kScale), prior2 = prior_sigma * prior_sigma;
   LogScale result;

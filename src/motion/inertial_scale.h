@@ -48,7 +48,9 @@ public:
   void process(const Frame &frame, const std::vector<RelativeMotion> &motions);
 
   /// The scale, an odometry of scale 1 within \p prior_sigma (of the log) being expected: a measurement far outside of
-  /// that stands alone. Nothing while no accelerometer was compared.
+  /// that stands alone. Nothing while no accelerometer was compared, or where points did not tell the direction of half
+  /// of the way: by the accelerometer alone a steady curve, whose acceleration a bias may be, has no scale, and the
+  /// filter believes that it has.
   std::optional<LogScale> scale(double prior_sigma) const;
 
   /// The displacement from \p from_ns, which is no earlier than the last comparison, to \p frame, which is yet to be
@@ -84,6 +86,7 @@ private:
   std::optional<Anchor> m_anchor;
   bool m_started = false; ///< the velocity is known
   int m_compared = 0;     ///< windows
+  int m_directions = 0;   ///< windows in which points told where it went
 
   Eigen::Matrix3d m_wRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d m_turned = Eigen::Matrix3d::Identity(); ///< since the anchor, by the gyro less its bias

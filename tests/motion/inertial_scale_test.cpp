@@ -26,7 +26,7 @@ TEST(InertialScale, ExactSensorsGiveTheScaleOfTheOdometry)
   for (const double factor : {0.8, 0.97, 1.05, 1.3}) {
     MadeFlight made;
     made.factor = factor;
-    const auto scale = fly(12, made).scale(kWide);
+    const auto scale = fly(14, made).scale(kWide);
     ASSERT_TRUE(scale);
     EXPECT_NEAR(scale->mean, std::log(factor), 0.006) << factor;
   }
@@ -42,6 +42,34 @@ TEST(InertialScale, NoiseAndBiasStayWithinThreeStandardDeviations)
   ASSERT_TRUE(scale);
   EXPECT_LT(scale->sigma, 0.03);
   EXPECT_LT(std::abs(scale->mean - std::log(made.factor)), 3 * scale->sigma);
+}
+
+TEST(InertialScale, NoiseOfDirectionsMakesNothingShorter)
+{
+  double sum = 0;
+  constexpr int kFlights = 8;
+  for (unsigned seed = 1; seed <= kFlights; ++seed) {
+    MadeFlight made;
+    made.radius = 6.4;
+    made.random.seed(seed);
+    made.odometry_noise = 0.012;
+    made.force_noise = 0.1;
+    made.points_noise = 0.01;
+    const auto scale = fly(60, made).scale(kWide);
+    ASSERT_TRUE(scale);
+    sum += scale->mean;
+  }
+  EXPECT_NEAR(sum / kFlights, 0, 0.012);
+}
+
+TEST(InertialScale, IsUnknownWherePointsTellNoDirection)
+{
+  MadeFlight made;
+  made.radius = 6.4;
+  InertialScale inertial(forwardCamera());
+  for (std::size_t i = 0; i < 200; ++i)
+    inertial.process(made.frame(i), {});
+  EXPECT_FALSE(inertial.scale(0.03));
 }
 
 TEST(InertialScale, ARotationThatPointsTookForATranslationIsUndoneByTheGyro)
