@@ -109,9 +109,12 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
 /// shaken; it is forgotten then. Without gyro and odometry a flight explains as much.
 void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
 {
-  constexpr double kLean = 0.015;  // of upright trunks [rad]: 3 px over 200 rows
-  constexpr double kSigmas = 6;    // of the fit; recorded images in order: at most 4.3 in 4000 pairs of them
-  constexpr double kGain = 9;      // chi-squared, three sigmas; images in order from a drone that sways: at most 3.6
+  constexpr double kLean = 0.015; // of upright trunks [rad]: 3 px over 200 rows
+  constexpr double kSigmas = 6;   // of the fit; recorded images in order: at most 4.3 in 4000 pairs of them
+  constexpr double kFirstGain =
+      30;                     // chi-squared; of images in order at most 22, where corners slide along a near trunk
+  constexpr double kGain = 9; // once there was one: a shutter shears image after image
+  constexpr std::int64_t kLasts_ns = 1'000'000'000;
   constexpr int kMostRefused = 10; // in a row: then the camera has changed for good
   if (m_seen.size() < 2)
     return;
@@ -134,8 +137,10 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   RowShear found = find({start});
   if (has_start && matters(found)) // a start far off may end in a motion that explains less without a shear
     found = find({start, seen_start});
+  const std::int64_t now_ns = m_seen.back().stamp_ns;
+  const bool is_likely = m_sheared_ns && now_ns - *m_sheared_ns < kLasts_ns;
   const bool is_sheared = matters(found) && gainOfShear(found, matches, m_camera, prior, {start, seen_start},
-                                                        m_options.relative_pose) > kGain;
+                                                        m_options.relative_pose) > (is_likely ? kGain : kFirstGain);
   if (!is_sheared || m_refused == kMostRefused) {
     m_refused = 0;
     if (rigid.hasDirection())
@@ -143,6 +148,7 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
     return;
   }
   ++m_refused;
+  m_sheared_ns = now_ns;
   m_fault = fmt::format("sheared: its last row stands {:.0f} px farther {} of its first than in the image before "
                         "(rolling shutter)",
                         std::abs(found.shear) * m_camera.height * m_camera.fx / m_camera.fy,

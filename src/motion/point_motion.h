@@ -102,14 +102,15 @@ private:
   PointMotionOptions m_options;
   PointTracker m_tracker;
   GyroBias m_bias;
-  std::deque<Seen> m_seen;                ///< oldest first, the current frame last
-  std::vector<GyroSample> m_gyro;         ///< since the oldest frame of m_seen
-  std::optional<GyroRotation> m_turned;   ///< from the good frame before to the newest
-  int m_good_frames = 0;                  ///< that were processed
-  std::size_t m_frames = 0;               ///< that came, good or not
-  std::int64_t m_bias_until_ns = 0;       ///< end of the last interval that taught the bias
-  std::string m_fault;                    ///< of the newest image
-  int m_refused = 0;                      ///< images in a row
-  std::optional<Eigen::Vector3d> m_ahead; ///< direction of the last translation from frame to frame, camera axes
+  std::deque<Seen> m_seen;                  ///< oldest first, the current frame last
+  std::vector<GyroSample> m_gyro;           ///< since the oldest frame of m_seen
+  std::optional<GyroRotation> m_turned;     ///< from the good frame before to the newest
+  int m_good_frames = 0;                    ///< that were processed
+  std::size_t m_frames = 0;                 ///< that came, good or not
+  std::int64_t m_bias_until_ns = 0;         ///< end of the last interval that taught the bias
+  std::string m_fault;                      ///< of the newest image
+  int m_refused = 0;                        ///< images in a row
+  std::optional<std::int64_t> m_sheared_ns; ///< stamp of the last that was
+  std::optional<Eigen::Vector3d> m_ahead;   ///< direction of the last translation from frame to frame, camera axes
 };
 } // namespace bole
