@@ -30,4 +30,11 @@ void FeatureFilter::correct(double seen, double sigma)
   m_x += gain * std::clamp(seen - m_x(0), -most, most);
   m_P -= gain * m_P.row(0);
 }
+
+void FeatureFilter::correctDrift(double seen, double sigma)
+{
+  const Eigen::Vector2d gain = m_P.col(1) / (m_P(1, 1) + sigma * sigma);
+  m_x += gain * (seen - m_x(1));
+  m_P -= gain * m_P.row(1);
+}
 } // namespace bole

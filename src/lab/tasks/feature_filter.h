@@ -21,6 +21,8 @@ public:
   void predict(double moved, double dt, double unrest);
   /// What is farther off than three standard deviations moves it by no more than these: read from other edges.
   void correct(double seen, double sigma);
+  /// The drift of the last interval as it was measured otherwise [1/s].
+  void correctDrift(double seen, double sigma);
 
   double value() const { return m_x(0); }
   double drift() const { return m_x(1); } ///< [1/s]

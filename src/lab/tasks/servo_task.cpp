@@ -48,7 +48,8 @@ TaskCommand ServoTask::decide(const FrameReport &report)
     return hover;
   }
   if (m_is_lost) {
-    hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(report.frame_status) + ": hovers";
+    const std::string why = report.reason.empty() ? "" : " (" + report.reason + ")";
+    hover.reason = is_ok ? "lost: hovers" : std::string("frame ") + toString(report.frame_status) + why + ": hovers";
     return hover;
   }
   for (const SensorVerdict &verdict : report.verdicts)

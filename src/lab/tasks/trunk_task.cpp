@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/trunk_task.h"
 
+#include "geometry/so3.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -20,7 +22,9 @@ constexpr double kBearingNoise = 0.0015; ///< of a tracked trunk in one image [r
 constexpr double kMapBearingNoise = 0.006; ///< of one by map and pose: the pose scatters by a pixel and more [rad]
 constexpr double kRatioNoise = 0.025;      ///< of its log r/d: half a pixel on a width of 20
 constexpr double kUnrest = 0.15;           ///< of the velocity sideways that nobody ordered [m/s per root of a second]
-constexpr double kApproachUnrest = 0.05;   ///< and of that ahead: learnt no faster than delay and lags let it be mended
+constexpr double kApproachUnrest = 0.06;   ///< and of that ahead: more leaves a modulus margin below .5
+constexpr double kFlownNoise = 0.009;      ///< of the way from frame to frame, by pose [m]
+constexpr double kTurnedNoise = 0.002;     ///< and of its turn [rad]
 constexpr double kSwing = 0.69;    ///< to either side, where a distance is asked for [m]: 13 degrees of parallax at 3 m
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
@@ -169,8 +173,21 @@ RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk
   return seen;
 }
 
+/// The way from the frame that the filters stand at, in the body there.
+std::optional<Eigen::Vector4d> TrunkTask::flownTo(const Pose &wMb)
+{
+  const std::optional<Pose> from = std::exchange(m_wMb, wMb);
+  if (!from || !m_has_feature)
+    return std::nullopt;
+  const Pose step = from->inverse() * wMb;
+  Eigen::Vector4d flown;
+  flown << step.t, logSo3(step.R).z();
+  return flown;
+}
+
 void TrunkTask::forgetFeature()
 {
+  m_wMb.reset();
   m_has_feature = false;
   m_log_radius.reset();
 }
@@ -214,7 +231,7 @@ TaskCommand TrunkTask::act(const FrameReport &report)
     m_blocked = 0;
   }
   const double round = is_free ? wanted : 0;
-  TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round), "holds"};
+  TaskCommand command{false, velocityFor(feature, trunk->trunk.radius(), time_s, round, flownTo(report.wMb)), "holds"};
   command.velocity.z() = sway.y();
   if (sway != Eigen::Vector2d::Zero())
     command.reason = "holds, swaying";
@@ -264,7 +281,7 @@ Eigen::Matrix<double, 2, 4> TrunkTask::interactionOf(vpFeatureTrunk feature) con
 }
 
 /// Brings the filters to the frame of \p time_s, in which \p feature was seen.
-void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
+void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s, const std::optional<Eigen::Vector4d> &flown)
 {
   const double dt = time_s - m_time_s, d = feature.distance();
   if (dt > kPause_s) {
@@ -276,6 +293,11 @@ void TrunkTask::filter(const vpFeatureTrunk &feature, double time_s)
     const Eigen::Vector2d moved = interactionOf(feature) * path;
     m_bearing.predict(moved(0), dt, kUnrest / d);
     m_log_ratio.predict(moved(1), dt, kApproachUnrest / d);
+    if (flown && dt > 0) {
+      const Eigen::Vector2d unordered = interactionOf(feature) * (*flown - path) / dt;
+      m_bearing.correctDrift(unordered(0), std::hypot(kFlownNoise / d, kTurnedNoise) / dt);
+      m_log_ratio.correctDrift(unordered(1), kFlownNoise / d / dt);
+    }
     m_bearing.correct(feature.bearing(), m_bearing_noise);
     m_log_ratio.correct(feature.logRatio(), kRatioNoise);
   }
@@ -307,9 +329,10 @@ Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, do
   return drift + J.col(1) * ahead.velocity().y();
 }
 
-Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round)
+Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round,
+                                       const std::optional<Eigen::Vector4d> &flown)
 {
-  filter(feature, time_s);
+  filter(feature, time_s, flown);
   desire(radius);
   round = std::clamp(round, -m_options.largest_speed, m_options.largest_speed);
   const Eigen::Vector2d besides = lead(feature, radius, time_s, round);

@@ -64,7 +64,9 @@ public:
 
   /// The control law alone: velocity (vx, vy, vz = 0, wz) of the body for the \p feature of the frame of \p time_s [s],
   /// going round at \p round [m/s], positive to the left.
-  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round);
+  /// \p flown: path of the body since the frame before by odometry and images (x, y, z [m], yaw [rad]), where known.
+  Eigen::Vector4d velocityFor(const vpFeatureTrunk &feature, double radius, double time_s, double round,
+                              const std::optional<Eigen::Vector4d> &flown = {});
 
 protected:
   bool sees(const FrameReport &report) const override;
@@ -77,11 +79,12 @@ private:
   int choose(const FrameReport &report, double elapsed_s) const;
   int successor(const FrameReport &report) const;
   RelativeTrunk look(const FrameReport &report, const KnownTrunk &trunk);
+  std::optional<Eigen::Vector4d> flownTo(const Pose &wMb);
   void forgetFeature();
   void desire(double radius);
   Eigen::Vector2d swayNow(double time_s);
   bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
-  void filter(const vpFeatureTrunk &feature, double time_s);
+  void filter(const vpFeatureTrunk &feature, double time_s, const std::optional<Eigen::Vector4d> &flown);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
   Eigen::Matrix<double, 2, 4> interactionOf(vpFeatureTrunk feature) const;
 
@@ -96,6 +99,7 @@ private:
   Eigen::Vector2d m_place = Eigen::Vector2d::Zero(); ///< of the target in the map
   double m_map_log_radius = 0;                       ///< of the target
   double m_time_s = 0, m_ratio = 0;
+  std::optional<Pose> m_wMb;          ///< at the frame that the filters stand at
   std::optional<double> m_log_radius; ///< as seen from here: distance by the map times r/d in the image, over a second
   double m_bearing_noise;             ///< of the feature seen last [rad]
   int m_misread = 0;                  ///< frames in a row

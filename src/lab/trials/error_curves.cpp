@@ -109,7 +109,7 @@ std::string samplesCsv(const LoopRecord &record)
       "wz [rad/s],speed [m/s],least clearance [m],loop [ms]";
   for (const std::string &name : names)
     text += ",believed " + name + ",true " + name;
-  text += "\n";
+  text += ",what it does\n";
   const auto value = [](const ServoTask::Values &values, const std::string &name) {
     for (const auto &[key, number] : values)
       if (key == name)
@@ -124,7 +124,9 @@ std::string samplesCsv(const LoopRecord &record)
         s.speed, s.clearance, s.loop_ms);
     for (const std::string &name : names)
       text += "," + value(s.believed, name) + "," + value(s.real, name);
-    text += "\n";
+    std::string what = s.reason;
+    std::replace(what.begin(), what.end(), ',', ';');
+    text += "," + what + "\n";
   }
   return text;
 }

@@ -92,6 +92,35 @@ TEST(TrunkTask, AWrongRadiusSlowsButDoesNotMoveTheRatioItKeeps)
   EXPECT_NEAR(std::exp(flight.feature().logRatio()), 0.06, 1e-3);
 }
 
+TEST(TrunkTask, WindThatOdometryShowsMovesItLess)
+{
+  const auto mostOff = [](bool is_told) {
+    Flight flight = before(3, 0, 0.15);
+    TrunkTaskOptions options = atOnce();
+    options.ratio = 0.05;
+    TrunkTask task(flight.bMc, options);
+    double most = 0;
+    Pose last = flight.wMb;
+    for (int k = 0; k < 60; ++k) {
+      std::optional<Eigen::Vector4d> flown;
+      const Pose step = last.inverse() * flight.wMb;
+      if (is_told && k > 0)
+        flown = Eigen::Vector4d(step.t.x(), step.t.y(), step.t.z(), logSo3(step.R).z());
+      last = flight.wMb;
+      Eigen::Vector4d v = task.velocityFor(flight.feature(), 0.15, 5 * kStep * k, 0, flown);
+      if (k > 20)
+        v.x() += 0.15; // [m/s]
+      for (int i = 0; i < 5; ++i)
+        flight.move(v);
+      most = std::max(most, 3 - flight.distance());
+    }
+    return most;
+  };
+  const double told = mostOff(true), alone = mostOff(false);
+  EXPECT_GT(alone, 0.03);
+  EXPECT_LT(told, 0.8 * alone);
+}
+
 TEST(TrunkTask, BacksOffWhereItsPredictionReachesTheBark)
 {
   TrunkTaskOptions options;
