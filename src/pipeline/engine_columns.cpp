@@ -20,7 +20,7 @@ Trunk asSeen(const TrackedTrunk &tracked, const Trunk &trunk, const Viewpoint &v
 }
 } // namespace
 
-/// A line beside which the trunk goes on is one of light and shade: the border is not read there, and the other one
+/// A line beside which the trunk goes on is one of light and shade: the border is not read there while the other one
 /// tells the bearing.
 void Engine::leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const
 {
@@ -28,8 +28,8 @@ void Engine::leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const
     const auto evidence = m_columns.lately(trunk.id);
     if (!evidence || !goesOnBeside(*evidence))
       continue;
-    bool &hidden = evidence->left < evidence->right ? trunk.tracking.left_hidden : trunk.tracking.right_hidden;
-    hidden = true;
+    bool &on_bark = evidence->left < evidence->right ? trunk.tracking.left_on_bark : trunk.tracking.right_on_bark;
+    on_bark = true;
   }
 }
 

@@ -182,8 +182,12 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   };
   if (!prediction.relative.isFinite() || !prediction.covariance.allFinite())
     return finish(TrackingStatus::not_visible);
-  const SeenBorder left = look(camera, prediction, Border::left, options.rows_min);
-  const SeenBorder right = look(camera, prediction, Border::right, options.rows_min);
+  SeenBorder left = look(camera, prediction, Border::left, options.rows_min);
+  SeenBorder right = look(camera, prediction, Border::right, options.rows_min);
+  if (prediction.left_on_bark && right.visible)
+    left.visible = false;
+  else if (prediction.right_on_bark && left.visible)
+    right.visible = false;
   if (!left.visible && !right.visible)
     return finish(prediction.left_hidden || prediction.right_hidden ? TrackingStatus::occluded
                                                                     : TrackingStatus::not_visible);

@@ -47,6 +47,7 @@ struct TrackingPrediction
   Matrix4d covariance = Matrix4d::Identity() * 1e-4;
   ElevationRange range;
   bool left_hidden = false, right_hidden = false;      ///< by nearer trunks
+  bool left_on_bark = false, right_on_bark = false;    ///< a line of light and shade: not read where the other is
   std::optional<double> left_contrast, right_contrast; ///< signed, from the frames before
 };
 

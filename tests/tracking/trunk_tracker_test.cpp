@@ -78,6 +78,22 @@ TEST(TrunkTracker, MendsTiltAndWidthOfThePredictionTogether)
   EXPECT_LT(std::abs(error(3)) * seen().ratio() * camera.fx, 0.08); // half the width [px]
 }
 
+/// As where the drone passes a trunk: the other border is out of the picture or behind another trunk.
+TEST(TrunkTracker, LeavesALineOnTheBarkOnlyWhereTheOtherBorderIsRead)
+{
+  const Gradient gradient = computeGradient(drawn(PinholeCamera(), seen(), 40, 200));
+  TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  prediction.left_on_bark = true;
+  const TrackingResult both = trackTrunk(gradient, PinholeCamera(), prediction, TrackingOptions());
+  EXPECT_EQ(both.status, TrackingStatus::tracked);
+  EXPECT_FALSE(both.left_used);
+  EXPECT_TRUE(both.right_used);
+  prediction.right_hidden = true;
+  const TrackingResult alone = trackTrunk(gradient, PinholeCamera(), prediction, TrackingOptions());
+  EXPECT_EQ(alone.status, TrackingStatus::tracked);
+  EXPECT_TRUE(alone.left_used);
+}
+
 TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
 {
   vpImage<unsigned char> image(240, 320, 0);
