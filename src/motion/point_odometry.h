@@ -67,8 +67,8 @@ struct PlacedFrame
 class PointOdometry
 {
 public:
-  /// \p focal_sigma: of the log of the focal length, 0 where it is calibrated. Under a wrong one a pan past a wall looks
-  /// like a sideways flight, so a start also needs flow that no rotation explains under any within three sigmas.
+  /// \p focal_sigma: of the log of the focal length, 0 where it is calibrated. Under a wrong one a pan past a wall
+  /// looks like a sideways flight, so a start also needs flow that no rotation explains under any within three sigmas.
   explicit PointOdometry(const PinholeCamera &camera, double focal_sigma = 0);
   ~PointOdometry();
   PointOdometry(PointOdometry &&) noexcept;

@@ -50,8 +50,8 @@ private:
   PinholeCamera m_camera;
   Pose m_bMc;
   double m_camera_height; ///< over the ground [m]; 0: unknown
-  double m_focal_sigma; ///< of the log of the focal length
-  MotionModel m_model; ///< for the gyro, and for what the images do not show
+  double m_focal_sigma;   ///< of the log of the focal length
+  MotionModel m_model;    ///< for the gyro, and for what the images do not show
   PointOdometry m_odometry;
   VerticalFinder m_verticals;
   VerticalFilter m_vertical; ///< in the world of m_odometry
