@@ -109,11 +109,10 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
 /// shaken; it is forgotten then. Without gyro and odometry a flight explains as much.
 void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
 {
-  constexpr double kLean = 0.015; // of upright trunks [rad]: 3 px over 200 rows
-  constexpr double kSigmas = 6;   // of the fit; recorded images in order: at most 4.3 in 4000 pairs of them
-  constexpr double kFirstGain =
-      30;                     // chi-squared; of images in order at most 22, where corners slide along a near trunk
-  constexpr double kGain = 9; // once there was one: a shutter shears image after image
+  constexpr double kLean = 0.015;   // of upright trunks [rad]: 3 px over 200 rows
+  constexpr double kSigmas = 6;     // of the fit; recorded images in order: at most 4.3 in 4000 pairs of them
+  constexpr double kFirstGain = 30; // chi-squared; images in order: at most 22, where corners slide along a trunk
+  constexpr double kGain = 9;       // once there was one: a shutter shears image after image
   constexpr std::int64_t kLasts_ns = 1'000'000'000;
   constexpr int kMostRefused = 10; // in a row: then the camera has changed for good
   if (m_seen.size() < 2)
