@@ -187,4 +187,12 @@ std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
     stamp_ns = std::llround(number(column, "timestamp") * 1e9);
   return rising(stamp_ns);
 }
+
+std::string oneField(std::string text)
+{
+  for (char &c : text)
+    if (c == ',' || c == '\n' || c == '\r')
+      c = c == ',' ? ';' : ' ';
+  return text;
+}
 } // namespace bole

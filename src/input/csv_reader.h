@@ -75,4 +75,6 @@ private:
   std::int64_t m_last_stamp_ns = 0;
   std::vector<std::string> m_fields;
 };
+/// \p text as one field of such a table: commas become semicolons, ends of lines blanks.
+std::string oneField(std::string text);
 } // namespace bole

@@ -16,16 +16,6 @@ namespace
 constexpr const char *kFramesHeader = "frame,stamp,status,x,y,z,var_xx,var_xy,var_yy,reason";
 constexpr const char *kViewsHeader = "frame,stamp,id,range,sigma_range,radius,sigma_radius,x,y,sigma_x,sigma_y";
 constexpr const char *kEvidenceHeader = "x,y,points";
-
-/// \p text as a field of a table.
-std::string oneField(std::string text)
-{
-  for (char &c : text)
-    if (c == ',' || c == '\n' || c == '\r')
-      c = c == ',' ? ';' : ' ';
-  return text;
-}
-
 } // namespace
 
 void GroundEvidence::add(const Eigen::Vector3d &point, int count)

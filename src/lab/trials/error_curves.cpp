@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/trials/error_curves.h"
+#include "input/csv_reader.h"
 #include "output/palette.h"
 #include "output/svg.h"
 
@@ -124,9 +125,7 @@ std::string samplesCsv(const LoopRecord &record)
         s.speed, s.clearance, s.loop_ms);
     for (const std::string &name : names)
       text += "," + value(s.believed, name) + "," + value(s.real, name);
-    std::string what = s.reason;
-    std::replace(what.begin(), what.end(), ',', ';');
-    text += "," + what + "\n";
+    text += "," + oneField(s.reason) + "\n";
   }
   return text;
 }
