@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/column_evidence.h"
 
+#include "geometry/median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,8 +16,7 @@ namespace
 /// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
-constexpr int kViews = 24;           // looked at, spread over the flight
-constexpr std::size_t kPartners = 3; // each is compared with
+constexpr std::size_t kPartners = 3; // a view is compared with
 
 /// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
 /// tell, not so much that the bark has turned.
@@ -29,33 +30,33 @@ struct Seen
 
 constexpr std::size_t kMostInside = 12, kBeside = 4; // columns inside a trunk, beside each of its borders
 
-/// Columns of a view that are compared: inside the trunk, beside its left border, beside its right one.
-struct Columns
+/// A column of a view that is compared.
+struct Column
 {
-  std::size_t count = 0;
-  std::array<double, kMostInside + 2 * kBeside> angle, range; ///< from the heading [rad], of what they show if the
-                                                              ///< trunk is there [m]
-  std::size_t inside = 0;                                     ///< the first ones are; those beside the borders follow
+  double angle = 0, range = 0; ///< from the heading [rad], of what it shows if the trunk is there [m]
+  std::size_t kind = 0;        ///< what it counts for
+  bool is_beside = false;      ///< outside of the borders that are thought
 };
 
-Columns columnsOf(const TrunkInLevelView &at, double radius, double px)
+/// Inside the trunk (kind 0), beside its left border (1), beside its right one (2).
+std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double px)
 {
-  Columns columns;
-  const auto add = [&](double offset, double range) {
-    columns.angle[columns.count] = at.bearing + offset;
-    columns.range[columns.count++] = range;
-  };
+  std::vector<Column> columns;
+  columns.reserve(kMostInside + 2 * kBeside);
   const double half = std::max(at.half_angle - px, 0.3 * at.half_angle);
-  columns.inside = static_cast<std::size_t>(std::clamp(2 * half / px, 3.0, double(kMostInside)));
-  for (std::size_t i = 0; i < columns.inside; ++i) {
-    const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(columns.inside - 1) - 1);
+  const auto inside = static_cast<std::size_t>(std::clamp(2 * half / px, 3.0, double(kMostInside)));
+  for (std::size_t i = 0; i < inside; ++i) {
+    const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(inside - 1) - 1);
     const double across = at.range * std::sin(offset);
-    add(offset, at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0)));
+    columns.push_back({at.bearing + offset,
+                       at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0))});
   }
   const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
-  for (const int side : {1, -1})
-    for (std::size_t i = 0; i < kBeside; ++i)
-      add(side * (at.half_angle + 1.5 * px + strip * static_cast<double>(i) / (kBeside - 1)), at.range);
+  for (const std::size_t kind : {1, 2})
+    for (std::size_t i = 0; i < kBeside; ++i) {
+      const double offset = at.half_angle + 1.5 * px + strip * static_cast<double>(i) / (kBeside - 1);
+      columns.push_back({at.bearing + (kind == 1 ? offset : -offset), at.range, kind, true});
+    }
   return columns;
 }
 
@@ -114,16 +115,17 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
   return {std::tan(at->bearing - at->half_angle), std::tan(at->bearing + at->half_angle)};
 }
 
-/// Adds what one view says of \p trunk beside its partners among \p all, if there is anything to compare.
-void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views,
-             ColumnCurves &curves)
+/// Compares \p columns of the view \p seen with its partners among \p all, at every range that is tried.
+/// \p add: takes the kind of a column, the range by its number, the difference.
+template <typename Add>
+void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
+             const std::vector<LevelView> &views, const Add &add)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008;  // [full scale] noise of the camera
   const LevelView &view = views[seen.view];
   const Vector2d &lean = trunk.lean;
-  const Columns columns = columnsOf(seen.at, trunk.radius(), view.image->step);
   const std::vector<std::size_t> partners = partnersOf(seen, all, views);
   std::array<std::pair<double, double>, kPartners> covered;
   for (std::size_t p = 0; p < partners.size(); ++p)
@@ -131,13 +133,11 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all,
   unsigned above = 0; // bands
   for (std::size_t b = 0; b < kLevelBands; ++b)
     above |= view.image->elevation[b] > kGround ? 1U << b : 0;
-  ColumnCurves here;
-  for (std::size_t i = 0; i < columns.count; ++i) {
-    const double c = std::cos(columns.angle[i]), s = std::sin(columns.angle[i]);
+  for (const Column &one : columns) {
+    const double c = std::cos(one.angle), s = std::sin(one.angle);
     const Vector2d direction = c * view.forward + s * view.left;
-    const std::size_t kind = i < columns.inside ? 0 : i < columns.inside + kBeside ? 1 : 2;
     LevelColumn column = view.image->at(s / c, across(direction, lean));
-    if (kind > 0)
+    if (one.is_beside)
       column.bands &= above;
     if (column.bands == 0)
       continue;
@@ -146,22 +146,30 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all,
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
       const auto by_value = static_cast<float>(1 / unit);
       for (std::size_t k = 0; k < kScales.size(); ++k) {
-        const Vector2d at = view.position + columns.range[i] * kScales[k] * direction - other.position;
+        const Vector2d at = view.position + one.range * kScales[k] * direction - other.position;
         const double ahead = at.dot(other.forward);
         if (ahead < 0.1)
           continue;
         const double q = at.dot(other.left) / ahead;
-        if (kind > 0 && k > kOwn && q > covered[p].first && q < covered[p].second)
+        if (one.is_beside && k > kOwn && q > covered[p].first && q < covered[p].second)
           continue; // what stands behind the trunk there is hidden by it
         const LevelColumn there = other.image->at(q, across(at, lean) / at.norm());
         const double d = difference(column, there, by_value, 2 * by_value);
         if (d >= 0)
-          here.add(kind, k, d);
+          add(one.kind, k, d);
       }
     }
   }
-  if (here.count[0][kOwn] > 0)
-    curves.add(here);
+}
+
+/// What one view says of \p trunk beside its partners among \p all; nothing where there is nothing to compare.
+std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all,
+                                     const std::vector<LevelView> &views)
+{
+  ColumnCurves here;
+  compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views,
+          [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
+  return here.count[0][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
 /// The views that show it.
@@ -173,6 +181,18 @@ std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &vi
     if (const auto at = locate(trunk, views[i], farthest))
       all.push_back({i, *at});
   return all;
+}
+/// As many as are looked at, spread over the flight.
+std::vector<Seen> spread(const std::vector<Seen> &all)
+{
+  constexpr std::size_t kViews = 24;
+  if (all.size() <= kViews)
+    return all;
+  std::vector<Seen> some;
+  some.reserve(kViews);
+  for (std::size_t i = 0; i < kViews; ++i)
+    some.push_back(all[i * (all.size() - 1) / (kViews - 1)]);
+  return some;
 }
 } // namespace
 
@@ -238,18 +258,21 @@ std::optional<ColumnCurves> columnsOfView(const Trunk &trunk, std::size_t which,
   const auto at = locate(trunk, views[which], farthest);
   if (!at)
     return std::nullopt;
+  const auto here = curvesOf(trunk, {which, *at}, locateAll(trunk, views, farthest), views);
+  if (!here)
+    return std::nullopt;
   ColumnCurves curves;
-  compare(trunk, {which, *at}, locateAll(trunk, views, farthest), views, curves);
-  return curves.views > 0 ? std::optional(curves) : std::nullopt;
+  curves.add(*here);
+  return curves;
 }
 
 std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
   const std::vector<Seen> all = locateAll(trunk, views, farthest);
   ColumnCurves curves;
-  const std::size_t n = std::min<std::size_t>(all.size(), kViews);
-  for (std::size_t i = 0; i < n; ++i)
-    compare(trunk, all[n > 1 ? i * (all.size() - 1) / (n - 1) : 0], all, views, curves);
+  for (const Seen &seen : spread(all))
+    if (const auto here = curvesOf(trunk, seen, all, views))
+      curves.add(*here);
   return evidenceOf(curves);
 }
 
@@ -276,5 +299,61 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
   evidence.left = beside(1);
   evidence.right = beside(2);
   return evidence;
+}
+
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr double kBin = 0.5, kReach = 8; // [px] of a place across, and how far it is looked beyond the borders
+  // logarithms of the ratio of both differences, the trunk's over the background's
+  constexpr double kThere = -0.5, kSurely = -0.3, kLikely = -0.15;
+  constexpr double kAlike = 0.1; // difference of two columns that show the same
+  constexpr std::size_t kLeastViews = 6;
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  if (all.size() < kLeastViews)
+    return std::nullopt;
+  std::vector<double> pixels;
+  for (const Seen &seen : all)
+    pixels.push_back(views[seen.view].image->step * seen.at.range);
+  DepthBorders borders;
+  borders.px = medianOf(pixels);
+  const double radius = trunk.radius(), bin = kBin * borders.px;
+  const int reach = static_cast<int>(std::ceil((4 * radius + kReach * borders.px) / bin));
+  std::vector<ColumnCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
+  std::vector<Column> columns(places.size());
+  for (const Seen &seen : spread(all)) {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const double across = bin * (static_cast<double>(i) - reach);
+      const double depth = std::sqrt(std::max(radius * radius - across * across, 0.0));
+      columns[i] = {seen.at.bearing + std::atan(across / seen.at.range), seen.at.range - depth, i,
+                    std::abs(across) > radius};
+    }
+    compare(trunk, seen, columns, all, views,
+            [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
+  }
+  const auto ratioAt = [&](int across) { // infinite or NaN where it is not known
+    const ColumnCurves &place = places[static_cast<std::size_t>(across + reach)];
+    return std::log((place.least(0, kOwn - 1, kOwn + 2) + kAlike) /
+                    (place.least(0, kBeyond + 1, kScales.size()) + kAlike));
+  };
+  const int within = static_cast<int>(0.7 * radius / bin);
+  int middle = 0;
+  for (int i = -within; i <= within; ++i)
+    if (std::isfinite(ratioAt(i)) && !(ratioAt(i) >= ratioAt(middle)))
+      middle = i;
+  if (!(ratioAt(middle) <= kThere))
+    return std::nullopt;
+  const auto risesTo = [&](double ratio, int side) -> std::optional<double> {
+    for (int i = middle; std::abs(i) < reach; i += side) {
+      const double here = ratioAt(i), next = ratioAt(i + side);
+      if (!std::isfinite(next))
+        return std::nullopt;
+      if (next >= ratio)
+        return bin * (side * i + (ratio - here) / (next - here));
+    }
+    return std::nullopt;
+  };
+  borders.least = {risesTo(kSurely, 1), risesTo(kSurely, -1)};
+  borders.likely = {risesTo(kLikely, 1), risesTo(kLikely, -1)};
+  return borders;
 }
 } // namespace bole

@@ -78,4 +78,15 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves);
 
 /// None where fewer than three views have a parallax.
 std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
+
+/// Where a trunk ends by depth alone, left and right of its axis [m, outwards]: no light or shade moves it. From the
+/// middle outwards the trunk explains the columns by less and less better than what stands behind it. None where
+/// nothing behind is seen.
+struct DepthBorders
+{
+  std::array<std::optional<double>, 2> least, likely; ///< as far as it surely goes on; the best guess
+  double px = 0;                                      ///< a pixel at the range of the trunk [m]
+};
+/// None where the views are few or the trunk itself is not seen.
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
 } // namespace bole

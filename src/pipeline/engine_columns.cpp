@@ -76,14 +76,14 @@ void Engine::readWider(const Hypothesis &narrow, const std::vector<LevelView> &v
   const auto before = judge(narrow, views, farthestJudged()); // where it stands now
   if (!before)
     return;
-  const auto guess = widerReading(*before, views, farthestJudged(), m_units.detection.radius_max);
+  const auto guess = silhouetteByDepth(*before, views, farthestJudged(), m_units.detection.radius_max);
   if (!guess)
     return;
   const Adoption wider = followThroughWindow(*guess, m_window, m_smoother, m_map, view, m_units);
   if (static_cast<int>(wider.views.size()) < kLeastViews)
     return;
   const auto judged = judge({narrow.id, wider.trunk.trunk, narrow.online}, views, farthestJudged());
-  if (!judged || !isSilhouetteOf(*judged, *before))
+  if (!judged || !isSilhouetteOf(*judged, *before, views, farthestJudged()))
     return;
   m_smoother.removeTrunk(m_map.readAgain(narrow.id, hold(wider)));
   m_columns.forget(narrow.id);

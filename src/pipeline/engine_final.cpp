@@ -133,14 +133,15 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   std::vector<std::size_t> of;
   for (std::size_t i = 0; i < readings.size(); ++i)
     if (readings[i].judged)
-      if (const auto one = widerReading(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
+      if (const auto one =
+              silhouetteByDepth(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
         wider.push_back(*one);
         of.push_back(i);
       }
   std::vector<Reading> widened = read(wider);
   for (std::size_t k = 0; k < wider.size(); ++k) {
     Reading &before = readings[of[k]];
-    if (widened[k].views && isSilhouetteOf(*widened[k].judged, *before.judged))
+    if (widened[k].views && isSilhouetteOf(*widened[k].judged, *before.judged, views, farthestJudged()))
       before = std::move(widened[k]);
   }
   return readings;

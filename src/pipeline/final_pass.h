@@ -78,12 +78,12 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis);
 
 /// Whether the trunk goes on beside a border.
 bool goesOnBeside(const ColumnEvidence &evidence);
-/// Where columns beside a border stand at the range of the trunk: the best guess of the silhouette that takes them in.
-/// None where there is none, or none up to \p radius_max.
-std::optional<Hypothesis> widerReading(const Judged &judged, const std::vector<LevelView> &views, double farthest,
-                                       double radius_max);
-/// Whether \p wider takes in what stood beside a border of \p narrow, and is no worse as a trunk.
-bool isSilhouetteOf(const Judged &wider, const Judged &narrow);
+/// Where a trunk surely goes on beside a border by depth: a guess of its silhouette, as wide as depth says. None where
+/// its borders are its ends, or wider than \p radius_max [m].
+std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                            double radius_max);
+/// Whether depth speaks for \p wider by more than it is less of a trunk than \p narrow.
+bool isSilhouetteOf(const Judged &wider, const Judged &narrow, const std::vector<LevelView> &views, double farthest);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.

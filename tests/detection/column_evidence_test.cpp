@@ -13,36 +13,6 @@ using namespace bole::test;
 const PinholeCamera kCamera;
 constexpr double kFarthest = 14;
 
-/// Far trunks of many greys side by side: a background with texture.
-std::vector<DrawnTrunk> wall()
-{
-  std::vector<DrawnTrunk> trunks;
-  for (int i = -20; i <= 20; ++i)
-    trunks.push_back({16, 0.6 * i, 0.3, 60.0 + (i * 73 + 2000) % 140});
-  return trunks;
-}
-
-struct LevelFlight
-{
-  std::vector<LevelImage> images;
-  std::vector<Pose> poses;
-
-  LevelFlight(std::vector<DrawnTrunk> trunks, std::vector<Pose> path) : poses(std::move(path))
-  {
-    for (const DrawnTrunk &far : wall())
-      trunks.push_back(far);
-    for (const Pose &wMc : poses)
-      images.push_back(computeLevelImage(draw(trunks, wMc, kCamera), kCamera, wMc.R, ElevationRange()));
-  }
-  std::vector<LevelView> views() const
-  {
-    std::vector<LevelView> all;
-    for (std::size_t i = 0; i < poses.size(); ++i)
-      all.emplace_back(images[i], poses[i]);
-    return all;
-  }
-};
-
 /// Where a camera that is turned and rolled sees a trunk, its columns are as bright as it is.
 TEST(LevelImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
 {
@@ -179,6 +149,35 @@ TEST(ColumnEvidence, ViewByViewItIsTheSame)
   const auto last = columnsOfView(trunkOf(trunk), views.size() - 1, views, kFarthest);
   ASSERT_TRUE(last.has_value());
   EXPECT_LT(std::abs(lately->own - last->mean(0, 4)), std::abs(by_view->own - last->mean(0, 4)) + 1e-9);
+}
+
+/// Of a trunk that is read as it is depth says no more than a pixel; where only its lit part is read, it ends the trunk
+/// where the shadow does.
+TEST(DepthBorders, AreThoseOfTheSilhouetteWhateverTheLight)
+{
+  const DrawnTrunk whole{3.55, 0.3, 0.18, 60}, lit{3.42, 0.39, 0.09, 0};
+  const LevelFlight flight(barkOf(whole, 0), sweep());
+  const auto right = depthBorders(trunkOf(whole), flight.views(), kFarthest);
+  ASSERT_TRUE(right && right->least[0] && right->least[1]);
+  for (const std::size_t side : {0, 1}) {
+    EXPECT_LT(*right->least[side], 0.18 + 1.25 * right->px) << side;
+    EXPECT_NEAR(*right->likely[side], 0.18, 1.5 * right->px) << side;
+  }
+  const auto narrow = depthBorders(trunkOf(lit), flight.views(), kFarthest);
+  ASSERT_TRUE(narrow && narrow->least[0] && narrow->least[1]);
+  EXPECT_LT(*narrow->least[0], 0.09 + 1.25 * narrow->px);
+  EXPECT_GT(*narrow->least[1], 0.09 + 2 * narrow->px);
+  EXPECT_NEAR(*narrow->likely[1], 0.27, 1.5 * narrow->px);
+}
+
+TEST(DepthBorders, AreNoneOfWhatIsNotThereOrHasNoParallax)
+{
+  const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
+  const LevelFlight flight({trunk}, sweep()), still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
+  EXPECT_FALSE(depthBorders(trunkOf({3.5, -0.4, 0.15, 40}), flight.views(), kFarthest).has_value());
+  EXPECT_FALSE(depthBorders(trunkOf(trunk), still.views(), kFarthest).has_value());
+  const std::vector<LevelView> all = flight.views();
+  EXPECT_FALSE(depthBorders(trunkOf(trunk), {all.begin(), all.begin() + 5}, kFarthest).has_value());
 }
 
 TEST(ColumnEvidence, WithoutParallaxThereIsNone)

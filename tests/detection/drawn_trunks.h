@@ -3,6 +3,7 @@
 /// \file
 /// Trunks drawn as flat areas of grey, near before far, their borders smooth over a pixel.
 
+#include "detection/column_evidence.h"
 #include "detection/detector.h"
 #include "geometry/so3.h"
 #include "gradient/gradient.h"
@@ -97,4 +98,47 @@ inline std::vector<Pose> sweep(int frames = 18, double metres = 0.7)
   }
   return path;
 }
+
+/// Far trunks of many greys side by side: a background with texture.
+inline std::vector<DrawnTrunk> wall()
+{
+  std::vector<DrawnTrunk> trunks;
+  for (int i = -20; i <= 20; ++i)
+    trunks.push_back({16, 0.6 * i, 0.3, 60.0 + (i * 73 + 2000) % 140});
+  return trunks;
+}
+
+/// A trunk ahead with stripes of bark, those left of \p shadow [m, from its axis] in the sun.
+inline std::vector<DrawnTrunk> barkOf(const DrawnTrunk &trunk, double shadow)
+{
+  std::vector<DrawnTrunk> all{trunk};
+  constexpr double kHalf = 0.012;
+  for (int i = -20; i <= 20; ++i)
+    if (const double y = 2 * kHalf * i; std::abs(y) < trunk.radius - kHalf)
+      all.push_back({trunk.x - std::sqrt(trunk.radius * trunk.radius - y * y), trunk.y + y, kHalf,
+                     (y > shadow ? 150.0 : 40.0) + (i * 37 + 800) % 50});
+  return all;
+}
+
+/// A flight past drawn trunks before the wall, as level images.
+struct LevelFlight
+{
+  std::vector<LevelImage> images;
+  std::vector<Pose> poses;
+
+  LevelFlight(std::vector<DrawnTrunk> trunks, std::vector<Pose> path) : poses(std::move(path))
+  {
+    for (const DrawnTrunk &far : wall())
+      trunks.push_back(far);
+    for (const Pose &wMc : poses)
+      images.push_back(computeLevelImage(draw(trunks, wMc, PinholeCamera()), PinholeCamera(), wMc.R, ElevationRange()));
+  }
+  std::vector<LevelView> views() const
+  {
+    std::vector<LevelView> all;
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      all.emplace_back(images[i], poses[i]);
+    return all;
+  }
+};
 } // namespace bole::test

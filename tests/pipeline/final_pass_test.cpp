@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/final_pass.h"
 
+#include "detection/drawn_trunks.h"
+
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -72,16 +74,25 @@ TEST(FinalPass, TwoReadingsOfTheSameColumnsAtTwoRangesAreOne)
               testing::ElementsAre(1, 2));
 }
 
+/// Only the lit part of a trunk is read.
 TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
 {
-  Judged narrow = judgedAt(1, trunkAt(4, 0, 0.1), 3), wide = judgedAt(1, trunkAt(4, -0.05, 0.15), 2.8);
-  narrow.evidence.right = -0.9;
-  EXPECT_TRUE(isSilhouetteOf(wide, narrow));
-  wide.evidence.right = -0.9;
-  EXPECT_FALSE(isSilhouetteOf(wide, narrow)); // it goes on there as before
-  wide.evidence.right = 0;
-  wide.log_odds = 1;
-  EXPECT_FALSE(isSilhouetteOf(wide, narrow)); // less of a trunk
+  constexpr double kFarthest = 14, kRadiusMax = 0.38;
+  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, lit{3.42, 0.39, 0.09, 0};
+  const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  const Judged narrow = judgedAt(1, test::trunkOf(lit), 3);
+  const auto guess = silhouetteByDepth(narrow, views, kFarthest, kRadiusMax);
+  ASSERT_TRUE(guess.has_value());
+  EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.02);
+  EXPECT_NEAR(guess->trunk.xy.y(), whole.y, 0.02);
+  EXPECT_FALSE(silhouetteByDepth(narrow, views, kFarthest, 0.1).has_value()); // wider than any trunk
+  Judged wide = judgedAt(1, test::trunkOf(whole), 2.8);
+  EXPECT_FALSE(silhouetteByDepth(wide, views, kFarthest, kRadiusMax).has_value()); // it ends there
+  EXPECT_TRUE(isSilhouetteOf(wide, narrow, views, kFarthest));
+  wide.log_odds = -2;
+  EXPECT_FALSE(isSilhouetteOf(wide, narrow, views, kFarthest)); // less of a trunk than depth makes up for
+  EXPECT_FALSE(isSilhouetteOf(narrow, narrow, views, kFarthest));
 }
 
 TEST(FinalPass, TheAlbumIsBounded)

@@ -30,9 +30,8 @@ TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
 TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade)
 {
   const test::DrawnTrunk sunny{3.55, 0.3, 0.18, 150}, shady{3.5, 0.2, 0.08, 60};
-  std::vector<test::DrawnTrunk> scene{sunny, shady};
-  for (int i = -20; i <= 20; ++i) // a background with texture
-    scene.push_back({16, 0.6 * i, 0.3, 60.0 + (i * 73 + 2000) % 140});
+  std::vector<test::DrawnTrunk> scene = test::wall();
+  scene.insert(scene.end(), {sunny, shady});
   const PinholeCamera camera;
   RecentColumns columns;
   std::vector<Pose> poses;
