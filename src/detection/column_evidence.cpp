@@ -36,6 +36,7 @@ struct Column
   double angle = 0, range = 0; ///< from the heading [rad], of what it shows if the trunk is there [m]
   std::size_t kind = 0;        ///< what it counts for
   bool is_beside = false;      ///< outside of the borders that are thought
+  std::size_t also = 0;        ///< for what else, 0 for nothing
 };
 
 /// Inside the trunk (kind 0), beside its left border (1), beside its right one (2).
@@ -49,7 +50,11 @@ std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double 
     const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(inside - 1) - 1);
     const double across = at.range * std::sin(offset);
     columns.push_back({at.bearing + offset,
-                       at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0))});
+                       at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0)), 0,
+                       false,
+                       offset > 0.5 * half    ? 3UL
+                       : offset < -0.5 * half ? 4UL
+                                              : 0UL});
   }
   const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
   for (const std::size_t kind : {1, 2})
@@ -155,8 +160,11 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
           continue; // what stands behind the trunk there is hidden by it
         const LevelColumn there = other.image->at(q, across(at, lean) / at.norm());
         const double d = difference(column, there, by_value, 2 * by_value);
-        if (d >= 0)
-          add(one.kind, k, d);
+        if (d < 0)
+          continue;
+        add(one.kind, k, d);
+        if (one.also > 0)
+          add(one.also, k, d);
       }
     }
   }
@@ -298,6 +306,8 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
   };
   evidence.left = beside(1);
   evidence.right = beside(2);
+  evidence.inside_left = beside(3);
+  evidence.inside_right = beside(4);
   return evidence;
 }
 

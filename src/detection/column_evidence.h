@@ -48,6 +48,8 @@ struct ColumnEvidence
   bool is_best_at_own = true; ///< among all ranges, its own to a ninth is best
   double left = 0, right = 0; ///< beside a border: at the trunk's range less the best farther one. Below 0: the trunk
                               ///< goes on there, and the border is one of light and shade
+  double inside_left = 0, inside_right = 0; ///< the same of the outermost quarters inside. Above 0: the background
+                                            ///< stands there, and the border is one of something behind
 
   double leastBeside() const { return std::min(left, right); }
 };
@@ -56,11 +58,11 @@ struct ColumnEvidence
 constexpr std::size_t kTriedRanges = 11;
 
 /// Means by range of what columns differ by, over the views of a trunk: inside it, beside its left border, beside its
-/// right one.
+/// right one, in the outermost quarters inside on the left and on the right.
 struct ColumnCurves
 {
   int views = 0;
-  std::array<std::array<double, kTriedRanges>, 3> sum{}, count{};
+  std::array<std::array<double, kTriedRanges>, 5> sum{}, count{};
 
   void add(std::size_t kind, std::size_t range, double value);
   void add(const ColumnCurves &view); ///< as one view

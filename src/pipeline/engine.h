@@ -59,7 +59,7 @@ private:
                  const vpImage<float> *p_background, const StageOptions &options);
   void adopt(const Adoption &adoption);
   NewTrunk hold(const Adoption &adoption);
-  void readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view);
+  void readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view);
   void leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const;
   void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;

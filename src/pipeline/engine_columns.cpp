@@ -46,8 +46,8 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
   if (!view.has_ranges)
     return;
   const std::vector<LevelView> views = levelViews(m_columns.frames());
-  std::optional<Hypothesis> narrow; // the one whose borders are the least those of its silhouette
-  double least_beside = 0;
+  std::optional<Hypothesis> doubtful; // the one whose borders are the least those of its silhouette
+  double least = 0;
   for (const TrackedTrunk &one : tracked) {
     if (one.result.status != TrackingStatus::tracked || one.is_flipped)
       continue;
@@ -58,34 +58,36 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
     m_map.record(
         ColumnOdds{trunk.id, judgedBy(*evidence, hypothesis).log_odds, evidence->views, evidence->leastBeside()});
-    const auto all = m_columns.sinceReading(trunk.id);
-    if (all && goesOnBeside(*all) && all->leastBeside() < least_beside) {
-      narrow = hypothesis;
-      least_beside = all->leastBeside();
+    if (!m_columns.mayReadAgain(trunk.id) || !(goesOnBeside(*evidence) || isBehind(*evidence)))
+      continue;
+    const double worst = std::min({evidence->left, evidence->right, -evidence->inside_left, -evidence->inside_right});
+    if (worst < least) {
+      doubtful = hypothesis;
+      least = worst;
     }
   }
   m_columns.forgetIf([this](int id) { return !m_map.isActive(id); });
-  if (narrow)
-    readWider(*narrow, views, view);
+  if (doubtful)
+    readAnew(*doubtful, views, view);
 }
 
-/// A reading of \p narrow between wider borders takes its place where the columns speak for it.
-void Engine::readWider(const Hypothesis &narrow, const std::vector<LevelView> &views, const Viewpoint &view)
+/// A reading of \p doubtful between other borders takes its place where the columns speak for it.
+void Engine::readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view)
 {
-  m_columns.noteReading(narrow.id);
-  const auto before = judge(narrow, views, farthestJudged()); // where it stands now
+  m_columns.noteReading(doubtful.id);
+  const auto before = judge(doubtful, views, farthestJudged()); // where it stands now
   if (!before)
     return;
   const auto guess = silhouetteByDepth(*before, views, farthestJudged(), m_units.detection.radius_max);
   if (!guess)
     return;
-  const Adoption wider = followThroughWindow(*guess, m_window, m_smoother, m_map, view, m_units);
-  if (static_cast<int>(wider.views.size()) < kLeastViews)
+  const Adoption other = followThroughWindow(*guess, m_window, m_smoother, m_map, view, m_units);
+  if (static_cast<int>(other.views.size()) < kLeastViews)
     return;
-  const auto judged = judge({narrow.id, wider.trunk.trunk, narrow.online}, views, farthestJudged());
+  const auto judged = judge({doubtful.id, other.trunk.trunk, doubtful.online}, views, farthestJudged());
   if (!judged || !isSilhouetteOf(*judged, *before, views, farthestJudged()))
     return;
-  m_smoother.removeTrunk(m_map.readAgain(narrow.id, hold(wider)));
-  m_columns.forget(narrow.id);
+  m_smoother.removeTrunk(m_map.readAgain(doubtful.id, hold(other)));
+  m_columns.forget(doubtful.id);
 }
 } // namespace bole

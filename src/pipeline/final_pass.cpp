@@ -69,6 +69,12 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis)
           oddsWeights().dot(oddsTerms(evidence, hypothesis.online))};
 }
 
+bool isBehind(const ColumnEvidence &evidence)
+{
+  constexpr double kBackground = 0.15; // difference inside a border
+  return std::max(evidence.inside_left, evidence.inside_right) > kBackground;
+}
+
 bool goesOnBeside(const ColumnEvidence &evidence)
 {
   constexpr double kGoesOn = -0.25; // difference beside a border
@@ -93,14 +99,21 @@ std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vec
                                             double radius_max)
 {
   constexpr double kSigma_px = 1; // of a border by depth
+  // depth ends the trunk inside of 1 in 20 borders that are read right by more, and where the other one is wrong
+  constexpr double kInside_px = 2.5, kBeside_px = 1.5;
   const std::optional<DepthBorders> borders = depthBorders(judged.trunk, views, farthest);
   if (!borders)
     return std::nullopt;
   const std::array<double, 2> beyond = beyondBorders(judged.trunk, *borders);
   std::array<double, 2> move{}; // outwards [m]
   for (std::size_t side = 0; side < beyond.size(); ++side)
-    if (beyond[side] > 0)
-      move[side] = *borders->likely[side] - judged.trunk.radius();
+    if (const double off = borders->likely[side] ? *borders->likely[side] - judged.trunk.radius() : 0;
+        beyond[side] > 0 || -off / borders->px > (beyond[1 - side] > 0 ? kBeside_px : kInside_px))
+      move[side] = off;
+  if (move[0] * move[1] < 0) { // beside the trunk: its width is known by more than these views
+    move[0] = 0.5 * (move[0] - move[1]);
+    move[1] = -move[0];
+  }
   if (move[0] == 0 && move[1] == 0)
     return std::nullopt;
   Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
@@ -109,7 +122,7 @@ std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vec
       toward += (judged.trunk.axisAt(view.z).head<2>() - view.position).normalized();
   const Eigen::Vector2d leftwards = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
   const double radius = judged.trunk.radius() + 0.5 * (move[0] + move[1]);
-  if (radius > radius_max)
+  if (radius < borders->px || radius > radius_max)
     return std::nullopt;
   Hypothesis guess{judged.id, judged.trunk, judged.online};
   guess.trunk.xy += 0.5 * (move[0] - move[1]) * leftwards;
@@ -120,7 +133,7 @@ std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vec
   return guess;
 }
 
-bool isSilhouetteOf(const Judged &wider, const Judged &narrow, const std::vector<LevelView> &views, double farthest)
+bool isSilhouetteOf(const Judged &other, const Judged &one, const std::vector<LevelView> &views, double farthest)
 {
   constexpr double kOdds_px = 1, kMost = 4; // log-odds a pixel by which a trunk goes on beside a border, of one border
   constexpr double kSure = 0.1;             // log-odds
@@ -129,7 +142,7 @@ bool isSilhouetteOf(const Judged &wider, const Judged &narrow, const std::vector
     const auto [left, right] = borders ? beyondBorders(judged.trunk, *borders) : std::array<double, 2>{};
     return judged.log_odds - std::min(kOdds_px * left, kMost) - std::min(kOdds_px * right, kMost);
   };
-  return odds(wider) > odds(narrow) + kSure;
+  return odds(other) > odds(one) + kSure;
 }
 
 namespace

@@ -78,12 +78,14 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis);
 
 /// Whether the trunk goes on beside a border.
 bool goesOnBeside(const ColumnEvidence &evidence);
-/// Where a trunk surely goes on beside a border by depth: a guess of its silhouette, as wide as depth says. None where
-/// its borders are its ends, or wider than \p radius_max [m].
+/// Whether the background stands inside a border.
+bool isBehind(const ColumnEvidence &evidence);
+/// Where depth contradicts the borders: a guess of the silhouette, between the ends that depth gives the trunk, or as
+/// wide as before where it stands beside it. None where its borders are its ends, or wider than \p radius_max [m].
 std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vector<LevelView> &views, double farthest,
                                             double radius_max);
-/// Whether depth speaks for \p wider by more than it is less of a trunk than \p narrow.
-bool isSilhouetteOf(const Judged &wider, const Judged &narrow, const std::vector<LevelView> &views, double farthest);
+/// Whether depth speaks for \p other by more than it is less of a trunk than \p one.
+bool isSilhouetteOf(const Judged &other, const Judged &one, const std::vector<LevelView> &views, double farthest);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.

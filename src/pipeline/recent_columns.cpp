@@ -31,18 +31,16 @@ std::optional<ColumnEvidence> RecentColumns::look(int id, const Trunk &trunk, co
     known.recent.add(*seen);
     known.last.fade(1 - 1 / kShortMemory);
     known.last.add(*seen);
-    known.all.add(*seen);
+    ++known.views;
   }
   return evidenceOf(known.recent);
 }
 
-std::optional<ColumnEvidence> RecentColumns::sinceReading(int id) const
+bool RecentColumns::mayReadAgain(int id) const
 {
   constexpr int kViewsBetween = 6; // another reading asks for all that was seen: some milliseconds
   const auto known = m_known.find(id);
-  if (known == m_known.end() || known->second.all.views < known->second.read_at + kViewsBetween)
-    return std::nullopt;
-  return evidenceOf(known->second.all);
+  return known != m_known.end() && known->second.views >= known->second.read_at + kViewsBetween;
 }
 
 std::optional<ColumnEvidence> RecentColumns::lately(int id) const
@@ -51,5 +49,5 @@ std::optional<ColumnEvidence> RecentColumns::lately(int id) const
   return known == m_known.end() ? std::nullopt : evidenceOf(known->second.last);
 }
 
-void RecentColumns::noteReading(int id) { m_known[id].read_at = m_known[id].all.views; }
+void RecentColumns::noteReading(int id) { m_known[id].read_at = m_known[id].views; }
 } // namespace bole

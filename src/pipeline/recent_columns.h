@@ -30,8 +30,8 @@ public:
   const std::deque<Frame> &frames() const { return m_frames; } ///< the newest last
   /// What the newest of \p views adds to what is known of a hypothesis; none before three of them had a parallax.
   std::optional<ColumnEvidence> look(int id, const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
-  /// What all views since its borders were last chosen say, where enough came since another reading was tried.
-  std::optional<ColumnEvidence> sinceReading(int id) const;
+  /// Whether enough views came since another reading was tried.
+  bool mayReadAgain(int id) const;
   void noteReading(int id);
   /// What the last views, some half a metre of them, say of its borders as they are read.
   std::optional<ColumnEvidence> lately(int id) const;
@@ -48,7 +48,7 @@ private:
   {
     ColumnCurves recent; ///< of a fading memory
     ColumnCurves last;   ///< of a shorter one
-    ColumnCurves all;    ///< of the present reading
+    int views = 0;       ///< of the present reading
     int read_at = 0;     ///< views when another reading was tried
   };
   std::deque<Frame> m_frames;

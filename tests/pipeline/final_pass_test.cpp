@@ -95,6 +95,28 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   EXPECT_FALSE(isSilhouetteOf(narrow, narrow, views, kFarthest));
 }
 
+/// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
+TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
+{
+  constexpr double kFarthest = 14, kRadiusMax = 0.38;
+  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, wide{3.55, 0.37, 0.25, 0}, beside{3.55, 0.43, 0.18, 0};
+  const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  for (const test::DrawnTrunk &reading : {wide, beside}) {
+    const auto judged = judge({1, test::trunkOf(reading), 3}, views, kFarthest);
+    ASSERT_TRUE(judged.has_value());
+    EXPECT_TRUE(isBehind(judged->evidence));
+    const auto guess = silhouetteByDepth(*judged, views, kFarthest, kRadiusMax);
+    ASSERT_TRUE(guess.has_value());
+    EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.02);
+    EXPECT_NEAR(guess->trunk.xy.y(), whole.y, 0.03);
+    EXPECT_TRUE(isSilhouetteOf(*judge({1, guess->trunk, 3}, views, kFarthest), *judged, views, kFarthest));
+  }
+  const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
+  ASSERT_TRUE(right.has_value());
+  EXPECT_FALSE(isBehind(right->evidence));
+}
+
 TEST(FinalPass, TheAlbumIsBounded)
 {
   Album album;

@@ -53,9 +53,13 @@ TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade
   fly(0, 14, test::trunkOf(sunny));
   ASSERT_TRUE(columns.lately(7));
   EXPECT_FALSE(goesOnBeside(*columns.lately(7)));
+  EXPECT_TRUE(columns.mayReadAgain(7));
+  columns.noteReading(7);
+  EXPECT_FALSE(columns.mayReadAgain(7)); // six views later it may
   fly(14, 22, test::trunkOf(shady));
   ASSERT_TRUE(columns.lately(7));
   EXPECT_TRUE(goesOnBeside(*columns.lately(7)));
+  EXPECT_TRUE(columns.mayReadAgain(7));
   EXPECT_LT(columns.lately(7)->left, columns.lately(7)->right);
 }
 } // namespace
