@@ -28,6 +28,7 @@ struct Seen
   TrunkInLevelView at;
 };
 
+constexpr double kBin = 0.5;                         // [px] of a place across where a trunk's ends are looked for
 constexpr std::size_t kMostInside = 12, kBeside = 4; // columns inside a trunk, beside each of its borders
 
 /// A column of a view that is compared.
@@ -121,10 +122,11 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
 }
 
 /// Compares \p columns of the view \p seen with its partners among \p all, at every range that is tried.
-/// \p add: takes the kind of a column, the range by its number, the difference.
-template <typename Add>
+/// \p is_asked: for which of the ranges by their numbers, \p add: takes the kind of a column, the range, the
+/// difference.
+template <typename IsAsked, typename Add>
 void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
-             const std::vector<LevelView> &views, const Add &add)
+             const std::vector<LevelView> &views, const IsAsked &is_asked, const Add &add)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
@@ -151,6 +153,8 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
       const auto by_value = static_cast<float>(1 / unit);
       for (std::size_t k = 0; k < kScales.size(); ++k) {
+        if (!is_asked(k))
+          continue;
         const Vector2d at = view.position + one.range * kScales[k] * direction - other.position;
         const double ahead = at.dot(other.forward);
         if (ahead < 0.1)
@@ -175,8 +179,9 @@ std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const
                                      const std::vector<LevelView> &views)
 {
   ColumnCurves here;
-  compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views,
-          [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
+  compare(
+      trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views,
+      [](std::size_t) { return true; }, [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
   return here.count[0][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
@@ -311,23 +316,16 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
   return evidence;
 }
 
-std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+namespace
 {
-  constexpr double kBin = 0.5, kReach = 8; // [px] of a place across, and how far it is looked beyond the borders
+/// The same of the places up to \p reach [half pixels at the range of most views] on either side.
+std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk &trunk, const std::vector<Seen> &all,
+                                               const std::vector<LevelView> &views)
+{
   // logarithms of the ratio of both differences, the trunk's over the background's
   constexpr double kThere = -0.5, kSurely = -0.3, kLikely = -0.15;
   constexpr double kAlike = 0.1; // difference of two columns that show the same
-  constexpr std::size_t kLeastViews = 6;
-  const std::vector<Seen> all = locateAll(trunk, views, farthest);
-  if (all.size() < kLeastViews)
-    return std::nullopt;
-  std::vector<double> pixels;
-  for (const Seen &seen : all)
-    pixels.push_back(views[seen.view].image->step * seen.at.range);
-  DepthBorders borders;
-  borders.px = medianOf(pixels);
-  const double radius = trunk.radius(), bin = kBin * borders.px;
-  const int reach = static_cast<int>(std::ceil((4 * radius + kReach * borders.px) / bin));
+  const double radius = trunk.radius(), bin = kBin * px;
   std::vector<ColumnCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
   std::vector<Column> columns(places.size());
   for (const Seen &seen : spread(all)) {
@@ -337,8 +335,9 @@ std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<L
       columns[i] = {seen.at.bearing + std::atan(across / seen.at.range), seen.at.range - depth, i,
                     std::abs(across) > radius};
     }
-    compare(trunk, seen, columns, all, views,
-            [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
+    compare(
+        trunk, seen, columns, all, views, [](std::size_t k) { return (k >= kOwn - 1 && k < kOwn + 2) || k > kBeyond; },
+        [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
   }
   const auto ratioAt = [&](int across) { // infinite or NaN where it is not known
     const ColumnCurves &place = places[static_cast<std::size_t>(across + reach)];
@@ -362,8 +361,31 @@ std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<L
     }
     return std::nullopt;
   };
+  DepthBorders borders;
+  borders.px = px;
   borders.least = {risesTo(kSurely, 1), risesTo(kSurely, -1)};
   borders.likely = {risesTo(kLikely, 1), risesTo(kLikely, -1)};
   return borders;
+}
+} // namespace
+
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr double kNear = 6, kFar = 8; // [px] outside of the borders
+  constexpr std::size_t kLeastViews = 6;
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  if (all.size() < kLeastViews)
+    return std::nullopt;
+  std::vector<double> pixels;
+  for (const Seen &seen : all)
+    pixels.push_back(views[seen.view].image->step * seen.at.range);
+  const double px = medianOf(pixels), radius = trunk.radius();
+  const auto within = [&](double metres) {
+    return depthBordersWithin(static_cast<int>(std::ceil(metres / (kBin * px))), px, trunk, all, views);
+  };
+  const auto near = within(radius + kNear * px); // a far place costs as much, and is seldom asked
+  if (!near || (near->likely[0] && near->likely[1]))
+    return near;
+  return within(4 * radius + kFar * px);
 }
 } // namespace bole
