@@ -69,11 +69,12 @@ TEST_P(Accuracy, IsNotBelowThatOfToday)
   }
 }
 
+// (of wrong trunks the demonstration may have as many as it has: it had fewer, so its bound is not widened by one more)
 // found 8 of 10, 3 of 5, 8 of 9, 3 of 6, 5 of 6; wrong 3, 0, 0, 2, 1 of 13, 5, 8, 10, 6
 INSTANTIATE_TEST_SUITE_P(
     Flights, Accuracy,
     testing::Values(
-        KnownFlight{"demonstration", "", 7, 4, .025, .10, .025},
+        KnownFlight{"demonstration", "", 7, 3, .025, .10, .025},
         KnownFlight{"forward", "--seed 11 --density .09 --light overcast --bark mixed --path forward", 2, 1, .015, .08,
                     .01},
         KnownFlight{"slalom", "--seed 12 --density .07 --light sun --bark bright --path slalom", 7, 1, .08, .065, .042},
