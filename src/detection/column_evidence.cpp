@@ -31,16 +31,19 @@ struct Seen
 constexpr double kBin = 0.5;                         // [px] of a place across where a trunk's ends are looked for
 constexpr std::size_t kMostInside = 12, kBeside = 4; // columns inside a trunk, beside each of its borders
 
+/// What the columns of ColumnCurves count for, in its order.
+constexpr std::size_t kInside = 0, kBesideLeft = 1, kBesideRight = 2, kInsideLeft = 3, kInsideRight = 4;
+
 /// A column of a view that is compared.
 struct Column
 {
   double angle = 0, range = 0; ///< from the heading [rad], of what it shows if the trunk is there [m]
-  std::size_t kind = 0;        ///< what it counts for
+  std::size_t kind = kInside;  ///< what it counts for
   bool is_beside = false;      ///< outside of the borders that are thought
-  std::size_t also = 0;        ///< for what else, 0 for nothing
+  std::size_t also = kInside;  ///< for what else, if for anything
 };
 
-/// Inside the trunk (kind 0), beside its left border (1), beside its right one (2).
+/// Inside the trunk and beside its borders.
 std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double px)
 {
   std::vector<Column> columns;
@@ -51,17 +54,15 @@ std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double 
     const double offset = half * (2.0 * static_cast<double>(i) / static_cast<double>(inside - 1) - 1);
     const double across = at.range * std::sin(offset);
     columns.push_back({at.bearing + offset,
-                       at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0)), 0,
-                       false,
-                       offset > 0.5 * half    ? 3UL
-                       : offset < -0.5 * half ? 4UL
-                                              : 0UL});
+                       at.range * std::cos(offset) - std::sqrt(std::max(radius * radius - across * across, 0.0))});
+    if (std::abs(offset) > 0.5 * half)
+      columns.back().also = offset > 0 ? kInsideLeft : kInsideRight;
   }
   const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
-  for (const std::size_t kind : {1, 2})
+  for (const std::size_t kind : {kBesideLeft, kBesideRight})
     for (std::size_t i = 0; i < kBeside; ++i) {
       const double offset = at.half_angle + 1.5 * px + strip * static_cast<double>(i) / (kBeside - 1);
-      columns.push_back({at.bearing + (kind == 1 ? offset : -offset), at.range, kind, true});
+      columns.push_back({at.bearing + (kind == kBesideLeft ? offset : -offset), at.range, kind, true});
     }
   return columns;
 }
@@ -167,7 +168,7 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
         if (d < 0)
           continue;
         add(one.kind, k, d);
-        if (one.also > 0)
+        if (one.also != kInside)
           add(one.also, k, d);
       }
     }
@@ -182,7 +183,7 @@ std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const
   compare(
       trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views,
       [](std::size_t) { return true; }, [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
-  return here.count[0][kOwn] > 0 ? std::optional(here) : std::nullopt;
+  return here.count[kInside][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
 /// The views that show it.
@@ -195,6 +196,7 @@ std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &vi
       all.push_back({i, *at});
   return all;
 }
+
 /// As many as are looked at, spread over the flight.
 std::vector<Seen> spread(const std::vector<Seen> &all)
 {
@@ -300,25 +302,25 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
     const double best = curves.least(kind, first, end);
     return std::isfinite(best) ? best - own : 0;
   };
-  evidence.own = curves.mean(0, kOwn);
-  evidence.nearer = from(0, 0, 3, evidence.own);
-  evidence.beyond = from(0, kBeyond, kBackground, evidence.own);
-  evidence.background = from(0, kBackground, kScales.size(), evidence.own);
-  evidence.is_best_at_own = curves.least(0, kOwn - 1, kOwn + 2) <= curves.least(0, 0, kScales.size());
+  evidence.own = curves.mean(kInside, kOwn);
+  evidence.nearer = from(kInside, 0, 3, evidence.own);
+  evidence.beyond = from(kInside, kBeyond, kBackground, evidence.own);
+  evidence.background = from(kInside, kBackground, kScales.size(), evidence.own);
+  evidence.is_best_at_own = curves.least(kInside, kOwn - 1, kOwn + 2) <= curves.least(kInside, 0, kScales.size());
   const auto beside = [&](std::size_t kind) {
     return std::isfinite(curves.mean(kind, kOwn)) ? -from(kind, kBeyond + 1, kScales.size(), curves.mean(kind, kOwn))
                                                   : 0;
   };
-  evidence.left = beside(1);
-  evidence.right = beside(2);
-  evidence.inside_left = beside(3);
-  evidence.inside_right = beside(4);
+  evidence.left = beside(kBesideLeft);
+  evidence.right = beside(kBesideRight);
+  evidence.inside_left = beside(kInsideLeft);
+  evidence.inside_right = beside(kInsideRight);
   return evidence;
 }
 
 namespace
 {
-/// The same of the places up to \p reach [half pixels at the range of most views] on either side.
+/// depthBorders(), looked for up to \p reach bins on either side of the axis. \p px: DepthBorders::px.
 std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk &trunk, const std::vector<Seen> &all,
                                                const std::vector<LevelView> &views)
 {

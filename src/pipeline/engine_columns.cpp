@@ -78,14 +78,14 @@ void Engine::readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &
   const auto before = judge(doubtful, views, farthestJudged()); // where it stands now
   if (!before)
     return;
-  const auto guess = silhouetteByDepth(*before, views, farthestJudged(), m_units.detection.radius_max);
-  if (!guess)
+  const auto doubt = doubtBorders(*before, views, farthestJudged(), m_units.detection.radius_max);
+  if (!doubt)
     return;
-  const Adoption other = followThroughWindow(*guess, m_window, m_smoother, m_map, view, m_units);
+  const Adoption other = followThroughWindow(doubt->guess, m_window, m_smoother, m_map, view, m_units);
   if (static_cast<int>(other.views.size()) < kLeastViews)
     return;
   const auto judged = judge({doubtful.id, other.trunk.trunk, doubtful.online}, views, farthestJudged());
-  if (!judged || !isSilhouetteOf(*judged, *before, views, farthestJudged()))
+  if (!judged || !isSilhouetteOf(*judged, *doubt, views, farthestJudged()))
     return;
   m_smoother.removeTrunk(m_map.readAgain(doubtful.id, hold(other)));
   m_columns.forget(doubtful.id);

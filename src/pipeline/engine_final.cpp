@@ -128,22 +128,21 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
       reading.views.reset();
     }
   }
-  // one border may be the edge of a shadow on the bark
-  std::vector<Hypothesis> wider;
+  // one border may be the edge of a shadow on the bark, or of something behind
+  std::vector<BorderDoubt> doubts;
+  std::vector<Hypothesis> guesses;
   std::vector<std::size_t> of;
   for (std::size_t i = 0; i < readings.size(); ++i)
     if (readings[i].judged)
-      if (const auto one =
-              silhouetteByDepth(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
-        wider.push_back(*one);
+      if (const auto doubt = doubtBorders(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
+        doubts.push_back(*doubt);
+        guesses.push_back(doubt->guess);
         of.push_back(i);
       }
-  std::vector<Reading> widened = read(wider);
-  for (std::size_t k = 0; k < wider.size(); ++k) {
-    Reading &before = readings[of[k]];
-    if (widened[k].views && isSilhouetteOf(*widened[k].judged, *before.judged, views, farthestJudged()))
-      before = std::move(widened[k]);
-  }
+  std::vector<Reading> others = read(guesses);
+  for (std::size_t k = 0; k < others.size(); ++k)
+    if (others[k].views && isSilhouetteOf(*others[k].judged, doubts[k], views, farthestJudged()))
+      readings[of[k]] = std::move(others[k]);
   return readings;
 }
 

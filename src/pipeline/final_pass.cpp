@@ -93,13 +93,22 @@ std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &bord
       beyond[side] = std::max((*borders.least[side] - trunk.radius()) / borders.px - kMixed_px, 0.0);
   return beyond;
 }
+
+/// Log-odds less what depth says against borders beside which the trunk goes on.
+double silhouetteOdds(const Judged &judged, const DepthBorders &borders)
+{
+  constexpr double kOdds_px = 1, kMost = 4; // log-odds a pixel by which it does, of one border
+  const auto [left, right] = beyondBorders(judged.trunk, borders);
+  return judged.log_odds - std::min(kOdds_px * left, kMost) - std::min(kOdds_px * right, kMost);
+}
 } // namespace
 
-std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vector<LevelView> &views, double farthest,
-                                            double radius_max)
+std::optional<BorderDoubt> doubtBorders(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                        double radius_max)
 {
   constexpr double kSigma_px = 1; // of a border by depth
-  // depth ends the trunk inside of 1 in 20 borders that are read right by more, and where the other one is wrong
+  // by which depth ends a trunk inside a border: more than of 19 in 20 that are read right; enough where the other is
+  // not
   constexpr double kInside_px = 2.5, kBeside_px = 1.5;
   const std::optional<DepthBorders> borders = depthBorders(judged.trunk, views, farthest);
   if (!borders)
@@ -130,19 +139,14 @@ std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vec
   const double sigma = kSigma_px * borders->px;
   guess.covariance.topLeftCorner<2, 2>() = 0.5 * sigma * sigma * leftwards * leftwards.transpose();
   guess.covariance(2, 2) = 0.5 * std::pow(sigma / radius, 2);
-  return guess;
+  return BorderDoubt{guess, silhouetteOdds(judged, *borders)};
 }
 
-bool isSilhouetteOf(const Judged &other, const Judged &one, const std::vector<LevelView> &views, double farthest)
+bool isSilhouetteOf(const Judged &other, const BorderDoubt &doubt, const std::vector<LevelView> &views, double farthest)
 {
-  constexpr double kOdds_px = 1, kMost = 4; // log-odds a pixel by which a trunk goes on beside a border, of one border
-  constexpr double kSure = 0.1;             // log-odds
-  const auto odds = [&](const Judged &judged) {
-    const auto borders = depthBorders(judged.trunk, views, farthest);
-    const auto [left, right] = borders ? beyondBorders(judged.trunk, *borders) : std::array<double, 2>{};
-    return judged.log_odds - std::min(kOdds_px * left, kMost) - std::min(kOdds_px * right, kMost);
-  };
-  return odds(other) > odds(one) + kSure;
+  constexpr double kSure = 0.1; // log-odds
+  const auto borders = depthBorders(other.trunk, views, farthest);
+  return (borders ? silhouetteOdds(other, *borders) : other.log_odds) > doubt.odds + kSure;
 }
 
 namespace

@@ -80,12 +80,19 @@ Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis);
 bool goesOnBeside(const ColumnEvidence &evidence);
 /// Whether the background stands inside a border.
 bool isBehind(const ColumnEvidence &evidence);
-/// Where depth contradicts the borders: a guess of the silhouette, between the ends that depth gives the trunk, or as
-/// wide as before where it stands beside it. None where its borders are its ends, or wider than \p radius_max [m].
-std::optional<Hypothesis> silhouetteByDepth(const Judged &judged, const std::vector<LevelView> &views, double farthest,
-                                            double radius_max);
-/// Whether depth speaks for \p other by more than it is less of a trunk than \p one.
-bool isSilhouetteOf(const Judged &other, const Judged &one, const std::vector<LevelView> &views, double farthest);
+/// A reading whose borders depth contradicts.
+struct BorderDoubt
+{
+  Hypothesis guess; ///< of the silhouette: between the ends that depth gives the trunk
+  double odds = 0;  ///< log-odds of the reading, less what depth says against its borders
+};
+/// None where the borders of \p judged are its ends, or the guess is wider than \p radius_max [m]. A reading beside its
+/// trunk is moved as wide as it is.
+std::optional<BorderDoubt> doubtBorders(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+                                        double radius_max);
+/// Whether depth speaks for \p other by more than it is less of a trunk than the reading in \p doubt.
+bool isSilhouetteOf(const Judged &other, const BorderDoubt &doubt, const std::vector<LevelView> &views,
+                    double farthest);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.

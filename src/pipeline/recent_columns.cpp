@@ -40,7 +40,7 @@ bool RecentColumns::mayReadAgain(int id) const
 {
   constexpr int kViewsBetween = 6; // another reading asks for all that was seen: some milliseconds
   const auto known = m_known.find(id);
-  return known != m_known.end() && known->second.views >= known->second.read_at + kViewsBetween;
+  return known != m_known.end() && known->second.views >= kViewsBetween;
 }
 
 std::optional<ColumnEvidence> RecentColumns::lately(int id) const
@@ -49,5 +49,5 @@ std::optional<ColumnEvidence> RecentColumns::lately(int id) const
   return known == m_known.end() ? std::nullopt : evidenceOf(known->second.last);
 }
 
-void RecentColumns::noteReading(int id) { m_known[id].read_at = m_known[id].views; }
+void RecentColumns::noteReading(int id) { m_known[id].views = 0; }
 } // namespace bole

@@ -48,8 +48,7 @@ private:
   {
     ColumnCurves recent; ///< of a fading memory
     ColumnCurves last;   ///< of a shorter one
-    int views = 0;       ///< of the present reading
-    int read_at = 0;     ///< views when another reading was tried
+    int views = 0;       ///< since another reading was tried
   };
   std::deque<Frame> m_frames;
   std::optional<Eigen::Vector3d> m_last;

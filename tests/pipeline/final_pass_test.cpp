@@ -82,17 +82,17 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
   const std::vector<LevelView> views = flight.views();
   const Judged narrow = judgedAt(1, test::trunkOf(lit), 3);
-  const auto guess = silhouetteByDepth(narrow, views, kFarthest, kRadiusMax);
-  ASSERT_TRUE(guess.has_value());
-  EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.02);
-  EXPECT_NEAR(guess->trunk.xy.y(), whole.y, 0.02);
-  EXPECT_FALSE(silhouetteByDepth(narrow, views, kFarthest, 0.1).has_value()); // wider than any trunk
+  const auto doubt = doubtBorders(narrow, views, kFarthest, kRadiusMax);
+  ASSERT_TRUE(doubt.has_value());
+  EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
+  EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.02);
+  EXPECT_FALSE(doubtBorders(narrow, views, kFarthest, 0.1).has_value()); // wider than any trunk
   Judged wide = judgedAt(1, test::trunkOf(whole), 2.8);
-  EXPECT_FALSE(silhouetteByDepth(wide, views, kFarthest, kRadiusMax).has_value()); // it ends there
-  EXPECT_TRUE(isSilhouetteOf(wide, narrow, views, kFarthest));
+  EXPECT_FALSE(doubtBorders(wide, views, kFarthest, kRadiusMax).has_value()); // it ends there
+  EXPECT_TRUE(isSilhouetteOf(wide, *doubt, views, kFarthest));
   wide.log_odds = -2;
-  EXPECT_FALSE(isSilhouetteOf(wide, narrow, views, kFarthest)); // less of a trunk than depth makes up for
-  EXPECT_FALSE(isSilhouetteOf(narrow, narrow, views, kFarthest));
+  EXPECT_FALSE(isSilhouetteOf(wide, *doubt, views, kFarthest)); // less of a trunk than depth makes up for
+  EXPECT_FALSE(isSilhouetteOf(narrow, *doubt, views, kFarthest));
 }
 
 /// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
@@ -106,11 +106,11 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
     const auto judged = judge({1, test::trunkOf(reading), 3}, views, kFarthest);
     ASSERT_TRUE(judged.has_value());
     EXPECT_TRUE(isBehind(judged->evidence));
-    const auto guess = silhouetteByDepth(*judged, views, kFarthest, kRadiusMax);
-    ASSERT_TRUE(guess.has_value());
-    EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.02);
-    EXPECT_NEAR(guess->trunk.xy.y(), whole.y, 0.03);
-    EXPECT_TRUE(isSilhouetteOf(*judge({1, guess->trunk, 3}, views, kFarthest), *judged, views, kFarthest));
+    const auto doubt = doubtBorders(*judged, views, kFarthest, kRadiusMax);
+    ASSERT_TRUE(doubt.has_value());
+    EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
+    EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.03);
+    EXPECT_TRUE(isSilhouetteOf(*judge({1, doubt->guess.trunk, 3}, views, kFarthest), *doubt, views, kFarthest));
   }
   const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
   ASSERT_TRUE(right.has_value());
