@@ -104,9 +104,13 @@ FrameReport Engine::process(const Frame &frame)
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
     if (m_units.flow.leave_bark)
       leaveLinesOnBark(predicted);
+    if (m_units.flow.follow_bark && view.has_ranges && newest() > 0)
+      m_bark.expect(frame.image, newest(), cameraAt(newest() - 1), view, m_map, predicted);
     const std::vector<TrackedTrunk> tracked =
         trackTrunks(*gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
-    add(tracked, view);                                                                // Eq. 9
+    if (m_units.flow.follow_bark)
+      m_bark.read(tracked, view.camera);
+    add(tracked, view); // Eq. 9
     lap("tracking");
     m_window.push(gradient, newest(), view, m_smoother, m_units);
     lookAtColumns(frame, tracked, view);

@@ -7,6 +7,7 @@
 /// The stages are functions of plain values in this folder. The engine holds what lives from frame to frame (motion
 /// source, saliency, smoother, window, map) and hands the result of one stage to the next.
 
+#include "pipeline/bark_follower.h"
 #include "pipeline/final_pass.h"
 #include "pipeline/motion_source.h"
 #include "pipeline/recent_columns.h"
@@ -96,6 +97,7 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  BarkFollower m_bark;
   RecentColumns m_columns;
   Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;

@@ -122,6 +122,7 @@ void setSensors(StageOptions &o, const Options &options)
 /// A camera that is steered by what it tracks rests before one trunk or goes round it.
 void setServoing(StageOptions &o)
 {
+  o.flow.follow_bark = true;      // its borders slip: along lines of light and shade, and to what passes behind
   o.flow.leave_bark = true;       // light and shade walk over a trunk that it goes round
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
   o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside

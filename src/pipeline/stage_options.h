@@ -53,6 +53,7 @@ struct FlowOptions
   double gate_sigma_px = 1.0;   ///< of a border beside the prediction [px], 0.1 to 10
   double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
+  bool follow_bark = false;     ///< near trunks are followed by their bark from image to image
   bool leave_bark = false;      ///< a border beside which the trunk goes on by its depth is not read
   double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1

@@ -11,6 +11,7 @@
 #include "saliency/pyramid_loops.h"
 #include "saliency/rotation_loops.h"
 #include "smoothing/front_loops.h"
+#include "tracking/bark_loops.h"
 #include "tracking/profile_loops.h"
 
 #include <cmath>
@@ -211,6 +212,9 @@ private:
       keep(std::vector<double>{sums.value, sums.slope, sums.slope_by_row, linearSumAlong(line), beside.left,
                                beside.middle, beside.right});
     }
+    PatchSums bark;
+    addPatchRow(m_grey.data() + 3, m_image.data(), kWidth - 9, bark);
+    keep(std::vector<double>{bark.sum, bark.square, bark.product});
   }
 
   void window()
