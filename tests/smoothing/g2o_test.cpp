@@ -3,6 +3,8 @@
 
 #include <bole/graph.h>
 
+#include <cmath>
+#include <filesystem>
 #include <gmock/gmock.h>
 #include <sstream>
 #include <visp3/core/vpException.h>
@@ -57,6 +59,38 @@ TEST(G2o, ReadsBackWhatItWrote)
   EXPECT_NEAR(cost(back), cost(graph), 1e-9 * cost(graph));
   for (std::size_t i = 0; i < graph.odometry.size(); ++i)
     EXPECT_TRUE(back.odometry[i].odometry.covariance.isApprox(graph.odometry[i].odometry.covariance, 1e-9));
+}
+
+TEST(G2o, WritesAFileAndLeavesNoOther)
+{
+  const std::string folder = testing::TempDir() + "g2o_file", path = folder + "/graph.g2o";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  const Graph graph = smallGraph();
+
+  writeG2o(path, graph);
+
+  EXPECT_EQ(readG2o(path).poses.size(), graph.poses.size());
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  EXPECT_THROW(writeG2o(folder + "/none/graph.g2o", graph), vpException);
+}
+
+TEST(G2o, APoseOrATrunkThatIsNotFiniteIsNoGraph)
+{
+  const auto error = [](const Graph &graph) -> std::string {
+    try {
+      Smoother smoother(graph, SmootherOptions());
+    }
+    catch (const vpException &e) {
+      return e.what();
+    }
+    return "none";
+  };
+  Graph pose = smallGraph(), trunk = pose;
+  pose.poses[4].wMb.t.x() = std::nan("");
+  EXPECT_THAT(error(pose), HasSubstr("pose 4"));
+  trunk.trunks[1].trunk.xy.y() = INFINITY;
+  EXPECT_THAT(error(trunk), HasSubstr("trunk 1"));
 }
 
 TEST(G2o, ReplaysToTheSameOptimum)

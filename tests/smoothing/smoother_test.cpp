@@ -118,6 +118,23 @@ TEST(Smoother, CostOfUpdateIsThatOfTheGraphOnceSettled)
   EXPECT_NEAR(replay.smoother.cost(), cost(replay.smoother.graph()), 1e-9);
 }
 
+/// Poses are linearised anew on the way, and under the lag the closed ones are a factor on the open ones.
+TEST(Smoother, CostOfAnUpdateIsThatOfAllFactorsAlsoUnderALag)
+{
+  FlightOptions o;
+  o.poses = 90;
+  const Flight flight = simulateFlight(o);
+  for (const int lag : {0, 30}) {
+    SmootherOptions options = smootherFor(o);
+    options.fixed_lag = lag;
+    Replay replay(flight, options);
+    replay.run();
+    const UpdateResult settled = replay.smoother.optimize(1e-10);
+    EXPECT_GT(settled.cost, 1) << lag;
+    EXPECT_NEAR(settled.cost, replay.smoother.cost(), 1e-3 * std::abs(settled.cost)) << lag;
+  }
+}
+
 TEST(Smoother, ReachesTheBatchOptimumAfterALoopThatReturnsToOldTrunks)
 {
   FlightOptions o;
