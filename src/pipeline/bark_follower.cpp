@@ -40,8 +40,8 @@ void BarkFollower::expect(const vpImage<unsigned char> &image, std::size_t pose,
   const bool is_next = m_pose > 0 && m_pose + 1 == pose;
   for (PredictedTrunk &one : predicted) {
     const auto followed = known.find(one.id);
-    if (!is_next || followed == known.end())
-      continue;
+    if (!is_next || followed == known.end() || map.trunk(one.id).status != TrunkStatus::confirmed)
+      continue; // what is not confirmed is judged by its borders alone
     TrackingPrediction &prediction = one.tracking;
     const Trunk &trunk = map.trunk(one.id).trunk;
     const RelativeTrunk there = relativeTrunk(before, Pose(), trunk), here = relativeTrunk(view.wMc, Pose(), trunk);

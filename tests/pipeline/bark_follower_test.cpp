@@ -109,6 +109,18 @@ TEST_F(FollowedBark, CarriesATrunkThatIsNotReadUntilItIsNoLongerSure)
   EXPECT_EQ(carried, 7);
 }
 
+TEST_F(FollowedBark, LeavesACandidateToItsBorders)
+{
+  MapTrunk known = m_map.trunks().front();
+  known.status = TrunkStatus::candidate;
+  m_map = TrunkMap(MapOptions(), {known});
+  for (int frame = 0; frame < 4; ++frame) {
+    const PredictedTrunk predicted = predict(frame, 0.02);
+    EXPECT_LT(off_px(predicted, frame), -1.5);
+    read(predicted, realTrunk(frame), TrackingStatus::tracked);
+  }
+}
+
 TEST_F(FollowedBark, LeavesThePredictionWhereTheBarkShowsNothing)
 {
   const test::Bark plain{0, false};
