@@ -22,8 +22,8 @@ namespace bole
 class BarkFollower
 {
 public:
-  /// Moves each of \p predicted that is confirmed to where its bark is in \p image, of the pose number \p pose. \p before: the camera
-  /// one pose earlier.
+  /// Moves each of \p predicted that is confirmed to where its bark is in \p image, of the pose number \p pose. \p
+  /// before: the camera one pose earlier.
   void expect(const vpImage<unsigned char> &image, std::size_t pose, const Pose &before, const Viewpoint &view,
               const TrunkMap &map, std::vector<PredictedTrunk> &predicted);
   /// Takes in what the borders say.
