@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 namespace bole
@@ -35,6 +36,17 @@ struct Patch
   double squares = 0;        ///< sum of theirs
   Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
 };
+
+/// Takes the mean off the pixels.
+void centre(Patch &patch)
+{
+  const double sum = std::accumulate(patch.pixels.begin(), patch.pixels.end(), 0.0);
+  const auto mean = static_cast<float>(sum / double(patch.pixels.size()));
+  for (float &pixel : patch.pixels) {
+    pixel -= mean;
+    patch.squares += double(pixel) * pixel;
+  }
+}
 
 /// Between pixels; -1 outside.
 double interpolated(const vpImage<unsigned char> &image, const Eigen::Vector2d &u_px)
@@ -101,7 +113,6 @@ Patch patchOf(const BarkWarp &warp, const BarkView &before, const PinholeCamera 
     return patch;
   const double slope = (foot.x() - top.x()) / (foot.y() - top.y());
   const int last = std::min(static_cast<int>(foot.y()), camera.height - 1 - kVertical_px);
-  double sum = 0;
   for (int y = std::max(static_cast<int>(std::ceil(top.y())), kVertical_px); y <= last; y += kRowsApart) {
     const double x = top.x() + slope * (y - top.y());
     const int left = static_cast<int>(std::ceil(x - inner)), right = static_cast<int>(std::floor(x + inner));
@@ -120,18 +131,12 @@ Patch patchOf(const BarkWarp &warp, const BarkView &before, const PinholeCamera 
       continue;
     }
     patch.rows.push_back({y, left, right - left + 1, first});
-    for (std::size_t i = first; i < patch.pixels.size(); ++i)
-      sum += patch.pixels[i];
     patch.middle_px += Eigen::Vector2d(x, y);
   }
   if (patch.rows.empty())
     return patch;
   patch.middle_px /= double(patch.rows.size());
-  const auto mean = static_cast<float>(sum / double(patch.pixels.size()));
-  for (float &pixel : patch.pixels) {
-    pixel -= mean;
-    patch.squares += double(pixel) * pixel;
-  }
+  centre(patch);
   return patch;
 }
 
@@ -156,20 +161,13 @@ std::optional<AcrossMinimum> halfMinimum(const Patch &patch, bool right, const v
                                          int across, int dy)
 {
   Patch half;
-  double sum = 0;
   for (const Patch::Row &row : patch.rows) {
     const int n = row.n / 2, skipped = right ? row.n - n : 0;
     half.rows.push_back({row.y, row.x + skipped, n, half.pixels.size()});
-    for (int i = 0; i < n; ++i) {
-      half.pixels.push_back(patch.pixels[row.first + static_cast<std::size_t>(skipped + i)]);
-      sum += half.pixels.back();
-    }
+    const auto from = patch.pixels.begin() + static_cast<std::ptrdiff_t>(row.first) + skipped;
+    half.pixels.insert(half.pixels.end(), from, from + n);
   }
-  const auto mean = static_cast<float>(sum / double(half.pixels.size()));
-  for (float &pixel : half.pixels) {
-    pixel -= mean;
-    half.squares += double(pixel) * pixel;
-  }
+  centre(half);
   std::vector<double> difference;
   for (int dx = -across; dx <= across; ++dx)
     difference.push_back(differenceAt(half, image, dx, dy));
