@@ -70,6 +70,18 @@ TEST_F(BarkShifts, AreFoundWhereTheTrunkIsTakenToStandALittleBesideItsPlace)
   EXPECT_NEAR(*shift, expected_px(), 0.35);
 }
 
+TEST_F(BarkShifts, AreFoundByACameraThatRolls)
+{
+  const Eigen::Matrix3d roll = Eigen::AngleAxisd(0.12, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  m_before.R = m_before.R * roll;
+  m_now.R = m_now.R * roll;
+  m_expected = m_now;
+  m_expected.t.y() += 0.03;
+  const auto shift = shift_px();
+  ASSERT_TRUE(shift);
+  EXPECT_NEAR(*shift, expected_px(), 0.3);
+}
+
 TEST_F(BarkShifts, AreNotToldByWhatShowsNothing)
 {
   m_bark.contrast = 0;
