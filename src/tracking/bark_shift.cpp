@@ -223,7 +223,7 @@ std::optional<BarkShift> barkShift(const BarkView &before, const BarkView &now, 
   curvature(0, 1) = curvature(1, 0) = 0.25 * (difference(x + 1, y + 1) - difference(x - 1, y + 1) -
                                               difference(x + 1, y - 1) + difference(x - 1, y - 1));
   const Eigen::LDLT<Eigen::Matrix2d> solver(curvature);
-  if (!solver.isPositive() || solver.vectorD().minCoeff() <= 0)
+  if (solver.vectorD().minCoeff() <= 0)
     return std::nullopt;
   const double grey2 = std::max(least / double(patch.pixels.size()), kGrey * kGrey);
   const Eigen::Matrix2d covariance = 2 * kShared * grey2 * solver.solve(Eigen::Matrix2d::Identity());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/bark_shift.h"
 
-#include "../support/drawn_bark.h"
+#include "support/drawn_bark.h"
 
 #include <gtest/gtest.h>
 
