@@ -39,7 +39,7 @@ double distanceToPath(const Eigen::Vector2d &p, const std::vector<Eigen::Vector3
 SimulatedTrunk grow(Random &random, const ForestOptions &options)
 {
   SimulatedTrunk trunk;
-  trunk.radius = std::clamp(options.radius_median * std::exp(options.radius_spread * random.normal()), 0.06, 0.45);
+  trunk.radius = options.radius_median * std::clamp(std::exp(options.radius_spread * random.normal()), 0.4, 3.0);
   const double lean = std::tan(options.lean_deg * M_PI / 180);
   trunk.lean = {lean * random.normal(), lean * random.normal()};
   trunk.bow = {options.bow * random.normal(), options.bow * random.normal()};
