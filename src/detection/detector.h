@@ -24,7 +24,7 @@ struct DetectorOptions
   int window = 18;               ///< frames looked at together, 4 to 100
   double range_min = 1.5;        ///< nearest trunk [m], 0.3 to 5
   double range_max = 10.5;       ///< farthest trunk that matters for planning [m], 2 to 50
-  double radius_min = 0.06;      ///< [m]
+  double radius_min = 0.02;      ///< [m]
   double radius_max = 0.38;      ///< [m]
   double agreement_min = 0.65;   ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;      ///< part of the views within inlier_px of both borders, 0 to 1

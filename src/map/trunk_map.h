@@ -62,7 +62,7 @@ struct MapOptions
   int lost_misses = 8;             ///< misses in a row before a trunk is lost, 1 to 1000
   double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
   double merge_distance = 0.30;    ///< two trunks with less than this between their bark are one [m], 0 to 5
-  double radius_min = 0.05;        ///< thinner is no trunk [m]
+  double radius_min = 0.017;       ///< thinner is no trunk [m]
   double radius_max = 0.60;        ///< thicker is no trunk [m]
 };
 
