@@ -150,16 +150,17 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
 /// stands between the likely ones is looked for now, along lines that lean to either side.
 void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients)
 {
-  constexpr double kLean = 0.05;       // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
-  constexpr double kThinnest_m = 0.06; // over 2 m a border half of kLean aslant is smeared as wide as a thinner trunk
-  constexpr double kHides = 0.5;       // log-odds at which one hides what stands behind it
-  constexpr std::size_t kEvery = 3;    // frames: a window holds many more
+  constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
+  constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
+  constexpr std::size_t kEvery = 3; // frames: a window holds many more
+  // a border kLean aslant is smeared as wide as a thinner trunk
+  const double thinnest = 0.5 * kLean * (m_units.flow.trunk_high - m_units.flow.trunk_low);
   const std::deque<KeptFrame> &frames = m_album.frames();
   const TrunkMap likely = m_map.withTrunks(idsOf(judged, kHides));
   for (const double lean : {-kLean, kLean}) {
     StageOptions options = m_units;
     options.detection.profile.lean = lean;
-    options.detection.radius_min = std::max(options.detection.radius_min, kThinnest_m / m_metres);
+    options.detection.radius_min = std::max(options.detection.radius_min, thinnest);
     DetectionWindow window;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const Viewpoint at = viewpointOf(frames[i]);
