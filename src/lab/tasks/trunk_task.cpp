@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/trunk_task.h"
 
+#include "geometry/constants.h"
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace bole
 {
@@ -29,11 +31,11 @@ constexpr double kSwing = 0.69;    ///< to either side, where a distance is aske
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
 constexpr double kPause_s = 0.25;  ///< without a command it hovered: what was sent before is over
-constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
-constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
-constexpr double kSameTrunk = 0.5;       ///< a trunk that took the target's place stands this near [m]
-constexpr double kRadiusWeight = 0.1;    ///< of a new image in the radius as seen from where it is
-constexpr double kReadAgain = 0.1;       ///< of the log radius in the map, between two frames: other borders
+constexpr double kFirstDrift = 0.3;   ///< standard deviation of the velocity nobody ordered, at first [m/s]
+constexpr double kLargestDrift = 0.5; ///< that is fed forward [m/s]
+constexpr double kSameTrunk = 0.5;    ///< a trunk that took the target's place stands this near [m]
+constexpr double kSameSide_s = 5;  ///< in which it goes round by a radian: an image's error is averaged, a side is not
+constexpr double kReadAgain = 0.1; ///< of the log radius in the map, between two frames: other borders
 constexpr double kMisreadJump = 0.12;    ///< a jump of log r/d that no motion explains: other edges than the trunk's
 constexpr int kBelieved = 15;            ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks behind [m/s]
@@ -148,9 +150,9 @@ void TrunkTask::desire(double radius)
 }
 
 /// The bearing as tracked in this image. The distance as the map has it: pose and place in it rest on all images, while
-/// what one image takes for a border wanders by a tenth of the width. A ratio that is asked for is the image's, but for
-/// misread widths; the trunk as seen from here may be wider or narrower than in the map, which has it from all sides:
-/// m_log_radius.
+/// what one image takes for a border wanders by a tenth of the width. Where a ratio is asked for, the radius is that of
+/// the last seconds: the trunk as seen from here may be wider or narrower than in the map, which has it from all sides
+/// (m_log_radius).
 RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk)
 {
   RelativeTrunk seen = relativeTrunk(report.wMb, m_bMc, trunk.trunk);
@@ -165,11 +167,12 @@ RelativeTrunk TrunkTask::look(const FrameReport &report, const KnownTrunk &trunk
   const double radius = trunk.trunk.log_radius + tracked->relative.log_ratio - seen.log_ratio;
   const bool is_misread = m_log_radius && std::abs(radius - *m_log_radius) > kMisreadJump;
   m_misread = is_misread ? m_misread + 1 : 0;
+  const double since_s = secondsOf(report.stamp_ns - std::exchange(m_radius_ns, report.stamp_ns));
   if (!m_log_radius || m_misread > kBelieved) // it does look like that from here
     m_log_radius = radius;
   else if (!is_misread)
-    *m_log_radius += kRadiusWeight * (radius - *m_log_radius);
-  seen.log_ratio = is_misread ? seen.log_ratio + *m_log_radius - trunk.trunk.log_radius : tracked->relative.log_ratio;
+    *m_log_radius += (1 - std::exp(-since_s / kSameSide_s)) * (radius - *m_log_radius);
+  seen.log_ratio += *m_log_radius - trunk.trunk.log_radius;
   return seen;
 }
 

@@ -100,7 +100,8 @@ private:
   double m_map_log_radius = 0;                       ///< of the target
   double m_time_s = 0, m_ratio = 0;
   std::optional<Pose> m_wMb;          ///< at the frame that the filters stand at
-  std::optional<double> m_log_radius; ///< as seen from here: distance by the map times r/d in the image, over a second
+  std::optional<double> m_log_radius; ///< as seen from this side: distance by the map times r/d in the image
+  std::int64_t m_radius_ns = 0;       ///< of the frame that told it last
   double m_bearing_noise;             ///< of the feature seen last [rad]
   int m_misread = 0;                  ///< frames in a row
   double m_turned_back = 1;           ///< -1: goes round the other way, since a trunk stood in it
