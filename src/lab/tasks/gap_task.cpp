@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/gap_task.h"
 
+#include "geometry/constants.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -106,7 +108,7 @@ bool GapTask::sees(const FrameReport &report) const
 
 TaskCommand GapTask::search(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  const double time_s = secondsOf(report.stamp_ns);
   TaskCommand command{false, m_sidestep.velocity(report.wMb, time_s), "sidesteps to find a gap"};
   const double elapsed = m_sidestep.elapsed(time_s);
   if (elapsed > m_options.search_s) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/servo_task.h"
 
+#include "geometry/constants.h"
 #include "geometry/names.h"
 
 #include <Eigen/Geometry>
@@ -67,7 +68,7 @@ TaskCommand ServoTask::step(const FrameReport &report)
 {
   const Eigen::Rotation2Dd heading(yawOf(report.wMb));
   const Eigen::Vector2d place = report.wMb.t.head<2>();
-  m_response.see(place, 1e-9 * static_cast<double>(report.stamp_ns));
+  m_response.see(place, secondsOf(report.stamp_ns));
   TaskCommand command = decide(report);
   if (command.is_hovering) {
     m_response.send(Eigen::Vector2d::Zero());

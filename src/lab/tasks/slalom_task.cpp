@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/slalom_task.h"
 
+#include "geometry/constants.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -39,7 +41,7 @@ double SlalomTask::line(double x) const
 
 void SlalomTask::locate(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  const double time_s = secondsOf(report.stamp_ns);
   if (!m_started) {
     m_start = {Eigen::AngleAxisd(yawOf(report.wMb), Eigen::Vector3d::UnitZ()).toRotationMatrix(), report.wMb.t};
     m_started = true;

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "lab/tasks/surroundings.h"
 
+#include "geometry/constants.h"
+
 #include <algorithm>
 
 namespace bole
 {
 void Surroundings::see(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  const double time_s = secondsOf(report.stamp_ns);
   m_near_points.see(placedPoints(report, kNearRange), report.wMb, time_s);
   m_seen.see(report.points, report.wMc.t, time_s);
   m_seen.stand(report.wMb.t.head<2>());

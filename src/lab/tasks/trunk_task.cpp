@@ -31,11 +31,11 @@ constexpr double kSwing = 0.69;    ///< to either side, where a distance is aske
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
 constexpr double kPause_s = 0.25;  ///< without a command it hovered: what was sent before is over
-constexpr double kFirstDrift = 0.3;   ///< standard deviation of the velocity nobody ordered, at first [m/s]
-constexpr double kLargestDrift = 0.5; ///< that is fed forward [m/s]
-constexpr double kSameTrunk = 0.5;    ///< a trunk that took the target's place stands this near [m]
-constexpr double kSameSide_s = 5;  ///< in which it goes round by a radian: an image's error is averaged, a side is not
-constexpr double kReadAgain = 0.1; ///< of the log radius in the map, between two frames: other borders
+constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
+constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
+constexpr double kSameTrunk = 0.5;       ///< a trunk that took the target's place stands this near [m]
+constexpr double kSameSide_s = 5;        ///< over which the images tell the radius: a radian of the way round
+constexpr double kReadAgain = 0.1;       ///< of the log radius in the map, between two frames: other borders
 constexpr double kMisreadJump = 0.12;    ///< a jump of log r/d that no motion explains: other edges than the trunk's
 constexpr int kBelieved = 15;            ///< frames in a row after which it is believed all the same
 constexpr double kRetreat = 0.3;         ///< backs off no faster: nothing looks behind [m/s]
@@ -207,7 +207,7 @@ void TrunkTask::giveUpTarget()
 
 TaskCommand TrunkTask::act(const FrameReport &report)
 {
-  const double time_s = 1e-9 * static_cast<double>(report.stamp_ns);
+  const double time_s = secondsOf(report.stamp_ns);
   if (m_target >= 0 && !knownTrunk(report, m_target))
     m_target = successor(report);
   const KnownTrunk *trunk = knownTrunk(report, m_target);
@@ -258,7 +258,7 @@ Eigen::Vector2d TrunkTask::swayNow(double time_s)
 /// Sent anew where it was cut: of two sent at one time the later counts.
 void TrunkTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
 {
-  m_response.send(1e-9 * static_cast<double>(report.stamp_ns), obeying(velocity, response().obeyed()));
+  m_response.send(secondsOf(report.stamp_ns), obeying(velocity, response().obeyed()));
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
