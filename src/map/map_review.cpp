@@ -308,6 +308,8 @@ MapUpdate TrunkMap::review(double now_s, bool has_ranges)
                                 [this](std::size_t i) { return m_trunks[i].removed || m_trunks[i].inactive; }),
                  m_active.end());
   bury(update, now_s);
+  if (!update.changes.empty())
+    learnRadii();
   return update;
 }
 
@@ -319,6 +321,7 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
     trunk.inactive = false;
   keepActive();
   MapUpdate update;
+  learnRadii();
   reviewEach(update, has_ranges);
   reviewPairs(update);
   keepActive();

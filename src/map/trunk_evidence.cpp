@@ -11,12 +11,13 @@ namespace
 /// Logistic regression of "within 0.4 m and half the radius of a true trunk" on what the map knows of every candidate,
 /// over 20 simulated flights (seeds 31 to 50: sun and overcast, dark to bright bark, 0.04 to 0.09 trunks a m^2, four
 /// paths, some through H.264). On 15 other flights, the rendered ones among them, the area under its ROC curve is .93.
-/// kLookedThrough was added to it later, chosen between .6 and 1 on the flights of seeds 31 to 60.
+/// kLookedThrough was added to it later, chosen between .6 and 1 on the flights of seeds 31 to 60. What the radius says
+/// besides kLogRadius is a prior that is learnt from the trunks of the flight: TrunkMap::learnRadii(). kLogRadius was
+/// chosen between -.5 and -1.6 on the flights of seeds 400 to 423, 500 to 507 (thick) and 520 to 527 (thin).
 constexpr double kBias = 3.35;
 constexpr double kInnovation = -2.29; ///< a pixel of rms between prediction and what was found
 constexpr double kMissed = -3.77;     ///< share of frames in which it should have been seen and was not
-constexpr double kLogRadius = -1.58;  ///< wide ones are more often gaps between trunks
-constexpr double kLogRadius2 = -1.99; ///< a log-normal prior with a sigma of 0.5
+constexpr double kLogRadius = -0.5;   ///< wide ones are more often gaps between trunks
 constexpr double kForegroundKnown = -0.77;
 constexpr double kForeground = 1.91;    ///< moved like something near, 0 to 1
 constexpr double kLookedThrough = -0.8; ///< log of 1 + MapTrunk::lookedThrough
@@ -26,13 +27,27 @@ constexpr double kFoundAgain = 0.54; ///< log of 1 + times the detector came to 
 constexpr double kLogPositionSigma = -0.73;
 } // namespace
 
+void TrunkMap::learnRadii()
+{
+  constexpr double kOfAWood = 0.5; // standard deviation of the log radius within a wood: 1 sigma is a factor of 1.6
+  constexpr double kOfWoods = 0.7; // of the median of a wood: poles of 5 cm and old trees of 45 cm are within 1.6 sigma
+  double precision = 1 / (kOfWoods * kOfWoods), sum = precision * std::log(m_options.usual_radius);
+  for (const MapTrunk &trunk : m_trunks) {
+    if (trunk.removed || trunk.status == TrunkStatus::candidate)
+      continue;
+    const double weight = 1 / (kOfAWood * kOfAWood + trunk.covariance(2, 2));
+    precision += weight;
+    sum += weight * trunk.trunk.log_radius;
+  }
+  m_radii = {sum / precision, kOfAWood * kOfAWood + 1 / precision};
+}
+
 double TrunkMap::evidence(const MapTrunk &trunk) const
 {
-  const double log_radius = trunk.trunk.log_radius - std::log(m_options.usual_radius);
   const double missed = trunk.misses / (trunk.hits + trunk.misses + 2.0);
   const double foreground_known = std::min(trunk.foreground_count, 5) / 5.0;
   return kBias + kInnovation * std::sqrt(trunk.innovation2) / m_options.innovation_unit_px + kMissed * missed +
-         kLogRadius * log_radius + kLogRadius2 * log_radius * log_radius +
+         kLogRadius * (trunk.trunk.log_radius - m_radii.log_mean) + m_radii.logOdds(trunk.trunk.log_radius) +
          foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
          kLookedThrough * std::log1p(trunk.lookedThrough()) + kLogParallax * std::log(trunk.parallax() + 0.01) +
          kLogContrast * std::log(trunk.contrast + 0.005) + kFoundAgain * std::log1p(trunk.found_again) +

@@ -15,9 +15,14 @@ TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
   for (std::size_t i = 0; i < m_trunks.size(); ++i)
     if (!m_trunks[i].removed && !m_trunks[i].inactive)
       m_active.push_back(i);
+  learnRadii();
 }
 
-void TrunkMap::setOptions(const MapOptions &options) { m_options = options; }
+void TrunkMap::setOptions(const MapOptions &options)
+{
+  m_options = options;
+  learnRadii();
+}
 
 std::size_t TrunkMap::place(int id) const
 {

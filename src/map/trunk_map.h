@@ -12,6 +12,7 @@
 /// in sight are recognised by their constellation. A confirmed trunk that is predicted in view and not found for long
 /// is lost from sight; it stays in the map and comes back under its id.
 
+#include "geometry/log_normal.h"
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
@@ -63,7 +64,7 @@ struct MapOptions
   double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
   double merge_distance = 0.30;    ///< two trunks with less than this between their bark are one [m], 0 to 5
   double radius_min = 0.017;       ///< thinner is no trunk [m]
-  double radius_max = 0.60;        ///< thicker is no trunk [m]
+  double radius_max = 1.58;        ///< thicker is no trunk [m]
 };
 
 /// Extremes of a bearing in the world.
@@ -288,6 +289,9 @@ public:
   /// contrast, its radius and how well its place is known. A logistic regression on simulated flights: see
   /// trunk_evidence.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
+  /// [m] What radii to expect in this wood: its confirmed trunks tell, and before there are any
+  /// MapOptions::usual_radius (a hierarchical prior).
+  const LogNormal &radii() const { return m_radii; }
 
   /// A trunk that was confirmed and is out of sight stays confirmed here.
   /// \p breast_z: breast height in the world, where places are told [m].
@@ -311,11 +315,13 @@ private:
   void joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone);
   void deactivate(MapUpdate &update, double now_s);
   void keepActive();
+  void learnRadii();
 
   MapOptions m_options;
   std::vector<MapTrunk> m_trunks; ///< by id
   std::deque<GivenUp> m_given_up;
   int m_next_id = 0;
   std::vector<std::size_t> m_active;
+  LogNormal m_radii;
 };
 } // namespace bole

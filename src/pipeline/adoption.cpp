@@ -39,7 +39,9 @@ std::vector<Detection> detectInWindow(const DetectionWindow &window, const Smoot
   std::vector<DetectorView> views;
   for (const WindowView &frame : window.views())
     views.push_back({&frame.profile, smoother.pose(frame.pose) * options.smoothing.bMc});
-  return detectTrunks(views, view.camera, inhibitedRanges(map, view, false), p_background, options.detection);
+  DetectorOptions detection = options.detection;
+  detection.radii = map.radii();
+  return detectTrunks(views, view.camera, inhibitedRanges(map, view, false), p_background, detection);
 }
 
 std::vector<LineDetection> detectInFrame(const WindowView &frame, const TrunkMap &map, const Viewpoint &view,

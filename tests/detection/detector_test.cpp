@@ -21,9 +21,10 @@ const Detection *nearestTo(const std::vector<Detection> &found, const DrawnTrunk
 }
 
 std::vector<Detection> detect(const DrawnFlight &flight, const std::vector<InhibitedRange> &known = {},
-                              const vpImage<float> *p_background = nullptr)
+                              const vpImage<float> *p_background = nullptr,
+                              const DetectorOptions &options = DetectorOptions())
 {
-  return detectTrunks(flight.views(), flight.camera, known, p_background, DetectorOptions());
+  return detectTrunks(flight.views(), flight.camera, known, p_background, options);
 }
 
 TEST(Detector, FindsTrunksWhereTheyStandAndAsThickAsTheyAre)
@@ -73,6 +74,23 @@ TEST(Detector, FindsABrightTrunkAndOneThatIsBrightOnOneSide)
   EXPECT_LT(nearestTo(found, trunks[0])->right_contrast, 0);
   EXPECT_LT(nearestTo(found, trunks[1])->left_contrast, 0);
   EXPECT_LT(nearestTo(found, trunks[1])->right_contrast, 0);
+}
+
+TEST(Detector, OfTwoReadingsOfTheSameLinesPrefersThatOfTheRadiiThatAreExpected)
+{
+  // two dark posts, or a trunk that is bright between two lines of shade
+  const std::vector<DrawnTrunk> posts = {{3, 0.21, 0.05, 40}, {3, -0.21, 0.05, 40}};
+  const DrawnFlight flight(posts, sweep());
+  const auto thinnest = [&](double usual) {
+    DetectorOptions options;
+    options.radii = {std::log(usual), 0.3};
+    double radius = 1;
+    for (const Detection &detection : detect(flight, {}, nullptr, options))
+      radius = std::min(radius, detection.trunk.radius());
+    return radius;
+  };
+  EXPECT_NEAR(thinnest(0.05), 0.05, 0.01);
+  EXPECT_NEAR(thinnest(0.4), 0.26, 0.02);
 }
 
 TEST(Detector, SaysHowWellItKnowsThePlace)

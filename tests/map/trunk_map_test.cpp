@@ -294,6 +294,26 @@ TEST_F(Life, WhatDidNotMoveLikeSomethingNearLosesOdds)
   EXPECT_EQ(at(far).foreground_count, 0);
 }
 
+TEST_F(Life, RadiiAreExpectedToBeThoseOfTheTrunksThatAreConfirmed)
+{
+  const auto oddsOfThick = [this](int id) {
+    MapTrunk thick = at(id);
+    thick.trunk.log_radius = std::log(0.4);
+    return m_map.evidence(thick) - evidence(id);
+  };
+  const int first = add(trunkAt(3, 1, 0.15));
+  see(first, 20);
+  const double before = oddsOfThick(first), unsure = m_map.radii().variance;
+  EXPECT_NEAR(m_map.radii().log_mean, std::log(m_options.usual_radius), 1e-9);
+  for (int i = 0; i < 4; ++i)
+    see(add(trunkAt(3, -4 * (i + 1), 0.4)), 40);
+  m_map.review(m_time_s);
+  ASSERT_GT(m_map.count(TrunkStatus::confirmed), 3);
+  EXPECT_GT(m_map.radii().log_mean, std::log(0.25));
+  EXPECT_LT(m_map.radii().variance, unsure);
+  EXPECT_GT(oddsOfThick(first), before + 0.5);
+}
+
 TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
 {
   const int trunk = add(trunkAt(3, 1));
