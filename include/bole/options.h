@@ -46,7 +46,7 @@ struct Options
     double radius = 0.15;      ///< median of the prior [m]
     double radius_sigma = 0.5; ///< standard deviation of its logarithm
     double radius_min = 0.02;  ///< thinner trunks are not looked for [m]
-    double radius_max = 1.00;  ///< thicker trunks are not looked for [m]
+    double radius_max = 0.60;  ///< thicker trunks are not looked for [m]
     double lean = 0.035;       ///< standard deviation of the lean [tan]; 0.0001: upright
     double low = 0.25;         ///< lower end of the part that is tracked, over the ground [m]
     double high = 2.6;         ///< upper end [m]

@@ -27,7 +27,7 @@ struct DetectorOptions
   double range_min = 1.5;        ///< nearest trunk [m], 0.3 to 5
   double range_max = 10.5;       ///< farthest trunk that matters for planning [m], 2 to 50
   double radius_min = 0.02;      ///< [m]
-  double radius_max = 1;         ///< [m]
+  double radius_max = 0.6;         ///< [m]
   /// [m] What radii to expect: median 0.15 m, within a factor of 2.4 for two in three.
   LogNormal radii{std::log(0.15), 0.74};
   double agreement_min = 0.65;   ///< mean agreement of the borders with the window, 0 to 1

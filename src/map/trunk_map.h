@@ -64,7 +64,7 @@ struct MapOptions
   double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
   double merge_distance = 0.30;    ///< two trunks with less than this between their bark are one [m], 0 to 5
   double radius_min = 0.017;       ///< thinner is no trunk [m]
-  double radius_max = 1.58;        ///< thicker is no trunk [m]
+  double radius_max = 0.95;        ///< thicker is no trunk [m]
 };
 
 /// Extremes of a bearing in the world.

@@ -161,10 +161,10 @@ TEST(Config, NamesTheKeyThatWasMeant)
 
 TEST(Config, RangesThatDependOnAnotherOptionAreThoseWhenAllIsSet)
 {
-  EXPECT_EQ(messageOf("trunks:\n  radius_min: 1.5\n  radius_max: 1.9\n"), "");
-  EXPECT_EQ(messageOfSet({"trunks.radius_min=1.5", "trunks.radius_max=1.9"}), "");
-  EXPECT_THAT(messageOf("trunks:\n  radius_min: 1.5\n"),
-              HasSubstr(":2: trunks.radius_min = 1.5, must be a number in [0.005, trunks.radius_max = 1]"));
+  EXPECT_EQ(messageOf("trunks:\n  radius_min: 0.7\n  radius_max: 0.9\n"), "");
+  EXPECT_EQ(messageOfSet({"trunks.radius_min=0.7", "trunks.radius_max=0.9"}), "");
+  EXPECT_THAT(messageOf("trunks:\n  radius_min: 0.7\n"),
+              HasSubstr(":2: trunks.radius_min = 0.7, must be a number in [0.005, trunks.radius_max = 0.6]"));
 }
 
 TEST(Config, AFileThatIsNoMapOfSectionsIsRefusedWithItsLine)
