@@ -236,8 +236,6 @@ bool hasParallax(const std::vector<PlaneView> &views, const Vector2d &xy, double
   return false;
 }
 
-bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
-
 /// Small residuals tell a trunk from chance; of two readings of the same place the wider is the silhouette, the
 /// narrower a shadow's edge on the bark, unless it is wider than the trunks here: then it is a gap.
 double quality(const Detection &detection, const LogNormal &radii)
@@ -245,19 +243,6 @@ double quality(const Detection &detection, const LogNormal &radii)
   return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) *
          std::exp(radii.logOdds(detection.trunk.log_radius)) * (0.5 + std::max(detection.foreground, 0.0)) /
          (detection.rms_px + 0.2);
-}
-
-/// Best first; a trunk that overlaps a better one in the image is another reading of the same lines.
-std::vector<Detection> suppress(std::vector<Detection> found, const LogNormal &radii)
-{
-  std::sort(found.begin(), found.end(), [&radii](const Detection &a, const Detection &b) {
-    return quality(a, radii) > quality(b, radii);
-  });
-  std::vector<Detection> kept;
-  for (const Detection &detection : found)
-    if (std::none_of(kept.begin(), kept.end(), [&](const Detection &k) { return overlaps(k, detection); }))
-      kept.push_back(detection);
-  return kept;
 }
 
 std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewColumns &columns,
@@ -306,6 +291,8 @@ bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double 
   });
 }
 } // namespace
+
+bool areOfTheSameLines(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
 
 double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
                          const ElevationRange &range)
@@ -377,6 +364,9 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         found.push_back(*detection);
       }
     }
-  return suppress(std::move(found), options.radii);
+  std::sort(found.begin(), found.end(), [&options](const Detection &a, const Detection &b) {
+    return quality(a, options.radii) > quality(b, options.radii);
+  });
+  return found;
 }
 } // namespace bole

@@ -48,6 +48,13 @@ std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
   return SaliencyField{std::move(saliency->p_background), std::move(saliency->confidence), saliency->unknown_below};
 }
 
+/// Found again in another frame: on the same bark, and as thick but for a quarter.
+bool isSameReading(const Trunk &a, const Trunk &b)
+{
+  return (a.axisAt(kBreastHeight) - b.axisAt(kBreastHeight)).head<2>().norm() < std::min(a.radius(), b.radius()) &&
+         std::abs(a.log_radius - b.log_radius) < 0.25;
+}
+
 bool isDropped(SummaryStatus status)
 {
   return status == SummaryStatus::indefinite || status == SummaryStatus::not_finite;
@@ -217,19 +224,35 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
   adoptFrom(m_window, m_map, view, p_background, m_units);
 }
 
-/// What \p window shows between the trunks of \p known and the map does not hold yet: the best.
+/// What \p window shows between the trunks of \p known and the map does not hold yet: of each set of lines the best
+/// reading. One that was given up is not tried again before half of the window is new, so that the next best comes to
+/// its turn (inhibition of return).
 void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
                        const vpImage<float> *p_background, const StageOptions &options)
 {
+  const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(options.detection.window) / 2;
+  while (!m_tried.empty() && (m_tried.front().pose > now || m_tried.front().pose + half <= now))
+    m_tried.pop_front();
+  const auto wasGivenUp = [this](const Trunk &found) {
+    return std::any_of(m_tried.begin(), m_tried.end(), [&](const TriedReading &tried) {
+      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, found);
+    });
+  };
   int adopted = 0;
-  for (const Detection &detection : detectInWindow(window, m_smoother, known, view, p_background, options))
-    if (!m_map.recognise(detection.trunk) && adopted < options.flow.adopt_most) { // the best come first
-      adopt(followThroughWindow(detection, window, m_smoother, m_map, view, options));
-      ++adopted;
-    }
+  std::vector<Detection> taken;
+  for (const Detection &detection : detectInWindow(window, m_smoother, known, view, p_background, options)) {
+    if (std::any_of(taken.begin(), taken.end(), [&](const Detection &t) { return areOfTheSameLines(t, detection); }) ||
+        wasGivenUp(detection.trunk))
+      continue;
+    taken.push_back(detection);
+    if (m_map.recognise(detection.trunk) || adopted++ >= options.flow.adopt_most) // the best come first
+      continue;
+    const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, options);
+    m_tried.push_back({adopt(adoption), now, detection.trunk});
+  }
 }
 
-void Engine::adopt(const Adoption &adoption) { m_map.add(hold(adoption)); }
+int Engine::adopt(const Adoption &adoption) { return m_map.add(hold(adoption)); }
 
 /// Gives a trunk with its views to the smoother, and returns it with its number there.
 NewTrunk Engine::hold(const Adoption &adoption)

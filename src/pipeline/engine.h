@@ -15,6 +15,8 @@
 #include "saliency/saliency.h"
 #include <bole/pipeline.h>
 
+#include <deque>
+
 namespace bole
 {
 class Engine
@@ -43,6 +45,14 @@ private:
   static constexpr int kLeastViews = 4;    ///< of a hypothesis that is judged
   static constexpr double kSettled = 1e-6; ///< of the cost: no view notices
 
+  /// A detection that was taken into the map.
+  struct TriedReading
+  {
+    int id = 0; ///< in the map
+    std::size_t pose = 0;
+    Trunk trunk; ///< as it was detected
+  };
+
   /// A hypothesis where it stands best, with new views where those are better than what the smoother holds.
   struct Reading
   {
@@ -58,7 +68,7 @@ private:
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
   void adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
                  const vpImage<float> *p_background, const StageOptions &options);
-  void adopt(const Adoption &adoption);
+  int adopt(const Adoption &adoption);
   NewTrunk hold(const Adoption &adoption);
   void readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view);
   void leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const;
@@ -97,6 +107,7 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  std::deque<TriedReading> m_tried; ///< of the last half window
   BarkFollower m_bark;
   RecentColumns m_columns;
   Album m_album; ///< frames for the last look at the flight
