@@ -361,12 +361,11 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
             detection->foreground < options.foreground_min)
           continue;
+        detection->quality = quality(*detection, options.radii);
         found.push_back(*detection);
       }
     }
-  std::sort(found.begin(), found.end(), [&options](const Detection &a, const Detection &b) {
-    return quality(a, options.radii) > quality(b, options.radii);
-  });
+  std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) { return a.quality > b.quality; });
   return found;
 }
 } // namespace bole

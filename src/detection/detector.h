@@ -56,6 +56,7 @@ struct Detection
   double agreement = 0;                                     ///< 0 to 1
   double rms_px = 0;
   double foreground = 0; ///< mean of 1 - p(background) between the borders, where known
+  double quality = 0;    ///< of two readings of the same lines the better has more
   int views = 0, inliers = 0;
   double q_left = 0, q_right = 0;               ///< in the current profile
   double left_contrast = 0, right_contrast = 0; ///< signed

@@ -221,16 +221,15 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
         adopt(*adoption);
   if (!has_ranges)
     return;
-  adoptFrom(m_window, m_map, view, p_background, m_units);
+  adoptBest(detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units), m_window, view);
 }
 
-/// What \p window shows between the trunks of \p known and the map does not hold yet: of each set of lines the best
-/// reading. One that was given up is not tried again before half of the window is new, so that the next best comes to
-/// its turn (inhibition of return).
-void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, const Viewpoint &view,
-                       const vpImage<float> *p_background, const StageOptions &options)
+/// Of each set of lines the best reading, if the map does not hold it. One that was given up is not tried again before
+/// half of the window is new, so that the next best has its turn (inhibition of return).
+/// \p found: in \p window, best first.
+void Engine::adoptBest(const std::vector<Detection> &found, const DetectionWindow &window, const Viewpoint &view)
 {
-  const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(options.detection.window) / 2;
+  const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(m_units.detection.window) / 2;
   while (!m_tried.empty() && (m_tried.front().pose > now || m_tried.front().pose + half <= now))
     m_tried.pop_front();
   const auto wasGivenUp = [this](const Trunk &found) {
@@ -240,14 +239,14 @@ void Engine::adoptFrom(const DetectionWindow &window, const TrunkMap &known, con
   };
   int adopted = 0;
   std::vector<Detection> taken;
-  for (const Detection &detection : detectInWindow(window, m_smoother, known, view, p_background, options)) {
+  for (const Detection &detection : found) {
     if (std::any_of(taken.begin(), taken.end(), [&](const Detection &t) { return areOfTheSameLines(t, detection); }) ||
         wasGivenUp(detection.trunk))
       continue;
     taken.push_back(detection);
-    if (m_map.recognise(detection.trunk) || adopted++ >= options.flow.adopt_most) // the best come first
+    if (m_map.recognise(detection.trunk) || adopted++ >= m_units.flow.adopt_most) // the best come first
       continue;
-    const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, options);
+    const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, m_units);
     m_tried.push_back({adopt(adoption), now, detection.trunk});
   }
 }

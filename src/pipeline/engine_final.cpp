@@ -155,19 +155,31 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
   constexpr std::size_t kEvery = 3; // frames: a window holds many more
   // a border kLean aslant is smeared as wide as a thinner trunk
   const double thinnest = 0.5 * kLean * (m_units.flow.trunk_high - m_units.flow.trunk_low);
-  const std::deque<KeptFrame> &frames = m_album.frames();
   const TrunkMap likely = m_map.withTrunks(idsOf(judged, kHides));
-  for (const double lean : {-kLean, kLean}) {
-    StageOptions options = m_units;
-    options.detection.profile.lean = lean;
-    options.detection.radius_min = std::max(options.detection.radius_min, thinnest);
-    DetectionWindow window;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      const Viewpoint at = viewpointOf(frames[i]);
-      window.push(gradients[i], frames[i].pose, at, m_smoother, options);
-      if (i % kEvery == 0)
-        adoptFrom(window, likely, at, nullptr, options);
+  StageOptions options[2] = {m_units, m_units};
+  DetectionWindow windows[2];
+  for (const int side : {0, 1}) {
+    options[side].detection.profile.lean = side == 0 ? -kLean : kLean;
+    options[side].detection.radius_min = std::max(options[side].detection.radius_min, thinnest);
+  }
+  for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
+    const KeptFrame &frame = m_album.frames()[i];
+    const Viewpoint at = viewpointOf(frame);
+    std::vector<Detection> found;
+    for (const int side : {0, 1}) {
+      windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
+      if (i % kEvery == 0) {
+        const auto leaning = detectInWindow(windows[side], m_smoother, likely, at, nullptr, options[side]);
+        found.insert(found.end(), leaning.begin(), leaning.end());
+      }
     }
+    // lines are smeared where they are added up along another lean
+    const auto sharpness = [](const Detection &one) {
+      return one.quality * std::min(std::abs(one.left_contrast), std::abs(one.right_contrast));
+    };
+    std::sort(found.begin(), found.end(),
+              [&](const Detection &a, const Detection &b) { return sharpness(a) > sharpness(b); });
+    adoptBest(found, windows[0], at);
   }
 }
 
