@@ -23,11 +23,11 @@ namespace bole
 struct DetectorOptions
 {
   ProfileOptions profile;
-  int window = 18;               ///< frames looked at together, 4 to 100
-  double range_min = 1.5;        ///< nearest trunk [m], 0.3 to 5
-  double range_max = 10.5;       ///< farthest trunk that matters for planning [m], 2 to 50
-  double radius_min = 0.02;      ///< [m]
-  double radius_max = 0.6;         ///< [m]
+  int window = 18;          ///< frames looked at together, 4 to 100
+  double range_min = 1.5;   ///< nearest trunk [m], 0.3 to 5
+  double range_max = 10.5;  ///< farthest trunk that matters for planning [m], 2 to 50
+  double radius_min = 0.02; ///< [m]
+  double radius_max = 0.6;  ///< [m]
   /// [m] What radii to expect: median 0.15 m, within a factor of 2.4 for two in three.
   LogNormal radii{std::log(0.15), 0.74};
   double agreement_min = 0.65;   ///< mean agreement of the borders with the window, 0 to 1
@@ -77,7 +77,8 @@ double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera
 bool areOfTheSameLines(const Detection &a, const Detection &b);
 
 /// Trunks seen in views.back() (the current frame) and agreed on by the others, best first, with every reading of the
-/// same lines. \p p_background: of the current frame, or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 18. Thread-safe.
+/// same lines. \p p_background: of the current frame, or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 18.
+/// Thread-safe.
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
                                     const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
                                     const DetectorOptions &options);

@@ -232,9 +232,9 @@ void Engine::adoptBest(const std::vector<Detection> &found, const DetectionWindo
   const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(m_units.detection.window) / 2;
   while (!m_tried.empty() && (m_tried.front().pose > now || m_tried.front().pose + half <= now))
     m_tried.pop_front();
-  const auto wasGivenUp = [this](const Trunk &found) {
+  const auto wasGivenUp = [this](const Trunk &reading) {
     return std::any_of(m_tried.begin(), m_tried.end(), [&](const TriedReading &tried) {
-      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, found);
+      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, reading);
     });
   };
   int adopted = 0;
