@@ -236,6 +236,8 @@ bool hasParallax(const std::vector<PlaneView> &views, const Vector2d &xy, double
   return false;
 }
 
+bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
+
 /// Small residuals tell a trunk from chance; of two readings of the same place the wider is the silhouette, the
 /// narrower a shadow's edge on the bark, unless it is wider than the trunks here: then it is a gap.
 double quality(const Detection &detection, const LogNormal &radii)
@@ -291,8 +293,6 @@ bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double 
   });
 }
 } // namespace
-
-bool areOfTheSameLines(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
 
 double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
                          const ElevationRange &range)
@@ -367,5 +367,14 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
     }
   std::sort(found.begin(), found.end(), [](const Detection &a, const Detection &b) { return a.quality > b.quality; });
   return found;
+}
+
+std::vector<Detection> bestReadings(const std::vector<Detection> &found)
+{
+  std::vector<Detection> best;
+  for (const Detection &one : found)
+    if (std::none_of(best.begin(), best.end(), [&](const Detection &other) { return overlaps(one, other); }))
+      best.push_back(one);
+  return best;
 }
 } // namespace bole

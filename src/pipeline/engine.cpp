@@ -227,28 +227,24 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
 /// Of each set of lines the best reading, if the map does not hold it. One that was given up is not tried again before
 /// half of the window is new, so that the next best has its turn (inhibition of return).
 /// \p found: in \p window, best first.
-void Engine::adoptBest(const std::vector<Detection> &found, const DetectionWindow &window, const Viewpoint &view)
+void Engine::adoptBest(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view)
 {
   const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(m_units.detection.window) / 2;
   while (!m_tried.empty() && (m_tried.front().pose > now || m_tried.front().pose + half <= now))
     m_tried.pop_front();
-  const auto wasGivenUp = [this](const Trunk &reading) {
+  const auto wasGivenUp = [this](const Detection &detection) {
     return std::any_of(m_tried.begin(), m_tried.end(), [&](const TriedReading &tried) {
-      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, reading);
+      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, detection.trunk);
     });
   };
+  found.erase(std::remove_if(found.begin(), found.end(), wasGivenUp), found.end());
   int adopted = 0;
-  std::vector<Detection> taken;
-  for (const Detection &detection : found) {
-    if (std::any_of(taken.begin(), taken.end(), [&](const Detection &t) { return areOfTheSameLines(t, detection); }) ||
-        wasGivenUp(detection.trunk))
-      continue;
-    taken.push_back(detection);
-    if (m_map.recognise(detection.trunk) || adopted++ >= m_units.flow.adopt_most) // the best come first
-      continue;
-    const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, m_units);
-    m_tried.push_back({adopt(adoption), now, detection.trunk});
-  }
+  for (const Detection &detection : bestReadings(found))
+    if (!m_map.recognise(detection.trunk) && adopted < m_units.flow.adopt_most) { // the best come first
+      const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, m_units);
+      m_tried.push_back({adopt(adoption), now, detection.trunk});
+      ++adopted;
+    }
 }
 
 int Engine::adopt(const Adoption &adoption) { return m_map.add(hold(adoption)); }

@@ -66,7 +66,7 @@ private:
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
   void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
-  void adoptBest(const std::vector<Detection> &found, const DetectionWindow &window, const Viewpoint &view);
+  void adoptBest(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view);
   int adopt(const Adoption &adoption);
   NewTrunk hold(const Adoption &adoption);
   void readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view);

@@ -165,13 +165,14 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
   for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
     const KeptFrame &frame = m_album.frames()[i];
     const Viewpoint at = viewpointOf(frame);
+    for (const int side : {0, 1})
+      windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
+    if (i % kEvery != 0)
+      continue;
     std::vector<Detection> found;
     for (const int side : {0, 1}) {
-      windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
-      if (i % kEvery == 0) {
-        const auto leaning = detectInWindow(windows[side], m_smoother, likely, at, nullptr, options[side]);
-        found.insert(found.end(), leaning.begin(), leaning.end());
-      }
+      const auto leaning = detectInWindow(windows[side], m_smoother, likely, at, nullptr, options[side]);
+      found.insert(found.end(), leaning.begin(), leaning.end());
     }
     // lines are smeared where they are added up along another lean
     const auto sharpness = [](const Detection &one) {
@@ -179,7 +180,7 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
     };
     std::sort(found.begin(), found.end(),
               [&](const Detection &a, const Detection &b) { return sharpness(a) > sharpness(b); });
-    adoptBest(found, windows[0], at);
+    adoptBest(std::move(found), windows[0], at);
   }
 }
 

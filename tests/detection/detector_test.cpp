@@ -20,16 +20,11 @@ const Detection *nearestTo(const std::vector<Detection> &found, const DrawnTrunk
   return nearest;
 }
 
-/// The best reading of each set of lines.
 std::vector<Detection> detect(const DrawnFlight &flight, const std::vector<InhibitedRange> &known = {},
                               const vpImage<float> *p_background = nullptr,
                               const DetectorOptions &options = DetectorOptions())
 {
-  std::vector<Detection> best;
-  for (const Detection &found : detectTrunks(flight.views(), flight.camera, known, p_background, options))
-    if (std::none_of(best.begin(), best.end(), [&](const Detection &b) { return areOfTheSameLines(b, found); }))
-      best.push_back(found);
-  return best;
+  return bestReadings(detectTrunks(flight.views(), flight.camera, known, p_background, options));
 }
 
 TEST(Detector, FindsTrunksWhereTheyStandAndAsThickAsTheyAre)
