@@ -75,17 +75,17 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
 void Engine::readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view)
 {
   m_columns.noteReading(doubtful.id);
+  const auto doubt = doubtBorders(doubtful, views, farthestJudged(), m_units.detection.radius_max);
+  if (!doubt)
+    return;
   const auto before = judge(doubtful, views, farthestJudged()); // where it stands now
   if (!before)
-    return;
-  const auto doubt = doubtBorders(*before, views, farthestJudged(), m_units.detection.radius_max);
-  if (!doubt)
     return;
   const Adoption other = followThroughWindow(doubt->guess, m_window, m_smoother, m_map, view, m_units);
   if (static_cast<int>(other.views.size()) < kLeastViews)
     return;
   const auto judged = judge({doubtful.id, other.trunk.trunk, doubtful.online}, views, farthestJudged());
-  if (!judged || !isSilhouetteOf(*judged, *doubt, views, farthestJudged()))
+  if (!judged || !isSilhouetteOf(*judged, *before, *doubt, views, farthestJudged()))
     return;
   m_smoother.removeTrunk(m_map.readAgain(doubtful.id, hold(other)));
   m_columns.forget(doubtful.id);

@@ -132,16 +132,21 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   std::vector<BorderDoubt> doubts;
   std::vector<Hypothesis> guesses;
   std::vector<std::size_t> of;
-  for (std::size_t i = 0; i < readings.size(); ++i)
-    if (readings[i].judged)
-      if (const auto doubt = doubtBorders(*readings[i].judged, views, farthestJudged(), m_units.detection.radius_max)) {
-        doubts.push_back(*doubt);
-        guesses.push_back(doubt->guess);
-        of.push_back(i);
-      }
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (!readings[i].judged)
+      continue;
+    const Judged &judged = *readings[i].judged;
+    if (const auto doubt = doubtBorders({judged.id, judged.trunk, judged.online}, views, farthestJudged(),
+                                        m_units.detection.radius_max)) {
+      doubts.push_back(*doubt);
+      guesses.push_back(doubt->guess);
+      of.push_back(i);
+    }
+  }
   std::vector<Reading> others = read(guesses);
   for (std::size_t k = 0; k < others.size(); ++k)
-    if (others[k].views && isSilhouetteOf(*others[k].judged, doubts[k], views, farthestJudged()))
+    if (others[k].views &&
+        isSilhouetteOf(*others[k].judged, *readings[of[k]].judged, doubts[k], views, farthestJudged()))
       readings[of[k]] = std::move(others[k]);
   return readings;
 }

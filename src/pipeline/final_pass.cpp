@@ -94,29 +94,30 @@ std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &bord
   return beyond;
 }
 
-/// Log-odds less what depth says against borders beside which the trunk goes on.
-double silhouetteOdds(const Judged &judged, const DepthBorders &borders)
+/// What depth says against borders beside which \p trunk goes on [log-odds].
+double oddsAgainst(const Trunk &trunk, const DepthBorders &borders)
 {
   constexpr double kOdds_px = 1, kMost = 4; // log-odds a pixel by which it does, of one border
-  const auto [left, right] = beyondBorders(judged.trunk, borders);
-  return judged.log_odds - std::min(kOdds_px * left, kMost) - std::min(kOdds_px * right, kMost);
+  const auto [left, right] = beyondBorders(trunk, borders);
+  return std::min(kOdds_px * left, kMost) + std::min(kOdds_px * right, kMost);
 }
 } // namespace
 
-std::optional<BorderDoubt> doubtBorders(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::vector<LevelView> &views, double farthest,
                                         double radius_max)
 {
   constexpr double kSigma_px = 1; // of a border by depth
   // by which depth ends a trunk inside a border: more than of 19 in 20 that are read right; enough where the other is
   // not
   constexpr double kInside_px = 2.5, kBeside_px = 1.5;
-  const std::optional<DepthBorders> borders = depthBorders(judged.trunk, views, farthest);
+  const Trunk &trunk = reading.trunk;
+  const std::optional<DepthBorders> borders = depthBorders(trunk, views, farthest);
   if (!borders)
     return std::nullopt;
-  const std::array<double, 2> beyond = beyondBorders(judged.trunk, *borders);
+  const std::array<double, 2> beyond = beyondBorders(trunk, *borders);
   std::array<double, 2> move{}; // outwards [m]
   for (std::size_t side = 0; side < beyond.size(); ++side)
-    if (const double off = borders->likely[side] ? *borders->likely[side] - judged.trunk.radius() : 0;
+    if (const double off = borders->likely[side] ? *borders->likely[side] - trunk.radius() : 0;
         beyond[side] > 0 || -off / borders->px > (beyond[1 - side] > 0 ? kBeside_px : kInside_px))
       move[side] = off;
   if (move[0] * move[1] < 0) { // beside the trunk: its width is known by more than these views
@@ -127,26 +128,28 @@ std::optional<BorderDoubt> doubtBorders(const Judged &judged, const std::vector<
     return std::nullopt;
   Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
   for (const LevelView &view : views)
-    if (locate(judged.trunk, view, farthest))
-      toward += (judged.trunk.axisAt(view.z).head<2>() - view.position).normalized();
+    if (locate(trunk, view, farthest))
+      toward += (trunk.axisAt(view.z).head<2>() - view.position).normalized();
   const Eigen::Vector2d leftwards = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
-  const double radius = judged.trunk.radius() + 0.5 * (move[0] + move[1]);
+  const double radius = trunk.radius() + 0.5 * (move[0] + move[1]);
   if (radius < borders->px || radius > radius_max)
     return std::nullopt;
-  Hypothesis guess{judged.id, judged.trunk, judged.online};
+  Hypothesis guess{reading.id, trunk, reading.online};
   guess.trunk.xy += 0.5 * (move[0] - move[1]) * leftwards;
   guess.trunk.log_radius = std::log(radius);
   const double sigma = kSigma_px * borders->px;
   guess.covariance.topLeftCorner<2, 2>() = 0.5 * sigma * sigma * leftwards * leftwards.transpose();
   guess.covariance(2, 2) = 0.5 * std::pow(sigma / radius, 2);
-  return BorderDoubt{guess, silhouetteOdds(judged, *borders)};
+  return BorderDoubt{guess, oddsAgainst(trunk, *borders)};
 }
 
-bool isSilhouetteOf(const Judged &other, const BorderDoubt &doubt, const std::vector<LevelView> &views, double farthest)
+bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoubt &doubt,
+                    const std::vector<LevelView> &views, double farthest)
 {
   constexpr double kSure = 0.1; // log-odds
   const auto borders = depthBorders(other.trunk, views, farthest);
-  return (borders ? silhouetteOdds(other, *borders) : other.log_odds) > doubt.odds + kSure;
+  const double against = borders ? oddsAgainst(other.trunk, *borders) : 0;
+  return other.log_odds - against > reading.log_odds - doubt.against + kSure;
 }
 
 namespace

@@ -83,16 +83,16 @@ bool isBehind(const ColumnEvidence &evidence);
 /// A reading whose borders depth contradicts.
 struct BorderDoubt
 {
-  Hypothesis guess; ///< of the silhouette: between the ends that depth gives the trunk
-  double odds = 0;  ///< log-odds of the reading, less what depth says against its borders
+  Hypothesis guess;   ///< of the silhouette: between the ends that depth gives the trunk
+  double against = 0; ///< what depth says against the borders of the reading [log-odds]
 };
-/// None where the borders of \p judged are its ends, or the guess is wider than \p radius_max [m]. A reading beside its
-/// trunk is moved as wide as it is.
-std::optional<BorderDoubt> doubtBorders(const Judged &judged, const std::vector<LevelView> &views, double farthest,
+/// None where the borders of \p reading are its ends, or the guess is wider than \p radius_max [m]. A reading beside
+/// its trunk is moved as wide as it is.
+std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::vector<LevelView> &views, double farthest,
                                         double radius_max);
-/// Whether depth speaks for \p other by more than it is less of a trunk than the reading in \p doubt.
-bool isSilhouetteOf(const Judged &other, const BorderDoubt &doubt, const std::vector<LevelView> &views,
-                    double farthest);
+/// Whether depth speaks for \p other by more than it is less of a trunk than the \p reading in \p doubt.
+bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoubt &doubt,
+                    const std::vector<LevelView> &views, double farthest);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/recent_columns.h"
 
+#include <algorithm>
+
 namespace bole
 {
 namespace
@@ -38,9 +40,12 @@ std::optional<ColumnEvidence> RecentColumns::look(int id, const Trunk &trunk, co
 
 bool RecentColumns::mayReadAgain(int id) const
 {
-  constexpr int kViewsBetween = 6; // another reading asks for all that was seen: some milliseconds
+  // another reading asks for all that was seen: one that was in vain has to wait until more of that is new, in the end
+  // all of it
+  constexpr int kViewsBetween = 6, kMostDoublings = 2; // kFrames at last
   const auto known = m_known.find(id);
-  return known != m_known.end() && known->second.views >= kViewsBetween;
+  return known != m_known.end() &&
+         known->second.views >= kViewsBetween << std::min(known->second.readings, kMostDoublings);
 }
 
 std::optional<ColumnEvidence> RecentColumns::lately(int id) const
@@ -49,5 +54,9 @@ std::optional<ColumnEvidence> RecentColumns::lately(int id) const
   return known == m_known.end() ? std::nullopt : evidenceOf(known->second.last);
 }
 
-void RecentColumns::noteReading(int id) { m_known[id].views = 0; }
+void RecentColumns::noteReading(int id)
+{
+  m_known[id].views = 0;
+  ++m_known[id].readings;
+}
 } // namespace bole

@@ -49,6 +49,7 @@ private:
     ColumnCurves recent; ///< of a fading memory
     ColumnCurves last;   ///< of a shorter one
     int views = 0;       ///< since another reading was tried
+    int readings = 0;    ///< that were tried
   };
   std::deque<Frame> m_frames;
   std::optional<Eigen::Vector3d> m_last;

@@ -82,17 +82,17 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
   const std::vector<LevelView> views = flight.views();
   const Judged narrow = judgedAt(1, test::trunkOf(lit), 3);
-  const auto doubt = doubtBorders(narrow, views, kFarthest, kRadiusMax);
+  const auto doubt = doubtBorders({1, narrow.trunk}, views, kFarthest, kRadiusMax);
   ASSERT_TRUE(doubt.has_value());
   EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
   EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.02);
-  EXPECT_FALSE(doubtBorders(narrow, views, kFarthest, 0.1).has_value()); // wider than any trunk
+  EXPECT_FALSE(doubtBorders({1, narrow.trunk}, views, kFarthest, 0.1).has_value()); // wider than any trunk
   Judged wide = judgedAt(1, test::trunkOf(whole), 2.8);
-  EXPECT_FALSE(doubtBorders(wide, views, kFarthest, kRadiusMax).has_value()); // it ends there
-  EXPECT_TRUE(isSilhouetteOf(wide, *doubt, views, kFarthest));
+  EXPECT_FALSE(doubtBorders({1, wide.trunk}, views, kFarthest, kRadiusMax).has_value()); // it ends there
+  EXPECT_TRUE(isSilhouetteOf(wide, narrow, *doubt, views, kFarthest));
   wide.log_odds = -2;
-  EXPECT_FALSE(isSilhouetteOf(wide, *doubt, views, kFarthest)); // less of a trunk than depth makes up for
-  EXPECT_FALSE(isSilhouetteOf(narrow, *doubt, views, kFarthest));
+  EXPECT_FALSE(isSilhouetteOf(wide, narrow, *doubt, views, kFarthest)); // less of a trunk than depth makes up for
+  EXPECT_FALSE(isSilhouetteOf(narrow, narrow, *doubt, views, kFarthest));
 }
 
 /// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
@@ -106,11 +106,12 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
     const auto judged = judge({1, test::trunkOf(reading), 3}, views, kFarthest);
     ASSERT_TRUE(judged.has_value());
     EXPECT_TRUE(isBehind(judged->evidence));
-    const auto doubt = doubtBorders(*judged, views, kFarthest, kRadiusMax);
+    const auto doubt = doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax);
     ASSERT_TRUE(doubt.has_value());
     EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
     EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.03);
-    EXPECT_TRUE(isSilhouetteOf(*judge({1, doubt->guess.trunk, 3}, views, kFarthest), *doubt, views, kFarthest));
+    EXPECT_TRUE(
+        isSilhouetteOf(*judge({1, doubt->guess.trunk, 3}, views, kFarthest), *judged, *doubt, views, kFarthest));
   }
   const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
   ASSERT_TRUE(right.has_value());
