@@ -16,7 +16,10 @@ namespace
 /// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
-constexpr std::size_t kPartners = 3; // a view is compared with
+constexpr std::array<std::size_t, kTriedRanges> kAllRanges = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+constexpr std::array<std::size_t, 7> kOwnAndBehind = {3, 4, 5, 7, 8, 9, 10}; // about its own; beyond kBeyond
+constexpr double kHidden = 1.05;                                             // over its range: behind the trunk
+constexpr std::size_t kPartners = 3;                                         // a view is compared with
 
 /// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
 /// tell, not so much that the bark has turned.
@@ -67,23 +70,6 @@ std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double 
   return columns;
 }
 
-/// Mean of squared differences, each cut, in units of the contrast; negative where no band is in both.
-double difference(const LevelColumn &a, const LevelColumn &b, float by_value, float by_slope)
-{
-  const unsigned bands = a.bands & b.bands;
-  if (bands == 0)
-    return -1;
-  float sum = 0;
-  int n = 0;
-  for (std::size_t k = 0; k < kLevelBands; ++k)
-    if (bands >> k & 1U) {
-      const float v = (a.value[k] - b.value[k]) * by_value, s = (a.slope[k] - b.slope[k]) * by_slope;
-      sum += std::min(v * v, 4.f) + std::min(s * s, 4.f);
-      ++n;
-    }
-  return 0.5 * static_cast<double>(sum) / n;
-}
-
 /// The views that stand apart by the right parallax, the best first.
 std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views)
 {
@@ -122,55 +108,80 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
   return {std::tan(at->bearing - at->half_angle), std::tan(at->bearing + at->half_angle)};
 }
 
-/// Compares \p columns of the view \p seen with its partners among \p all, at every range that is tried.
-/// \p is_asked: for which of the ranges by their numbers, \p add: takes the kind of a column, the range, the
-/// difference.
-template <typename IsAsked, typename Add>
+/// How \p view sees what stands at a range along \p direction from \p from and leans by \p lean [tan].
+CarriedColumn carriedTo(const LevelView &view, const Vector2d &from, const Vector2d &direction, const Vector2d &lean)
+{
+  const Vector2d base = from - view.position;
+  const auto number = [](double value) { return static_cast<float>(value); };
+  return {number(base.dot(view.forward)),
+          number(direction.dot(view.forward)),
+          number(base.dot(view.left)),
+          number(direction.dot(view.left)),
+          number(across(base, lean)),
+          number(across(direction, lean)),
+          number(0),
+          number(0),
+          std::numeric_limits<float>::max()};
+}
+
+OtherColumns columnsOf(const LevelImage &image)
+{
+  OtherColumns columns{};
+  columns.q_first = static_cast<float>(image.q_first);
+  columns.by_step = static_cast<float>(1 / image.step);
+  columns.count = static_cast<int>(image.columns());
+  for (std::size_t b = 0; b < kLevelBands; ++b) {
+    columns.value[b] = image.value[b].data();
+    columns.slope[b] = image.slope[b].data();
+    columns.elevation[b] = static_cast<float>(image.elevation[b]);
+  }
+  return columns;
+}
+
+/// Compares \p columns of the view \p seen with its partners among \p all, at the \p tried ones of kScales.
+/// \p add: takes the kind of a column, the number of the range, the difference.
+template <std::size_t Tried, typename Add>
 void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
-             const std::vector<LevelView> &views, const IsAsked &is_asked, const Add &add)
+             const std::vector<LevelView> &views, const std::array<std::size_t, Tried> &tried, const Add &add)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008;  // [full scale] noise of the camera
   const LevelView &view = views[seen.view];
-  const Vector2d &lean = trunk.lean;
   const std::vector<std::size_t> partners = partnersOf(seen, all, views);
   std::array<std::pair<double, double>, kPartners> covered;
   for (std::size_t p = 0; p < partners.size(); ++p)
     covered[p] = coveredBy(trunk, views[partners[p]]);
-  unsigned above = 0; // bands
-  for (std::size_t b = 0; b < kLevelBands; ++b)
-    above |= view.image->elevation[b] > kGround ? 1U << b : 0;
+  constexpr std::size_t kTogether = 8, kPadded = (Tried + kTogether - 1) / kTogether * kTogether;
+  std::array<float, kPadded> ranges{}, differences{};
   for (const Column &one : columns) {
     const double c = std::cos(one.angle), s = std::sin(one.angle);
     const Vector2d direction = c * view.forward + s * view.left;
-    LevelColumn column = view.image->at(s / c, across(direction, lean));
+    LevelColumn column = view.image->at(s / c, across(direction, trunk.lean));
     if (one.is_beside)
-      column.bands &= above;
-    if (column.bands == 0)
-      continue;
+      for (std::size_t b = 0; b < kLevelBands; ++b)
+        if (view.image->elevation[b] <= kGround)
+          column.value[b] = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t i = 0; i < Tried; ++i)
+      ranges[i] = static_cast<float>(one.range * kScales[tried[i]]);
     for (std::size_t p = 0; p < partners.size(); ++p) {
       const LevelView &other = views[partners[p]];
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
       const auto by_value = static_cast<float>(1 / unit);
-      for (std::size_t k = 0; k < kScales.size(); ++k) {
-        if (!is_asked(k))
-          continue;
-        const Vector2d at = view.position + one.range * kScales[k] * direction - other.position;
-        const double ahead = at.dot(other.forward);
-        if (ahead < 0.1)
-          continue;
-        const double q = at.dot(other.left) / ahead;
-        if (one.is_beside && k > kOwn && q > covered[p].first && q < covered[p].second)
-          continue; // what stands behind the trunk there is hidden by it
-        const LevelColumn there = other.image->at(q, across(at, lean) / at.norm());
-        const double d = difference(column, there, by_value, 2 * by_value);
-        if (d < 0)
-          continue;
-        add(one.kind, k, d);
-        if (one.also != kInside)
-          add(one.also, k, d);
+      CarriedColumn carried = carriedTo(other, view.position, direction, trunk.lean);
+      if (one.is_beside) { // what stands behind the trunk there is hidden by it
+        carried.hidden_first = static_cast<float>(covered[p].first);
+        carried.hidden_last = static_cast<float>(covered[p].second);
+        carried.hidden_beyond = static_cast<float>(one.range * kHidden);
       }
+      differencesAtRanges(column, carried, columnsOf(*other.image), by_value, 2 * by_value, ranges.data(),
+                          static_cast<int>(kPadded), differences.data());
+      for (std::size_t i = 0; i < Tried; ++i)
+        if (const double d = static_cast<double>(differences[i]); d >= 0) {
+          add(one.kind, tried[i], d);
+          if (one.also != kInside)
+            add(one.also, tried[i], d);
+        }
     }
   }
 }
@@ -180,9 +191,8 @@ std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const
                                      const std::vector<LevelView> &views)
 {
   ColumnCurves here;
-  compare(
-      trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views,
-      [](std::size_t) { return true; }, [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
+  compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views, kAllRanges,
+          [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
   return here.count[kInside][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
@@ -337,9 +347,8 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
       columns[i] = {seen.at.bearing + std::atan(across / seen.at.range), seen.at.range - depth, i,
                     std::abs(across) > radius};
     }
-    compare(
-        trunk, seen, columns, all, views, [](std::size_t k) { return (k >= kOwn - 1 && k < kOwn + 2) || k > kBeyond; },
-        [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
+    compare(trunk, seen, columns, all, views, kOwnAndBehind,
+            [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
   }
   const auto ratioAt = [&](int across) { // infinite or NaN where it is not known
     const ColumnCurves &place = places[static_cast<std::size_t>(across + reach)];

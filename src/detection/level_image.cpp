@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -12,12 +13,13 @@ using Eigen::Vector3d;
 
 namespace
 {
-/// Mean of one band along a column; false where less than this share of it is in the image.
-constexpr double kLeastSeen = 0.6;
+constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
 
-bool addBand(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Vector3d &low,
-             const Vector3d &high, int samples, float &mean)
+/// Mean of one band along a column; NaN where less than a share of it is in the image.
+float meanOfBand(const vpImage<unsigned char> &image, const PinholeCamera &camera, const Vector3d &low,
+                 const Vector3d &high, int samples)
 {
+  constexpr double kLeastSeen = 0.6;
   const int width = camera.width, height = camera.height;
   const Vector3d step = (high - low) / (samples - 1);
   Vector3d c = low;
@@ -36,39 +38,31 @@ bool addBand(const vpImage<unsigned char> &image, const PinholeCamera &camera, c
     sum += (1 - b) * ((1 - a) * p[0] + a * p[1]) + b * ((1 - a) * q[0] + a * q[1]);
     ++seen;
   }
-  if (seen < kLeastSeen * samples)
-    return false;
-  mean = sum / (255.f * static_cast<float>(seen));
-  return true;
+  return seen < kLeastSeen * samples ? kUnseen : sum / (255.f * static_cast<float>(seen));
 }
 
-/// Central differences, where both neighbours show the band; without them a column is not compared.
-void findSlopes(std::vector<LevelColumn> &columns)
+/// Central differences; NaN beside a column that does not show the band: it is not compared.
+std::vector<float> slopesOf(const std::vector<float> &value)
 {
-  std::vector<unsigned> seen;
-  seen.reserve(columns.size());
-  for (const LevelColumn &column : columns)
-    seen.push_back(column.bands);
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const bool is_inside = i > 0 && i + 1 < columns.size();
-    columns[i].bands = is_inside ? seen[i - 1] & seen[i] & seen[i + 1] : 0;
-    if (is_inside)
-      for (std::size_t b = 0; b < kLevelBands; ++b)
-        columns[i].slope[b] = 0.5f * (columns[i + 1].value[b] - columns[i - 1].value[b]);
-  }
+  std::vector<float> slope(value.size(), kUnseen);
+  for (std::size_t i = 1; i + 1 < value.size(); ++i)
+    if (!std::isnan(value[i]))
+      slope[i] = 0.5f * (value[i + 1] - value[i - 1]);
+  return slope;
 }
 
-double contrastOf(const std::vector<LevelColumn> &columns)
+double contrastOf(const LevelImage &level)
 {
   double variance = 0;
   int bands = 0;
   for (std::size_t b = 0; b < kLevelBands; ++b) {
     double sum = 0, squares = 0;
     int n = 0;
-    for (const LevelColumn &column : columns)
-      if (column.bands >> b & 1U) {
-        sum += column.value[b];
-        squares += column.value[b] * column.value[b];
+    for (std::size_t i = 0; i < level.columns(); ++i)
+      if (!std::isnan(level.slope[b][i])) {
+        const float value = level.value[b][i];
+        sum += value;
+        squares += value * value;
         ++n;
       }
     if (n > 1) {
@@ -86,14 +80,11 @@ LevelColumn LevelImage::at(double q, double lean) const
   const double by_elevation = lean * (1 + q * q);
   for (std::size_t b = 0; b < kLevelBands; ++b) {
     const double x = (q + by_elevation * elevation[b] - q_first) / step;
-    if (!(x >= 0) || x >= static_cast<double>(columns.size() - 1))
-      continue;
-    const auto i = static_cast<std::size_t>(x);
-    const LevelColumn &l = columns[i], &r = columns[i + 1];
-    const auto a = static_cast<float>(x - static_cast<double>(i));
-    column.value[b] = l.value[b] + a * (r.value[b] - l.value[b]);
-    column.slope[b] = l.slope[b] + a * (r.slope[b] - l.slope[b]);
-    column.bands |= l.bands & r.bands & 1U << b;
+    const bool is_inside = x >= 0 && x < static_cast<double>(columns() - 1);
+    const auto i = static_cast<std::size_t>(is_inside ? x : 0);
+    const float share = is_inside ? static_cast<float>(x - static_cast<double>(i)) : kUnseen;
+    column.value[b] = value[b][i] + share * (value[b][i + 1] - value[b][i]);
+    column.slope[b] = slope[b][i] + share * (slope[b][i + 1] - slope[b][i]);
   }
   return column;
 }
@@ -111,24 +102,25 @@ LevelImage computeLevelImage(const vpImage<unsigned char> &image, const PinholeC
   const double q_max = 1.1 * std::max(camera.cx, camera.width - camera.cx) / camera.fx;
   const int half = static_cast<int>(q_max / level.step);
   level.q_first = -half * level.step;
-  level.columns.resize(static_cast<std::size_t>(2 * half + 1));
   const double band = (range.high - range.low) / kLevelBands;
-  for (int b = 0; b < kLevelBands; ++b)
+  for (int b = 0; b < kLevelBands; ++b) {
     level.elevation[static_cast<std::size_t>(b)] = range.low + (b + 0.5) * band;
+    level.value[static_cast<std::size_t>(b)].resize(static_cast<std::size_t>(2 * half + 1));
+  }
   const int samples = std::clamp(static_cast<int>(band * camera.fy / 3), kLeast, kMost);
   for (int i = -half; i <= half; ++i) {
-    LevelColumn &column = level.columns[static_cast<std::size_t>(i + half)];
     const double q = i * level.step, horizontal = std::hypot(1, q);
     for (int b = 0; b < kLevelBands; ++b) {
       const double bottom = range.low + b * band;
       const Vector3d low = level.cRl * Vector3d(1, q, (bottom + 0.05 * band) * horizontal);
       const Vector3d high = level.cRl * Vector3d(1, q, (bottom + 0.95 * band) * horizontal);
-      if (addBand(image, camera, low, high, samples, column.value[static_cast<std::size_t>(b)]))
-        column.bands |= 1U << b;
+      level.value[static_cast<std::size_t>(b)][static_cast<std::size_t>(i + half)] =
+          meanOfBand(image, camera, low, high, samples);
     }
   }
-  findSlopes(level.columns);
-  level.contrast = contrastOf(level.columns);
+  for (std::size_t b = 0; b < kLevelBands; ++b)
+    level.slope[b] = slopesOf(level.value[b]);
+  level.contrast = contrastOf(level);
   return level;
 }
 } // namespace bole

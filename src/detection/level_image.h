@@ -7,22 +7,13 @@
 /// camera centre, in bands of elevation. A trunk fills a run of such columns with the same brightness in every band;
 /// two frames are compared by a few numbers a column, and a whole flight is kept in some kilobytes a frame.
 
+#include "detection/column_loops.h"
 #include "gradient/border_line.h"
 
-#include <array>
 #include <vector>
 
 namespace bole
 {
-constexpr int kLevelBands = 4; ///< of elevation, of equal height in its tangent
-
-/// What one column shows: mean brightness of each band [full scale] and its slope from column to column.
-struct LevelColumn
-{
-  std::array<float, kLevelBands> value{}, slope{};
-  unsigned bands = 0; ///< bit b: band b is in the image
-};
-
 struct LevelImage
 {
   Eigen::Matrix3d cRl = Eigen::Matrix3d::Identity(); ///< level frame (forward, left, up) to camera
@@ -30,12 +21,12 @@ struct LevelImage
   double step = 0.005;
   double contrast = 0;                         ///< standard deviation of the brightness over the columns [full scale]
   std::array<double, kLevelBands> elevation{}; ///< tangent of the middle of each band
-  std::vector<LevelColumn> columns;
+  std::array<std::vector<float>, kLevelBands> value, slope; ///< LevelColumn of each column, band by band
 
-  double qLast() const { return q_first + step * static_cast<double>(columns.size() - 1); }
+  std::size_t columns() const { return value[0].size(); }
+  double qLast() const { return q_first + step * static_cast<double>(columns() - 1); }
   /// What stands at \p q at the height of the camera and leans by \p lean across the line of sight, positive to the
-  /// left [tan]: at any range it shifts each band by its elevation. Linear between two columns; without the bands that
-  /// are outside.
+  /// left [tan]: at any range it shifts each band by its elevation. Linear between two columns.
   LevelColumn at(double q, double lean = 0) const;
 };
 

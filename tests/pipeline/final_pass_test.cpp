@@ -40,7 +40,7 @@ struct Path
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].cRl = forward.R.transpose();
       images[i].q_first = -0.8;
-      images[i].columns.resize(321);
+      images[i].value[0].resize(321);
       views.emplace_back(images[i], Pose(forward.R, {0, 0.05 * static_cast<double>(i), 1.2}));
     }
   }

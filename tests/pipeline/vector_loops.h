@@ -2,6 +2,7 @@
 // No guard: included once for the loops of the library and once for those compiled for the least machine.
 // Everything that the loops over pixels give on made-up images.
 
+#include "detection/column_loops.h"
 #include "detection/window_loops.h"
 #include "gradient/line_loops.h"
 #include "motion/epipolar_loops.h"
@@ -36,6 +37,7 @@ public:
     front();
     lines();
     window();
+    columns();
   }
   const std::vector<double> &all() const { return m_all; }
 
@@ -252,6 +254,24 @@ private:
     m_all.push_back(scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data()));
     keep(scores);
     m_all.push_back(static_cast<double>(sumOfRow(m_image.data() + 5, 203)));
+  }
+
+  void columns()
+  {
+    LevelColumn column;
+    OtherColumns other{-0.8f, 37.f, kWidth, {}, {}, {-0.4f, -0.1f, 0.1f, 0.4f}};
+    for (std::size_t b = 0; b < kLevelBands; ++b) {
+      column.value[b] = b == 2 ? std::nanf("") : 0.4f + 0.1f * static_cast<float>(b);
+      column.slope[b] = 0.02f * static_cast<float>(b);
+      other.value[b] = m_image.data() + 2 * b * kWidth;
+      other.slope[b] = m_image.data() + (2 * b + 1) * kWidth;
+    }
+    const CarriedColumn carried{-0.2f, 0.98f, 0.3f, 0.18f, 0.01f, 0.05f, 0.2f, 0.22f, 4.f};
+    std::vector<float> ranges, differences(11);
+    for (int i = 0; i < 11; ++i)
+      ranges.push_back(0.1f * std::pow(1.6f, static_cast<float>(i)));
+    differencesAtRanges(column, carried, other, 9.f, 7.f, ranges.data(), 11, differences.data());
+    keep(differences);
   }
 
   std::vector<float> m_image;

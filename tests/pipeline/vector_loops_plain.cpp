@@ -5,6 +5,7 @@
 #define BOLE_VECTOR_CLONES
 #define bole bole_plain
 
+#include "detection/column_loops.cpp"
 #include "detection/window_loops.cpp"
 #include "gradient/line_loops.cpp"
 #include "motion/epipolar_loops.cpp"
