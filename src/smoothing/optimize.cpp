@@ -38,13 +38,12 @@ void Smoother::State::solveAll(UpdateResult &result, bool anew)
     touch(id);
   }
   moved.clear();
-  if (anew && damping > 0) {
+  if (damping > 0) {
     for (const int id : stale_factors)
       if (factors[id].alive && factors[id].stale)
         linearise(factors[id]);
-  }
-  if (damping > 0)
     measureDampingScale();
+  }
   reeliminate(result);
   backSubstitute(result);
   ++result.iterations;
