@@ -16,10 +16,8 @@ namespace
 /// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
-constexpr std::array<std::size_t, kTriedRanges> kAllRanges = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
-constexpr std::array<std::size_t, 7> kOwnAndBehind = {3, 4, 5, 7, 8, 9, 10}; // about its own; beyond kBeyond
-constexpr double kHidden = 1.05;                                             // over its range: behind the trunk
-constexpr std::size_t kPartners = 3;                                         // a view is compared with
+constexpr double kHidden = 1.05;     // over its range: behind the trunk
+constexpr std::size_t kPartners = 3; // a view is compared with
 
 /// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
 /// tell, not so much that the bark has turned.
@@ -138,11 +136,11 @@ OtherColumns columnsOf(const LevelImage &image)
   return columns;
 }
 
-/// Compares \p columns of the view \p seen with its partners among \p all, at the \p tried ones of kScales.
-/// \p add: takes the kind of a column, the number of the range, the difference.
+/// Compares \p columns of the view \p seen with its partners among \p all, at the ranges \p scales over theirs.
+/// \p add: takes the kind of a column, which of the ranges, the difference.
 template <std::size_t Tried, typename Add>
 void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
-             const std::vector<LevelView> &views, const std::array<std::size_t, Tried> &tried, const Add &add)
+             const std::vector<LevelView> &views, const std::array<double, Tried> &scales, const Add &add)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
@@ -163,7 +161,7 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
         if (view.image->elevation[b] <= kGround)
           column.value[b] = std::numeric_limits<float>::quiet_NaN();
     for (std::size_t i = 0; i < Tried; ++i)
-      ranges[i] = static_cast<float>(one.range * kScales[tried[i]]);
+      ranges[i] = static_cast<float>(one.range * scales[i]);
     for (std::size_t p = 0; p < partners.size(); ++p) {
       const LevelView &other = views[partners[p]];
       const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
@@ -178,9 +176,9 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
                           static_cast<int>(kPadded), differences.data());
       for (std::size_t i = 0; i < Tried; ++i)
         if (const double d = static_cast<double>(differences[i]); d >= 0) {
-          add(one.kind, tried[i], d);
+          add(one.kind, i, d);
           if (one.also != kInside)
-            add(one.also, tried[i], d);
+            add(one.also, i, d);
         }
     }
   }
@@ -191,7 +189,7 @@ std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const
                                      const std::vector<LevelView> &views)
 {
   ColumnCurves here;
-  compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views, kAllRanges,
+  compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views, kScales,
           [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
   return here.count[kInside][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
@@ -328,6 +326,41 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
   return evidence;
 }
 
+std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr std::size_t kTried = 32;
+  constexpr double kStep = 0.02; // of the logarithm of the range
+  constexpr int kLeastViews = 3;
+  std::array<double, kTried> scales, sum{}, seen{};
+  for (std::size_t k = 0; k < kTried; ++k)
+    scales[k] = std::exp(kStep * (static_cast<double>(k) - 0.5 * (kTried - 1)));
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  for (const Seen &one : spread(all)) {
+    std::vector<Column> columns = columnsOf(one.at, trunk.radius(), views[one.view].image->step);
+    columns.erase(std::remove_if(columns.begin(), columns.end(), [](const Column &column) { return column.is_beside; }),
+                  columns.end());
+    std::array<double, kTried> here{}, count{};
+    compare(trunk, one, columns, all, views, scales, [&](std::size_t kind, std::size_t k, double d) {
+      here[k] += kind == kInside ? d : 0;
+      count[k] += kind == kInside;
+    });
+    for (std::size_t k = 0; k < kTried; ++k)
+      if (count[k] > 0) { // each view counts as much
+        sum[k] += here[k] / count[k];
+        ++seen[k];
+      }
+  }
+  for (std::size_t k = 0; k < kTried; ++k)
+    sum[k] = seen[k] >= kLeastViews ? sum[k] / seen[k] : std::numeric_limits<double>::infinity();
+  const auto best = static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
+  if (best == 0 || best + 1 == kTried)
+    return std::nullopt;
+  const double bend = sum[best - 1] - 2 * sum[best] + sum[best + 1]; // of the parabola through the three
+  if (!(bend > 0) || !std::isfinite(bend))
+    return std::nullopt;
+  return std::log(scales[best]) + kStep * 0.5 * (sum[best - 1] - sum[best + 1]) / bend;
+}
+
 namespace
 {
 /// depthBorders(), looked for up to \p reach bins on either side of the axis. \p px: DepthBorders::px.
@@ -337,6 +370,8 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
   // logarithms of the ratio of both differences, the trunk's over the background's
   constexpr double kThere = -0.5, kSurely = -0.3, kLikely = -0.15;
   constexpr double kAlike = 0.1; // difference of two columns that show the same
+  constexpr std::array<double, 7> kHereAndBehind = {0.9, 1, 1.11, 1.5, 2, 3, 1000}; // ranges that are tried
+  constexpr std::size_t kHere = 3;                                                  // of them the first
   const double radius = trunk.radius(), bin = kBin * px;
   std::vector<ColumnCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
   std::vector<Column> columns(places.size());
@@ -347,13 +382,12 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
       columns[i] = {seen.at.bearing + std::atan(across / seen.at.range), seen.at.range - depth, i,
                     std::abs(across) > radius};
     }
-    compare(trunk, seen, columns, all, views, kOwnAndBehind,
+    compare(trunk, seen, columns, all, views, kHereAndBehind,
             [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
   }
   const auto ratioAt = [&](int across) { // infinite or NaN where it is not known
     const ColumnCurves &place = places[static_cast<std::size_t>(across + reach)];
-    return std::log((place.least(0, kOwn - 1, kOwn + 2) + kAlike) /
-                    (place.least(0, kBeyond + 1, kScales.size()) + kAlike));
+    return std::log((place.least(0, 0, kHere) + kAlike) / (place.least(0, kHere, kHereAndBehind.size()) + kAlike));
   };
   const int within = static_cast<int>(0.7 * radius / bin);
   int middle = 0;

@@ -81,6 +81,11 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves);
 /// None where fewer than three views have a parallax.
 std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
 
+/// Logarithm of the range at which the columns inside \p trunk differ least between its views, over that where it
+/// stands. Error about .03 (rms, seeds 400 to 423). None where the least is not within a quarter of its range, or fewer
+/// than three views have a parallax.
+std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
+
 /// Where a trunk ends by depth alone, left and right of its axis [m, outwards]: no light or shade moves it. From the
 /// middle outwards the trunk explains the columns by less and less better than what stands behind it. None where
 /// nothing behind is seen.

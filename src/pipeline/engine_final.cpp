@@ -148,6 +148,23 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
     if (others[k].views &&
         isSilhouetteOf(*others[k].judged, *readings[of[k]].judged, doubts[k], views, farthestJudged()))
       readings[of[k]] = std::move(others[k]);
+  // lines that are not the same in all frames put a trunk nearer or farther than its bark says
+  guesses.clear();
+  of.clear();
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (!readings[i].judged)
+      continue;
+    const Judged &judged = *readings[i].judged;
+    if (const auto guess = nearerOrFarther({judged.id, judged.trunk, judged.online}, views, farthestJudged(),
+                                           m_units.detection.radius_max)) {
+      guesses.push_back(*guess);
+      of.push_back(i);
+    }
+  }
+  others = read(guesses);
+  for (std::size_t k = 0; k < others.size(); ++k)
+    if (others[k].views && others[k].judged->log_odds > readings[of[k]].judged->log_odds)
+      readings[of[k]] = std::move(others[k]);
   return readings;
 }
 

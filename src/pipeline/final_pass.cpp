@@ -152,6 +152,30 @@ bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoub
   return other.log_odds - against > reading.log_odds - doubt.against + kSure;
 }
 
+std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,
+                                          double farthest, double radius_max)
+{
+  constexpr double kLeast = 0.01, kSigma = 0.02; // of the range: less leads to the same lines; how sure the bark is
+  const std::optional<double> by_bark = rangeByColumns(reading.trunk, views, farthest);
+  if (!by_bark || std::abs(*by_bark) < kLeast || reading.trunk.radius() * std::exp(*by_bark) > radius_max)
+    return std::nullopt;
+  Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the mean of the lines of sight [m]
+  int n = 0;
+  for (const LevelView &view : views)
+    if (locate(reading.trunk, view, farthest)) {
+      toward += reading.trunk.axisAt(view.z).head<2>() - view.position;
+      ++n;
+    }
+  toward /= n; // some, as there is a range by them
+  Hypothesis guess{reading.id, reading.trunk, reading.online};
+  guess.trunk.xy += (std::exp(*by_bark) - 1) * toward;
+  guess.trunk.log_radius += *by_bark;
+  Eigen::Vector3d along; // as the range grows by its logarithm
+  along << toward, 1;
+  guess.covariance.topLeftCorner<3, 3>() = kSigma * kSigma * along * along.transpose();
+  return guess;
+}
+
 namespace
 {
 /// Two hypotheses that fill the same columns in most of the views that show both are made of the same lines.

@@ -94,6 +94,11 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
 bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoubt &doubt,
                     const std::vector<LevelView> &views, double farthest);
 
+/// Where the bark says that \p reading stands: nearer or farther along the lines of sight, as wide in the images as it
+/// is. None where it stands there, or would be thicker than \p radius_max [m].
+std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,
+                                          double farthest, double radius_max);
+
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.
 std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,

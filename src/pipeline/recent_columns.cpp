@@ -44,8 +44,8 @@ bool RecentColumns::mayReadAgain(int id) const
   // all of it
   constexpr int kViewsBetween = 6, kMostDoublings = 2; // kFrames at last
   const auto known = m_known.find(id);
-  return known != m_known.end() &&
-         known->second.views >= kViewsBetween << std::min(known->second.readings, kMostDoublings);
+  return known != m_known.end() && known->second.views >= kViewsBetween
+                                                              << std::min(known->second.readings, kMostDoublings);
 }
 
 std::optional<ColumnEvidence> RecentColumns::lately(int id) const

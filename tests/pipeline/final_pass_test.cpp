@@ -118,6 +118,29 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
   EXPECT_FALSE(isBehind(right->evidence));
 }
 
+/// The same lines in the images, a twelfth too near and too far.
+TEST(FinalPass, TheBarkTellsHowFarATrunkStands)
+{
+  constexpr double kFarthest = 14, kRadiusMax = 0.38;
+  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60};
+  const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  EXPECT_FALSE(nearerOrFarther({1, test::trunkOf(whole)}, views, kFarthest, kRadiusMax).has_value());
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const LevelView &view : views)
+    middle += view.position / static_cast<double>(views.size());
+  for (const double scale : {1 / 1.08, 1.08}) {
+    Hypothesis reading{1, test::trunkOf(whole)};
+    reading.trunk.xy = middle + scale * (reading.trunk.xy - middle);
+    reading.trunk.log_radius += std::log(scale);
+    const auto guess = nearerOrFarther(reading, views, kFarthest, kRadiusMax);
+    ASSERT_TRUE(guess.has_value()) << scale;
+    EXPECT_LT((guess->trunk.xy - test::trunkOf(whole).xy).norm(), 0.06) << scale;
+    EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.004) << scale;
+    EXPECT_FALSE(nearerOrFarther(reading, views, kFarthest, 0.17).has_value()) << "thicker than any trunk";
+  }
+}
+
 TEST(FinalPass, TheAlbumIsBounded)
 {
   Album album;
