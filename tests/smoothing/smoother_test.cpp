@@ -134,8 +134,9 @@ TEST(Smoother, CostOfAnUpdateIsThatOfAllFactorsAlsoUnderALag)
     const UpdateResult settled = replay.smoother.optimize(1e-10);
     EXPECT_GT(settled.cost, 1) << lag;
     EXPECT_NEAR(settled.cost, replay.smoother.cost(), 1e-3 * std::abs(settled.cost)) << lag;
-    if (lag == 0) // else what is closed counts in one of them
+    if (lag == 0) { // else what is closed counts in one of them
       EXPECT_NEAR(replay.smoother.update().cost, settled.cost, 1e-3 * std::abs(settled.cost));
+    }
   }
 }
 
