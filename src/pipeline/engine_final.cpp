@@ -19,6 +19,8 @@ std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
   return ids;
 }
 
+Hypothesis hypothesisOf(const Judged &one) { return {one.id, one.trunk, one.online}; }
+
 bool isOf(const Judged &one, const Hypothesis &hypothesis)
 {
   return one.id == hypothesis.id && one.trunk.minus(hypothesis.trunk).isZero(0) && one.online == hypothesis.online;
@@ -117,7 +119,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   };
   std::vector<Hypothesis> hypotheses;
   for (const Judged &one : likely)
-    hypotheses.push_back({one.id, one.trunk, one.online});
+    hypotheses.push_back(hypothesisOf(one));
   std::vector<Reading> readings = read(hypotheses);
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
@@ -128,43 +130,38 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
       reading.views.reset();
     }
   }
+  /// Reads each again where \p guess_of puts it, and keeps what \p is_better.
+  const auto challenge = [&](const auto &guess_of, const auto &is_better) {
+    std::vector<Hypothesis> guesses;
+    std::vector<std::size_t> of;
+    for (std::size_t i = 0; i < readings.size(); ++i)
+      if (readings[i].judged)
+        if (const auto guess = guess_of(hypothesisOf(*readings[i].judged))) {
+          guesses.push_back(*guess);
+          of.push_back(i);
+        }
+    std::vector<Reading> others = read(guesses);
+    for (std::size_t k = 0; k < others.size(); ++k)
+      if (others[k].views && is_better(k, *others[k].judged, *readings[of[k]].judged))
+        readings[of[k]] = std::move(others[k]);
+  };
+  const double thickest = m_units.detection.radius_max;
   // one border may be the edge of a shadow on the bark, or of something behind
   std::vector<BorderDoubt> doubts;
-  std::vector<Hypothesis> guesses;
-  std::vector<std::size_t> of;
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (!readings[i].judged)
-      continue;
-    const Judged &judged = *readings[i].judged;
-    if (const auto doubt = doubtBorders({judged.id, judged.trunk, judged.online}, views, farthestJudged(),
-                                        m_units.detection.radius_max)) {
-      doubts.push_back(*doubt);
-      guesses.push_back(doubt->guess);
-      of.push_back(i);
-    }
-  }
-  std::vector<Reading> others = read(guesses);
-  for (std::size_t k = 0; k < others.size(); ++k)
-    if (others[k].views &&
-        isSilhouetteOf(*others[k].judged, *readings[of[k]].judged, doubts[k], views, farthestJudged()))
-      readings[of[k]] = std::move(others[k]);
+  challenge(
+      [&](const Hypothesis &reading) -> std::optional<Hypothesis> {
+        const auto doubt = doubtBorders(reading, views, farthestJudged(), thickest);
+        if (!doubt)
+          return std::nullopt;
+        doubts.push_back(*doubt);
+        return doubt->guess;
+      },
+      [&](std::size_t k, const Judged &other, const Judged &reading) {
+        return isSilhouetteOf(other, reading, doubts[k], views, farthestJudged());
+      });
   // lines that are not the same in all frames put a trunk nearer or farther than its bark says
-  guesses.clear();
-  of.clear();
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (!readings[i].judged)
-      continue;
-    const Judged &judged = *readings[i].judged;
-    if (const auto guess = nearerOrFarther({judged.id, judged.trunk, judged.online}, views, farthestJudged(),
-                                           m_units.detection.radius_max)) {
-      guesses.push_back(*guess);
-      of.push_back(i);
-    }
-  }
-  others = read(guesses);
-  for (std::size_t k = 0; k < others.size(); ++k)
-    if (others[k].views && others[k].judged->log_odds > readings[of[k]].judged->log_odds)
-      readings[of[k]] = std::move(others[k]);
+  challenge([&](const Hypothesis &reading) { return nearerOrFarther(reading, views, farthestJudged(), thickest); },
+            [](std::size_t, const Judged &other, const Judged &reading) { return other.log_odds > reading.log_odds; });
   return readings;
 }
 

@@ -55,11 +55,30 @@ TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade
   EXPECT_FALSE(goesOnBeside(*columns.lately(7)));
   EXPECT_TRUE(columns.mayReadAgain(7));
   columns.noteReading(7);
-  EXPECT_FALSE(columns.mayReadAgain(7)); // six views later it may
   fly(14, 22, test::trunkOf(shady));
   ASSERT_TRUE(columns.lately(7));
   EXPECT_TRUE(goesOnBeside(*columns.lately(7)));
-  EXPECT_TRUE(columns.mayReadAgain(7));
   EXPECT_LT(columns.lately(7)->left, columns.lately(7)->right);
+}
+
+TEST(RecentColumns, WhatWasReadAgainInVainWaitsTwiceAsLong)
+{
+  const test::DrawnTrunk trunk{3.55, 0.3, 0.18, 60};
+  const test::LevelFlight flight(test::barkOf(trunk, 0), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  RecentColumns columns;
+  const auto viewsUntilItMay = [&] {
+    int n = 0;
+    for (; n < 100 && !columns.mayReadAgain(7); ++n)
+      columns.look(7, test::trunkOf(trunk), views, 14);
+    columns.noteReading(7);
+    return n;
+  };
+  EXPECT_EQ(viewsUntilItMay(), 6);
+  EXPECT_EQ(viewsUntilItMay(), 12);
+  EXPECT_EQ(viewsUntilItMay(), 24);
+  EXPECT_EQ(viewsUntilItMay(), 24); // all that is compared is new
+  columns.forget(7);
+  EXPECT_EQ(viewsUntilItMay(), 6);
 }
 } // namespace
