@@ -141,6 +141,38 @@ TEST(Changes, TheLagClosesOldPosesAndStaysNearTheFullSmoother)
   EXPECT_NEAR(std::sqrt(window.smoother.currentPoseCovariance()(0, 0) / C(0, 0)), 1, 0.1);
 }
 
+/// What a pull at the last pose costs in the end is what the graph resists, with all poses open and with the closed
+/// ones as a quadratic.
+TEST(Changes, WhatTheLagClosedResistsAsItDidBefore)
+{
+  constexpr double kPull = 0.05, kSure = 0.02; // [m]
+  FlightOptions o;
+  o.poses = 90;
+  const Flight flight = simulateFlight(o);
+  std::vector<double> cost, moved;
+  for (const int lag : {0, 40}) {
+    SmootherOptions options = smootherFor(o);
+    options.fixed_lag = lag;
+    Replay replay(flight, options);
+    replay.run();
+    replay.smoother.optimize(1e-12);
+    const double before = replay.smoother.cost();
+    const Pose at = replay.smoother.pose(89);
+    PosePrior pull;
+    pull.mean = at.plus((Vector6d() << 0, kPull, 0, 0, 0, 0).finished());
+    pull.covariance = kSure * kSure * Matrix6d::Identity();
+    replay.smoother.addPosePrior(89, pull);
+    const UpdateResult pulled = replay.smoother.optimize(1e-12);
+    EXPECT_EQ(pulled.status, UpdateStatus::ok) << lag;
+    EXPECT_NEAR(pulled.cost, replay.smoother.cost(), 1e-6 * pulled.cost) << lag;
+    cost.push_back(replay.smoother.cost() - before);
+    moved.push_back(replay.smoother.pose(89).minus(at)(1));
+  }
+  EXPECT_GT(cost[0], 0.1);
+  EXPECT_NEAR(cost[1], cost[0], 0.05 * cost[0]);
+  EXPECT_NEAR(moved[1], moved[0], 0.1 * moved[0]);
+}
+
 TEST(Changes, ALongLagClosesPosesAlsoWhereOldTrunksReturn)
 {
   FlightOptions o;
