@@ -2,6 +2,7 @@
 #include "detection/column_evidence.h"
 
 #include "geometry/median.h"
+#include "geometry/parabola.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,6 @@ namespace
 /// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
-constexpr double kHidden = 1.05;     // over its range: behind the trunk
 constexpr std::size_t kPartners = 3; // a view is compared with
 
 /// Parallax of the trunk against what stands twice as far [px of a focal length of 200 px, as an angle]: enough to
@@ -44,8 +44,7 @@ struct Column
   std::size_t also = kInside;  ///< for what else, if for anything
 };
 
-/// Inside the trunk and beside its borders.
-std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double px)
+std::vector<Column> columnsInside(const TrunkInLevelView &at, double radius, double px)
 {
   std::vector<Column> columns;
   columns.reserve(kMostInside + 2 * kBeside);
@@ -59,6 +58,13 @@ std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double 
     if (std::abs(offset) > 0.5 * half)
       columns.back().also = offset > 0 ? kInsideLeft : kInsideRight;
   }
+  return columns;
+}
+
+/// Inside the trunk and beside its borders.
+std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double px)
+{
+  std::vector<Column> columns = columnsInside(at, radius, px);
   const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
   for (const std::size_t kind : {kBesideLeft, kBesideRight})
     for (std::size_t i = 0; i < kBeside; ++i) {
@@ -117,12 +123,12 @@ CarriedColumn carriedTo(const LevelView &view, const Vector2d &from, const Vecto
           number(direction.dot(view.left)),
           number(across(base, lean)),
           number(across(direction, lean)),
-          number(0),
-          number(0),
+          0,
+          0,
           std::numeric_limits<float>::max()};
 }
 
-OtherColumns columnsOf(const LevelImage &image)
+OtherColumns numbersOf(const LevelImage &image)
 {
   OtherColumns columns{};
   columns.q_first = static_cast<float>(image.q_first);
@@ -145,11 +151,22 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
   constexpr double kLeast = 0.008;  // [full scale] noise of the camera
+  constexpr double kHidden = 1.05;  // over the range of the trunk: behind it
+  struct Partner
+  {
+    const LevelView *view;
+    std::pair<double, double> covered;
+    OtherColumns columns;
+    float by_value;
+  };
   const LevelView &view = views[seen.view];
-  const std::vector<std::size_t> partners = partnersOf(seen, all, views);
-  std::array<std::pair<double, double>, kPartners> covered;
-  for (std::size_t p = 0; p < partners.size(); ++p)
-    covered[p] = coveredBy(trunk, views[partners[p]]);
+  std::vector<Partner> partners;
+  partners.reserve(kPartners);
+  for (const std::size_t p : partnersOf(seen, all, views)) {
+    const double unit = std::max(kUnit * 0.5 * (view.image->contrast + views[p].image->contrast), kLeast);
+    partners.push_back(
+        {&views[p], coveredBy(trunk, views[p]), numbersOf(*views[p].image), static_cast<float>(1 / unit)});
+  }
   constexpr std::size_t kTogether = 8, kPadded = (Tried + kTogether - 1) / kTogether * kTogether;
   std::array<float, kPadded> ranges{}, differences{};
   for (const Column &one : columns) {
@@ -162,17 +179,14 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
           column.value[b] = std::numeric_limits<float>::quiet_NaN();
     for (std::size_t i = 0; i < Tried; ++i)
       ranges[i] = static_cast<float>(one.range * scales[i]);
-    for (std::size_t p = 0; p < partners.size(); ++p) {
-      const LevelView &other = views[partners[p]];
-      const double unit = std::max(kUnit * 0.5 * (view.image->contrast + other.image->contrast), kLeast);
-      const auto by_value = static_cast<float>(1 / unit);
-      CarriedColumn carried = carriedTo(other, view.position, direction, trunk.lean);
+    for (const Partner &other : partners) {
+      CarriedColumn carried = carriedTo(*other.view, view.position, direction, trunk.lean);
       if (one.is_beside) { // what stands behind the trunk there is hidden by it
-        carried.hidden_first = static_cast<float>(covered[p].first);
-        carried.hidden_last = static_cast<float>(covered[p].second);
+        carried.hidden_first = static_cast<float>(other.covered.first);
+        carried.hidden_last = static_cast<float>(other.covered.second);
         carried.hidden_beyond = static_cast<float>(one.range * kHidden);
       }
-      differencesAtRanges(column, carried, columnsOf(*other.image), by_value, 2 * by_value, ranges.data(),
+      differencesAtRanges(column, carried, other.columns, other.by_value, 2 * other.by_value, ranges.data(),
                           static_cast<int>(kPadded), differences.data());
       for (std::size_t i = 0; i < Tried; ++i)
         if (const double d = static_cast<double>(differences[i]); d >= 0) {
@@ -336,9 +350,7 @@ std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<Level
     scales[k] = std::exp(kStep * (static_cast<double>(k) - 0.5 * (kTried - 1)));
   const std::vector<Seen> all = locateAll(trunk, views, farthest);
   for (const Seen &one : spread(all)) {
-    std::vector<Column> columns = columnsOf(one.at, trunk.radius(), views[one.view].image->step);
-    columns.erase(std::remove_if(columns.begin(), columns.end(), [](const Column &column) { return column.is_beside; }),
-                  columns.end());
+    const std::vector<Column> columns = columnsInside(one.at, trunk.radius(), views[one.view].image->step);
     std::array<double, kTried> here{}, count{};
     compare(trunk, one, columns, all, views, scales, [&](std::size_t kind, std::size_t k, double d) {
       here[k] += kind == kInside ? d : 0;
@@ -353,12 +365,9 @@ std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<Level
   for (std::size_t k = 0; k < kTried; ++k)
     sum[k] = seen[k] >= kLeastViews ? sum[k] / seen[k] : std::numeric_limits<double>::infinity();
   const auto best = static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
-  if (best == 0 || best + 1 == kTried)
+  if (best == 0 || best + 1 == kTried || !std::isfinite(sum[best - 1] + sum[best + 1]))
     return std::nullopt;
-  const double bend = sum[best - 1] - 2 * sum[best] + sum[best + 1]; // of the parabola through the three
-  if (!(bend > 0) || !std::isfinite(bend))
-    return std::nullopt;
-  return std::log(scales[best]) + kStep * 0.5 * (sum[best - 1] - sum[best + 1]) / bend;
+  return std::log(scales[best]) + kStep * peakOffset(-sum[best - 1], -sum[best], -sum[best + 1]);
 }
 
 namespace
@@ -370,8 +379,9 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
   // logarithms of the ratio of both differences, the trunk's over the background's
   constexpr double kThere = -0.5, kSurely = -0.3, kLikely = -0.15;
   constexpr double kAlike = 0.1; // difference of two columns that show the same
-  constexpr std::array<double, 7> kHereAndBehind = {0.9, 1, 1.11, 1.5, 2, 3, 1000}; // ranges that are tried
-  constexpr std::size_t kHere = 3;                                                  // of them the first
+  constexpr std::array<double, 7> kHereAndBehind = {kScales[kOwn - 1], kScales[kOwn], kScales[kOwn + 1], kScales[7],
+                                                    kScales[8],        kScales[9],    kScales[10]};
+  constexpr std::size_t kHere = 3; // of them the first
   const double radius = trunk.radius(), bin = kBin * px;
   std::vector<ColumnCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
   std::vector<Column> columns(places.size());

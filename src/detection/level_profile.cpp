@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/level_profile.h"
 
+#include "geometry/parabola.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -36,8 +38,7 @@ void findPeaks(LevelProfile &profile, double contrast_min)
     const double a = std::abs(p[i - 1]), b = std::abs(p[i]), c = std::abs(p[i + 1]);
     if (b < contrast_min || b < a || b <= c)
       continue;
-    const double bend = a - 2 * b + c;
-    const double shift = bend < 0 ? std::clamp(0.5 * (a - c) / bend, -0.5, 0.5) : 0;
+    const double shift = peakOffset(a, b, c);
     profile.peaks.push_back({profile.q_first + profile.step * (static_cast<double>(i) + shift),
                              std::copysign(b - 0.25 * (a - c) * shift, p[i])});
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/border_profile.h"
 
+#include "geometry/parabola.h"
 #include "tracking/profile_loops.h"
 
 #include <algorithm>
@@ -140,8 +141,7 @@ std::vector<BorderPeak> peaksOf(const std::vector<float> &contrast, double step_
     const double a = std::abs(at[-1]), b = std::abs(at[0]), c = std::abs(at[1]);
     if (b < least || b < a || b <= c)
       continue;
-    const double bend = a - 2 * b + c;
-    const double shift = bend < 0 ? std::clamp(0.5 * (a - c) / bend, -0.5, 0.5) : 0;
+    const double shift = peakOffset(a, b, c);
     const double height = b - 0.25 * (a - c) * shift;
     peaks.push_back({(k - middle + shift) * step_px, std::copysign(height, double(at[0]))});
   }
