@@ -340,7 +340,18 @@ std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
   return evidence;
 }
 
-std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+namespace
+{
+/// Where the columns inside a trunk differ least.
+struct LeastDifference
+{
+  double log_scale = 0; ///< of the range, over that where the trunk is thought to stand
+  double difference = 0;
+};
+
+/// \p on_bark: how far what the columns show stands out from the plane of the axis, 1 as the bark does.
+std::optional<LeastDifference> leastDifference(double on_bark, const Trunk &trunk, const std::vector<Seen> &all,
+                                               const std::vector<LevelView> &views)
 {
   constexpr std::size_t kTried = 32;
   constexpr double kStep = 0.02; // of the logarithm of the range
@@ -348,9 +359,12 @@ std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<Level
   std::array<double, kTried> scales, sum{}, seen{};
   for (std::size_t k = 0; k < kTried; ++k)
     scales[k] = std::exp(kStep * (static_cast<double>(k) - 0.5 * (kTried - 1)));
-  const std::vector<Seen> all = locateAll(trunk, views, farthest);
   for (const Seen &one : spread(all)) {
-    const std::vector<Column> columns = columnsInside(one.at, trunk.radius(), views[one.view].image->step);
+    std::vector<Column> columns = columnsInside(one.at, trunk.radius(), views[one.view].image->step);
+    for (Column &column : columns) {
+      const double axis = one.at.range * std::cos(column.angle - one.at.bearing);
+      column.range = axis + on_bark * (column.range - axis);
+    }
     std::array<double, kTried> here{}, count{};
     compare(trunk, one, columns, all, views, scales, [&](std::size_t kind, std::size_t k, double d) {
       here[k] += kind == kInside ? d : 0;
@@ -367,7 +381,20 @@ std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<Level
   const auto best = static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
   if (best == 0 || best + 1 == kTried || !std::isfinite(sum[best - 1] + sum[best + 1]))
     return std::nullopt;
-  return std::log(scales[best]) + kStep * peakOffset(-sum[best - 1], -sum[best], -sum[best + 1]);
+  return LeastDifference{std::log(scales[best]) + kStep * peakOffset(-sum[best - 1], -sum[best], -sum[best + 1]),
+                         sum[best]};
+}
+} // namespace
+
+std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr double kSure = 0.01; // a mean difference that speaks for the one or the other
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  const auto bark = leastDifference(1, trunk, all, views), shade = leastDifference(0, trunk, all, views);
+  if (!bark || !shade)
+    return bark ? std::optional(bark->log_scale) : std::nullopt;
+  const double by_bark = 1 / (1 + std::exp((bark->difference - shade->difference) / kSure));
+  return by_bark * bark->log_scale + (1 - by_bark) * shade->log_scale;
 }
 
 namespace

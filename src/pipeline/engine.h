@@ -84,6 +84,7 @@ private:
   std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
                                  AlbumGradients &gradients) const;
   void detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients);
+  void placeByBark();
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void followScale(double seconds_passed);

@@ -203,6 +203,16 @@ void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gr
   }
 }
 
+/// The last word on where the trunks stand. It moves no pose: bark and borders share the path by which both are
+/// measured.
+void Engine::placeByBark()
+{
+  const std::vector<LevelView> views = levelViews(m_album.frames());
+  for (const MapTrunk &trunk : m_map.trunks())
+    if (!trunk.removed)
+      m_map.refresh({trunk.id, placedByBark(trunk.trunk, views, farthestJudged()), std::nullopt});
+}
+
 /// Every hypothesis in the light of all frames.
 void Engine::decideByAllFrames()
 {
@@ -245,6 +255,7 @@ void Engine::decideByAllFrames()
     m_smoother.removeTrunk(gone);
   m_smoother.optimize(kSettled);
   refreshWholeMap();
+  placeByBark();
   m_map.doubtPlaces();
 }
 } // namespace bole

@@ -83,6 +83,27 @@ bool goesOnBeside(const ColumnEvidence &evidence)
 
 namespace
 {
+/// From where \p trunk is seen to where it stands [m], of some views.
+Eigen::Vector2d meanLineOfSight(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  int n = 0;
+  for (const LevelView &view : views)
+    if (locate(trunk, view, farthest)) {
+      sum += trunk.axisAt(view.z).head<2>() - view.position;
+      ++n;
+    }
+  return sum / n;
+}
+
+/// \p trunk with its range along \p line_of_sight [m] changed by its logarithm \p by, as wide in the images as it is.
+Trunk movedAlong(const Eigen::Vector2d &line_of_sight, Trunk trunk, double by)
+{
+  trunk.xy += (std::exp(by) - 1) * line_of_sight;
+  trunk.log_radius += by;
+  return trunk;
+}
+
 /// How far \p trunk surely goes on outside of its borders [px], left and right.
 std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &borders)
 {
@@ -126,10 +147,7 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
   }
   if (move[0] == 0 && move[1] == 0)
     return std::nullopt;
-  Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the trunk, from where it is seen
-  for (const LevelView &view : views)
-    if (locate(trunk, view, farthest))
-      toward += (trunk.axisAt(view.z).head<2>() - view.position).normalized();
+  const Eigen::Vector2d toward = meanLineOfSight(trunk, views, farthest);
   const Eigen::Vector2d leftwards = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
   const double radius = trunk.radius() + 0.5 * (move[0] + move[1]);
   if (radius < borders->px || radius > radius_max)
@@ -159,21 +177,19 @@ std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::
   const std::optional<double> by_bark = rangeByColumns(reading.trunk, views, farthest);
   if (!by_bark || std::abs(*by_bark) < kLeast || reading.trunk.radius() * std::exp(*by_bark) > radius_max)
     return std::nullopt;
-  Eigen::Vector2d toward = Eigen::Vector2d::Zero(); // the mean of the lines of sight [m]
-  int n = 0;
-  for (const LevelView &view : views)
-    if (locate(reading.trunk, view, farthest)) {
-      toward += reading.trunk.axisAt(view.z).head<2>() - view.position;
-      ++n;
-    }
-  toward /= n; // some, as there is a range by them
-  Hypothesis guess{reading.id, reading.trunk, reading.online};
-  guess.trunk.xy += (std::exp(*by_bark) - 1) * toward;
-  guess.trunk.log_radius += *by_bark;
+  const Eigen::Vector2d toward = meanLineOfSight(reading.trunk, views, farthest);
+  Hypothesis guess{reading.id, movedAlong(toward, reading.trunk, *by_bark), reading.online};
   Eigen::Vector3d along; // as the range grows by its logarithm
   along << toward, 1;
   guess.covariance.topLeftCorner<3, 3>() = kSigma * kSigma * along * along.transpose();
   return guess;
+}
+
+Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr double kBark = 0.5; // its share: it errs by as much as the borders (rms), the one hardly as the other
+  const std::optional<double> by_bark = rangeByColumns(trunk, views, farthest);
+  return by_bark ? movedAlong(meanLineOfSight(trunk, views, farthest), trunk, kBark * *by_bark) : trunk;
 }
 
 namespace

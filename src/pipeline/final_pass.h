@@ -99,6 +99,9 @@ bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoub
 std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,
                                           double farthest, double radius_max);
 
+/// Where \p trunk stands by its bark as well as by its borders: at the mean of both ranges.
+Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
+
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
 /// \p apart [m] between their bark) or fill the same columns in most views.
 std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,

@@ -138,6 +138,11 @@ TEST(FinalPass, TheBarkTellsHowFarATrunkStands)
     EXPECT_LT((guess->trunk.xy - test::trunkOf(whole).xy).norm(), 0.06) << scale;
     EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.004) << scale;
     EXPECT_FALSE(nearerOrFarther(reading, views, kFarthest, 0.17).has_value()) << "thicker than any trunk";
+    const Trunk between = placedByBark(reading.trunk, views, kFarthest);
+    EXPECT_LT((between.xy - 0.5 * (reading.trunk.xy + guess->trunk.xy)).norm(), 0.02) << "as sure as its borders";
+    EXPECT_NEAR(between.radius() / (between.xy - middle).norm(),
+                reading.trunk.radius() / (reading.trunk.xy - middle).norm(), 1e-9)
+        << "as wide in the images";
   }
 }
 
