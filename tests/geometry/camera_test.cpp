@@ -64,6 +64,9 @@ TEST(CameraModel, TheFovLensIsThatOfDevernayAndFaugeras)
   // its inverse: r_u = tan(r_d s) / (2 tan(s / 2)), along the same direction
   EXPECT_NEAR(bent.x() * xy.y(), bent.y() * xy.x(), 1e-12);
   EXPECT_NEAR(std::tan(bent.norm() * 0.9) / (2 * std::tan(0.45)), xy.norm(), 1e-12);
+  EXPECT_EQ(model.distort({0, 0}), Eigen::Vector2d(kCamera.cx, kCamera.cy)); // on the axis, where r is 0
+  model.coefficients = {};                                                   // bends nothing
+  EXPECT_LT((model.distort(xy) - kCamera.project({0.5, -0.2, 1})).norm(), 1e-12);
 }
 
 /// The pixels are those of cv2.projectPoints and cv2.fisheye.projectPoints (OpenCV 4.6) with the same numbers.

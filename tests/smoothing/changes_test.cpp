@@ -4,6 +4,7 @@
 #include "support/flight.h"
 
 #include <gmock/gmock.h>
+#include <malloc.h>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -389,6 +390,46 @@ TEST(Changes, ALongFlightUnderALagKeepsAPoseAFrameAndNothingElse)
   constexpr double kPose = 160; // bytes: the pose, and its part of the covariances
   EXPECT_LT(keptAFrame(true), kPose);
   EXPECT_LT(keptAFrame(false), kPose);
+}
+
+/// By what the heap grows by while a flight is solved.
+TEST(Changes, TheBytesToldAreThoseThatAreHeld)
+{
+  FlightOptions o;
+  o.poses = 400;
+  const Flight flight = simulateFlight(o);
+  const auto held = [] {
+    const auto heap = mallinfo2();
+    return static_cast<double>(heap.uordblks + heap.hblkhd);
+  };
+  const double before = held();
+  Replay replay(flight, smootherFor(o));
+  replay.run();
+  const double grown = held() - before;
+  EXPECT_NEAR(static_cast<double>(replay.smoother.memoryBytes()) / grown, 1, 0.15);
+}
+
+/// Neither the views of a trunk nor the poses that they were taken from are solved again for a view that says nothing
+/// new: the change is too small to run down the tree.
+TEST(Changes, AViewAsExpectedIsTakenInWithoutSolvingTheFlightAgain)
+{
+  FlightOptions o;
+  o.poses = 100;
+  const Flight flight = simulateFlight(o);
+  Replay replay(flight, smootherFor(o));
+  replay.run();
+  Smoother &smoother = replay.smoother;
+  smoother.optimize();
+  const std::size_t trunk = static_cast<std::size_t>(replay.trunk_id[flight.views.back().front().first]);
+  SummaryFactor view = flight.views.back().front().second;
+  view.optimum = smoother.predictedRelative(trunk);
+  smoother.addObservation(smoother.poseCount() - 1, trunk, view);
+
+  const UpdateResult result = smoother.update();
+
+  EXPECT_EQ(result.status, UpdateStatus::ok);
+  EXPECT_EQ(result.relinearised, 0u);
+  EXPECT_EQ(result.resolved, result.eliminated);
 }
 
 TEST(Changes, TheLagGivesMemoryBack) { EXPECT_LT(growth(0, 40), 0.2 * growth(0, 0)); }

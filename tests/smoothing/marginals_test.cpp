@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <gmock/gmock.h>
+#include <limits>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -160,6 +161,36 @@ TEST_F(OneTrunk, RefusesWhatTheCallerGotWrong)
   SmootherOptions wrong;
   wrong.fixed_lag = 1;
   EXPECT_THROW(wrong.validate(), vpException);
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const TrunkPrior weak = {truth, Vector5d::Constant(3)};
+  Trunk nowhere = truth;
+  nowhere.xy.x() = kNaN;
+  TrunkPrior unknown = weak, sure = weak, unsure = weak;
+  unknown.mean.log_radius = kNaN;
+  sure.sigma(4) = 0;
+  unsure.sigma(0) = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(smoother.addTrunk(nowhere, weak), vpException);
+  for (const TrunkPrior &prior : {unknown, sure, unsure})
+    EXPECT_THROW(smoother.addTrunk(truth, prior), vpException);
+  const std::size_t trunk = smoother.addTrunk(truth, weak);
+  for (const std::size_t none : {trunk + 1, std::size_t(-1)}) {
+    EXPECT_THROW(smoother.addObservation(pose, none, view()), vpException);
+    EXPECT_THROW(smoother.addObservation(pose + 1, trunk, view()), vpException);
+    EXPECT_THROW(smoother.removeObservation(pose, none), vpException);
+    EXPECT_THROW(smoother.mergeTrunks(trunk, none), vpException);
+    EXPECT_THROW(smoother.removeTrunk(none), vpException);
+    EXPECT_THROW(smoother.keepTrunk(none, true), vpException);
+    EXPECT_THROW(smoother.trunk(none), vpException);
+    EXPECT_THROW(smoother.trunkCovariance(none), vpException);
+    EXPECT_THROW(smoother.pose(none), vpException);
+    EXPECT_THROW(smoother.addPosePrior(none, {}), vpException);
+    EXPECT_THROW(smoother.addOdometry(pose, none, {}), vpException);
+    EXPECT_THROW(smoother.addRelativePose(none, pose, {}), vpException);
+  }
+  EXPECT_THROW(smoother.mergeTrunks(trunk, trunk), vpException);
+  EXPECT_THROW(smoother.addOdometry(pose, pose, {}), vpException);
+  smoother.removeTrunk(trunk);
+  EXPECT_THROW(smoother.trunk(trunk), vpException);
 }
 } // namespace
 } // namespace bole

@@ -94,6 +94,23 @@ TEST(TrunkTracker, LeavesALineOnTheBarkOnlyWhereTheOtherBorderIsRead)
   EXPECT_TRUE(alone.left_used);
 }
 
+/// Six pixels beside the prediction, as far as a gust turns the drone.
+TEST(TrunkTracker, FollowsByOneBorderWhereTheOtherIsHidden)
+{
+  const PinholeCamera camera;
+  const Gradient gradient = computeGradient(drawn(camera, seen(), 40, 200));
+  for (const double off : {-0.03, 0.03})
+    for (const bool is_left_hidden : {true, false}) {
+      TrackingPrediction prediction = predictionNear(seen(), Vector4d(0, 0, off, 0));
+      (is_left_hidden ? prediction.left_hidden : prediction.right_hidden) = true;
+      const TrackingResult result = trackTrunk(gradient, camera, prediction, TrackingOptions());
+      ASSERT_EQ(result.status, TrackingStatus::tracked) << toString(result.status);
+      EXPECT_EQ(result.left_used, !is_left_hidden);
+      EXPECT_EQ(result.right_used, is_left_hidden);
+      EXPECT_LT(std::abs(result.optimum.minus(seen())(2)) * camera.fx, 1) << off << ' ' << is_left_hidden;
+    }
+}
+
 TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
 {
   vpImage<unsigned char> image(240, 320, 0);
