@@ -249,14 +249,13 @@ void Smoother::State::see(int pose, int trunk)
   seen.last_pose = std::max(seen.last_pose, pose);
 }
 
-void Smoother::State::addObservationFactor(int pose, int trunk, const SummaryFactor &summary,
-                                           const SquareRootSummary &root)
+void Smoother::State::addObservationFactor(int pose, int trunk, const SquareRootSummary &summary)
 {
   see(pose, trunk);
   ++trunks[trunk].observations;
   ++live_observations;
-  newFactor(FactorKind::observation, placeData(observations, FactorKind::observation, {summary, root}),
-            poses[pose].variable, trunks[trunk].variable);
+  newFactor(FactorKind::observation, placeData(observations, FactorKind::observation, summary), poses[pose].variable,
+            trunks[trunk].variable);
 }
 
 void Smoother::State::removeTrunk(int trunk)
@@ -296,8 +295,8 @@ void Smoother::State::mergeTrunks(int keep, int gone)
         moving.emplace_back(variables[factors[factor].a].number, factors[factor].data);
   removeTrunk(gone);
   for (const auto &[pose, data] : moving) {
-    const ObservationData seen = observations[data];
-    addObservationFactor(pose, keep, seen.factor, seen.root);
+    const SquareRootSummary seen = observations[data];
+    addObservationFactor(pose, keep, seen);
   }
 }
 } // namespace bole

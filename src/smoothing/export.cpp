@@ -40,7 +40,7 @@ Graph Smoother::State::graph() const
       graph.relative_poses.push_back({a, b, relative_poses[factor.data].factor});
       break;
     case FactorKind::observation:
-      graph.observations.push_back({a, b, observations[factor.data].factor});
+      graph.observations.push_back({a, b, observations[factor.data].factor()});
       break;
     case FactorKind::marginal:
     case FactorKind::image: // stays with its picture
@@ -54,7 +54,7 @@ std::size_t Smoother::State::memoryBytes() const
 {
   std::size_t bytes = store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
                       poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
-                      closed_covariances.size() * sizeof(Matrix6d) + observations.size() * sizeof(ObservationData) +
+                      closed_covariances.size() * sizeof(Matrix6d) + observations.size() * sizeof(SquareRootSummary) +
                       odometry.size() * sizeof(OdometryData) + relative_poses.size() * sizeof(RelativePoseData) +
                       pose_priors.size() * sizeof(PosePriorData);
   for (const Variable &v : variables)

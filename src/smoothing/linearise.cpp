@@ -70,7 +70,7 @@ void Smoother::State::linearise(Factor &factor)
   case FactorKind::observation: {
     Matrix46d J_pose;
     Matrix45d J_trunk;
-    const Vector4d r = residual(observations[factor.data].root, options.bMc, pose(factor.a),
+    const Vector4d r = residual(observations[factor.data], options.bMc, pose(factor.a),
                                 trunks[variables[factor.b].number].point, &J_pose, &J_trunk);
     factor.cost = store2<4, 6, 5>(options.summary_loss, J_pose, J_trunk, r, factor.linear);
     break;
@@ -126,7 +126,7 @@ double Smoother::State::costAtEstimate(const Factor &factor) const
     return 0.5 * options.direction_loss.rho(r.squaredNorm());
   }
   case FactorKind::observation: {
-    const Vector4d r = residual(observations[factor.data].root, options.bMc, pose(factor.a),
+    const Vector4d r = residual(observations[factor.data], options.bMc, pose(factor.a),
                                 estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
     return 0.5 * options.summary_loss.rho(r.squaredNorm());
   }

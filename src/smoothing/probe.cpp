@@ -65,9 +65,8 @@ double Smoother::State::linearisationError(const Factor &factor) const
   if (factor.stale)
     return 0;
   if (factor.kind == FactorKind::observation) {
-    const Vector4d r =
-        residual(observations[factor.data].root, options.bMc, estimate(poses[variables[factor.a].number]),
-                 estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
+    const Vector4d r = residual(observations[factor.data], options.bMc, estimate(poses[variables[factor.a].number]),
+                                estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
     return modelError<4>(options.summary_loss, factor.cost, r, linearPrediction(factor).head<4>());
   }
   if (factor.kind == FactorKind::odometry) {

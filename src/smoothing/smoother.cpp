@@ -97,7 +97,7 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, cons
   SquareRootSummary root;
   const SummaryStatus status = squareRoot(summary, root);
   if (status == SummaryStatus::ok || status == SummaryStatus::projected)
-    m_state->addObservationFactor(static_cast<int>(pose), static_cast<int>(trunk), summary, root);
+    m_state->addObservationFactor(static_cast<int>(pose), static_cast<int>(trunk), root);
   return status;
 }
 

@@ -110,11 +110,6 @@ struct RelativePoseData
   RelativePoseMeasurement factor;
   Matrix5d S;
 };
-struct ObservationData
-{
-  SummaryFactor factor;
-  SquareRootSummary root;
-};
 struct ImageData
 {
   ImageEnergy energy;
@@ -167,7 +162,7 @@ public:
   std::deque<PosePriorData> pose_priors;
   std::deque<OdometryData> odometry;
   std::deque<RelativePoseData> relative_poses;
-  std::deque<ObservationData> observations;
+  std::deque<SquareRootSummary> observations;
   std::deque<MarginalData> marginals;
   std::deque<ImageData> images;
   std::size_t live_observations = 0;
@@ -184,7 +179,7 @@ public:
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
   void see(int pose, int trunk);
-  void addObservationFactor(int pose, int trunk, const SummaryFactor &summary, const SquareRootSummary &root);
+  void addObservationFactor(int pose, int trunk, const SquareRootSummary &summary);
   void removeTrunk(int trunk);
   void mergeTrunks(int keep, int gone);
   void checkPose(std::size_t pose) const;

@@ -11,7 +11,7 @@ namespace bole
 namespace
 {
 constexpr int kRecentPoses = 64;                  ///< behind the newest, all of them keep their contribution
-constexpr int kContributionEvery = 8;             ///< older poses that keep it; the rest is eliminated again if needed
+constexpr int kContributionEvery = 32;            ///< older poses that keep it; the rest is eliminated again if needed
 constexpr int kReach = 256;                       ///< variables below the eliminated ones that a pass visits
 constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
 constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
@@ -202,8 +202,8 @@ void Smoother::State::backSubstitute(UpdateResult &result)
   moved.erase(std::remove_if(moved.begin(), moved.end(), isFine), moved.end());
 }
 
-/// Frees what an old pose left to its parent, but that of every eighth: where it is needed, the pose is eliminated
-/// again.
+/// Frees what an old pose left to its parent, but for every kContributionEvery-th: where it is needed, the pose is
+/// eliminated again.
 void Smoother::State::dropContribution(Variable &v)
 {
   if (options.fixed_lag > 0) // bounds the memory by itself, and closes a pose by its contribution

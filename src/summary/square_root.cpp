@@ -19,6 +19,16 @@ Vector4d SquareRootSummary::residual(const RelativeTrunk &relative, Matrix4d *J)
   return S * d + b;
 }
 
+SummaryFactor SquareRootSummary::factor() const
+{
+  SummaryFactor factor;
+  factor.optimum = optimum;
+  factor.energy = constant + 0.5 * b.squaredNorm();
+  factor.f = S.transpose() * b;
+  factor.F = S.transpose() * S;
+  return factor;
+}
+
 SummaryStatus squareRoot(const SummaryFactor &factor, SquareRootSummary &root)
 {
   const RelativeTrunk &x = factor.optimum;

@@ -19,7 +19,7 @@ constexpr double kIndefiniteTolerance = 1e-3;
 constexpr double kRankTolerance = 1e-9;
 
 /// Laws (each a test): 1/2 |residual(x)|^2 + constant == energyAt(x) for positive definite F;
-/// S^T S == F for positive semi-definite F.
+/// S^T S == F for positive semi-definite F; squareRoot(factor()) is the same quadratic.
 struct SquareRootSummary
 {
   RelativeTrunk optimum;
@@ -30,6 +30,8 @@ struct SquareRootSummary
   /// Whitened residual at \p relative; \p J, if not null, its 4x4 Jacobian by the tangent of \p
   /// relative.
   Vector4d residual(const RelativeTrunk &relative, Matrix4d *J = nullptr) const;
+  /// The quadratic as a summary again: what squareRoot() made this of, without directions that carry no information.
+  SummaryFactor factor() const;
 };
 
 /// Fills \p root from \p factor; leaves it alone when the status is indefinite or not_finite.

@@ -78,6 +78,7 @@ TEST(SquareRootSummary, IsTheSameEnergyAsASumOfSquares)
       const RelativeTrunk at = factor.optimum.plus(0.1 * random.vector());
       const double energy = 0.5 * root.residual(at).squaredNorm() + root.constant;
       EXPECT_NEAR(energy, factor.energyAt(at), 1e-7 * (1 + std::abs(energy)));
+      EXPECT_NEAR(energy, root.factor().energyAt(at), 1e-7 * (1 + std::abs(energy)));
     }
 }
 
