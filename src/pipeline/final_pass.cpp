@@ -83,7 +83,7 @@ bool goesOnBeside(const ColumnEvidence &evidence)
 
 namespace
 {
-/// From where \p trunk is seen to where it stands [m], of some views.
+/// From where \p trunk is seen to where it stands [m], in the mean of the views; one of them at least must show it.
 Eigen::Vector2d meanLineOfSight(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -187,7 +187,7 @@ std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::
 
 Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
 {
-  constexpr double kBark = 0.5; // its share: it errs by as much as the borders (rms), the one hardly as the other
+  constexpr double kBark = 0.5; // its share: it errs by as much as the borders (rms), and only in part as they do
   const std::optional<double> by_bark = rangeByColumns(trunk, views, farthest);
   return by_bark ? movedAlong(meanLineOfSight(trunk, views, farthest), trunk, kBark * *by_bark) : trunk;
 }
