@@ -127,6 +127,8 @@ void setServoing(StageOptions &o)
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
   o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
+  // From one distance it sees the same heights of a trunk: bow remains, taper does not.
+  o.tracking.border_correlation = 0.8;
 }
 
 constexpr LineQuartiles kParkForward = {0.042, 0.574}; ///< of data/park-forward

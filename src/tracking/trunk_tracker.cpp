@@ -143,11 +143,15 @@ RelativeTrunk startFrom(const PeakPair &pair, const SeenBorder &left, const Seen
   return predicted.plus(step);
 }
 
-Eigen::Matrix2d offsetCovariance(const SeenBorder &left, const SeenBorder &right, const Matrix4d &covariance)
+Eigen::Matrix2d offsetCovariance(const SeenBorder &left, const SeenBorder &right, const Matrix4d &covariance,
+                                 double border_correlation)
 {
+  constexpr double kVariance = 0.5; // bow, taper and noise: 0.7 px
   Eigen::Matrix<double, 2, 4> J;
   J << left.J_mid, right.J_mid;
-  return J * covariance * J.transpose() + 0.5 * Eigen::Matrix2d::Identity(); // bow and noise: 0.7 px
+  Eigen::Matrix2d shape = Eigen::Matrix2d::Constant(kVariance * border_correlation);
+  shape.diagonal().setConstant(kVariance);
+  return J * covariance * J.transpose() + shape;
 }
 
 double evennessOf(const Gradient &gradient, const PinholeCamera &camera, const TrackingResult &result,
@@ -196,7 +200,7 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
   RelativeTrunk start = prediction.relative;
   PeakPair pair;
   if (options.scan) {
-    const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance);
+    const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance, options.border_correlation);
     const auto scan = [&](const SeenBorder &border, double variance) {
       const double width =
           std::clamp(options.scan_sigmas * std::sqrt(variance), options.scan_min_px, options.scan_max_px);

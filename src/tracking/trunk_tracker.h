@@ -18,6 +18,8 @@ namespace bole
 struct TrackingOptions
 {
   EnergyOptions energy;
+  /// Of how far left and right border are off those of the cylinder: bow moves both, taper widens; 0 to 0.99.
+  double border_correlation = 0;
   double scan_min_px = 2.5;    ///< half-width of the scan at the least, [px], 0.5 to 20; the lean and bow of trunks
   double scan_max_px = 12;     ///< and at the most, [px], 1 to 60
   double scan_sigmas = 3;      ///< half-width in standard deviations of the prediction, 1 to 10

@@ -111,6 +111,35 @@ TEST(TrunkTracker, FollowsByOneBorderWhereTheOtherIsHidden)
     }
 }
 
+/// The sun comes round a dark trunk: its left border turns bright, and the contrast that it had stands at the inner end
+/// of a rim of light.
+TEST(TrunkTracker, KeepsTheKnownWidthWhereARimOfSunGrows)
+{
+  constexpr double kRim_px = 2;
+  const PinholeCamera camera;
+  const double ratio_px = seen().ratio() * camera.fx; // half the width
+  const RelativeTrunk shade = seen().plus({0, 0, -0.5 * kRim_px / camera.fx, -0.5 * kRim_px / ratio_px});
+  vpImage<unsigned char> image = drawn(camera, seen(), 200, 110), inner = drawn(camera, shade, 0, 160);
+  for (unsigned i = 0; i < image.getSize(); ++i)
+    image.bitmap[i] = static_cast<unsigned char>(image.bitmap[i] - 160 + inner.bitmap[i]);
+  TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  prediction.covariance.diagonal() << 1e-4, 1e-4, 1e-4, 1e-4; // two pixels sideways, a hundredth of its width
+  prediction.left_contrast = -0.2;
+  prediction.right_contrast = 0.1;
+  const auto moved_px = [&](const TrackingResult &result) { // of the left border
+    const Vector4d error = result.optimum.minus(seen());
+    return camera.fx * error(2) + ratio_px * error(3);
+  };
+  TrackingOptions options;
+  const TrackingResult alone = trackTrunk(computeGradient(image), camera, prediction, options);
+  EXPECT_EQ(alone.status, TrackingStatus::tracked);
+  EXPECT_LT(moved_px(alone), -1.5); // at the end of the rim
+  options.border_correlation = 0.8;
+  const TrackingResult together = trackTrunk(computeGradient(image), camera, prediction, options);
+  EXPECT_EQ(together.status, TrackingStatus::sign_changed);
+  EXPECT_LT(std::abs(moved_px(together)), 0.6);
+}
+
 TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
 {
   vpImage<unsigned char> image(240, 320, 0);
