@@ -25,16 +25,14 @@ void Smoother::State::measureDampingScale()
   }
 }
 
-/// One solve of the whole graph with the present damping; \p anew also moves the points of
-/// linearisation.
-void Smoother::State::solveAll(UpdateResult &result, bool anew)
+/// One solve of the whole graph, linearised at the estimate, with the present damping.
+void Smoother::State::solveAll(UpdateResult &result)
 {
   for (int id = 0; id < static_cast<int>(variables.size()); ++id) {
     if (!isOpen(id))
       continue;
     variables[id].in_moved = false;
-    if (anew)
-      relinearise(id);
+    relinearise(id);
     touch(id);
   }
   moved.clear();
@@ -55,26 +53,24 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   held_directions = 0;
   damping = 0;
   double before = costAtEstimate();
-  bool settled = false, anew = true;
+  bool settled = false;
   while (!settled && result.iterations < max_iterations) {
-    solveAll(result, anew);
+    solveAll(result);
     const double after = costAtEstimate(), fall = before - after;
     if (std::isfinite(after) && fall >= -1e-13 * std::abs(before)) { // an image's energy is below zero
       settled = fall <= tolerance * std::abs(before);
       before = after;
-      anew = true;
       damping = damping < 1e-7 ? 0 : damping / 10;
     }
     else {
       for (Variable &v : variables)
         v.delta.setZero();
-      anew = false;
       settled = damping > 1e12 || (damping == 0 && fall >= -tolerance * std::max(1.0, std::abs(before))); // rounding
       damping = damping == 0 ? 1e-6 : damping * 10;
     }
   }
   damping = 0; // the factorisation left behind is that of the graph itself
-  solveAll(result, true);
+  solveAll(result);
   const double after = costAtEstimate();
   if (!(after <= before))
     for (Variable &v : variables)

@@ -239,7 +239,7 @@ public:
 
   // optimize.cpp
   void measureDampingScale();
-  void solveAll(UpdateResult &result, bool anew);
+  void solveAll(UpdateResult &result);
   UpdateResult optimize(double tolerance, int max_iterations);
 
   // ordering.cpp
