@@ -4,6 +4,8 @@
 
 #include "map/constellation.h"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +13,7 @@ namespace bole
 {
 namespace
 {
+constexpr double kMostLean = 5;     ///< standard deviations of the lean of trunks: two lines that are none bend to it
 constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
 } // namespace
 
@@ -20,6 +23,8 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
     return false;
   if (!has_ranges)
     return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
+  if (trunk.trunk.lean.norm() > kMostLean * m_options.lean_sigma)
+    return true;
   if (trunk.column_views >= kColumnViews && trunk.column_odds < m_options.final_odds - kHysteresis)
     return true;
   if (trunk.status == TrunkStatus::confirmed)
@@ -65,15 +70,31 @@ bool mayBeEdgeOf(const MapTrunk &known, const Trunk &wide)
   return !known.is_silhouette && isInside(known.trunk, wide);
 }
 
-/// The same trunk at two visits: alike in place and radius, and seen at different times. What is seen at the same time
-/// shares its views' image lines, which must not count twice.
-bool isAnotherVisit(const MapTrunk &a, const MapTrunk &b)
+/// What is seen at the same time shares its views' image lines, which must not count twice.
+bool areSeenApart(const MapTrunk &a, const MapTrunk &b)
 {
-  constexpr double kPlace = 0.15, kLogRadius = 0.25; // by which one trunk differs from itself [m], [1]
-  const bool are_apart = a.first_seen_s > b.last_seen_s || b.first_seen_s > a.last_seen_s;
-  const double drift = 3 * std::hypot(a.positionSigma(), b.positionSigma());
-  return are_apart && distanceBetween(a.trunk, b.trunk) < kPlace + drift &&
-         std::abs(a.trunk.log_radius - b.trunk.log_radius) < kLogRadius;
+  return a.first_seen_s > b.last_seen_s || b.first_seen_s > a.last_seen_s;
+}
+
+/// Of x, y of the axis at breast height and of the log radius.
+Eigen::Matrix3d breastCovariance(const MapTrunk &trunk)
+{
+  Eigen::Matrix<double, 3, 5> J = Eigen::Matrix<double, 3, 5>::Identity();
+  J.topRightCorner<2, 2>() = kBreastHeight * Eigen::Matrix2d::Identity();
+  return J * trunk.covariance * J.transpose();
+}
+
+/// Alike in place and radius within what both are known to: what ties two visits moves all that was seen since.
+bool mayBeTheSame(const MapTrunk &a, const MapTrunk &b)
+{
+  constexpr double kFromItself = 0.05; // by which one trunk differs from another side, [m] and [1]
+  constexpr double kGate = 14.2;       // chi square (3), three sigma
+  Eigen::Vector3d apart;
+  apart << (a.trunk.axisAt(kBreastHeight) - b.trunk.axisAt(kBreastHeight)).head<2>(),
+      a.trunk.log_radius - b.trunk.log_radius;
+  const Eigen::Matrix3d S =
+      breastCovariance(a) + breastCovariance(b) + kFromItself * kFromItself * Eigen::Matrix3d::Identity();
+  return apart.dot(S.inverse() * apart) < kGate;
 }
 
 /// What was seen of \p gone was seen of \p keep.
@@ -172,12 +193,6 @@ void remove(MapUpdate &update, MapTrunk &trunk, TrunkFate fate)
   update.removed.push_back(trunk.smoother_id);
   change(update, trunk, TrunkStatus::lost, fate);
 }
-
-/// Log-odds that fell, or a rival: which of the two \p evidence below \p least tells.
-TrunkFate fateOfDisproved(double evidence, double least)
-{
-  return evidence < least ? TrunkFate::doubted : TrunkFate::outdone;
-}
 } // namespace
 
 void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
@@ -185,15 +200,17 @@ void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
   for (const std::size_t i : m_active) {
     MapTrunk &trunk = m_trunks[i];
     const bool is_candidate = trunk.status == TrunkStatus::candidate;
-    const double least = is_candidate ? m_options.doubt_candidate : m_options.doubt_confirmed;
     if (is_candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
       change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
     else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0)
       change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
     else if (trunk.status == TrunkStatus::lost)
       continue;
-    else if (isDisproved(trunk, has_ranges))
-      remove(update, trunk, has_ranges ? fateOfDisproved(evidence(trunk), least) : TrunkFate::doubted);
+    else if (isDisproved(trunk, has_ranges)) {
+      const bool is_outdone = has_ranges && is_candidate && evidence(trunk) >= m_options.doubt_candidate &&
+                              hasBetterRival(trunk, m_options.doubt_rival);
+      remove(update, trunk, is_outdone ? TrunkFate::outdone : TrunkFate::doubted);
+    }
     else if (trunk.misses_in_a_row >= m_options.lost_misses && is_candidate)
       remove(update, trunk, TrunkFate::missed);
     else if (trunk.misses_in_a_row >= m_options.lost_misses) // out of sight, and still a trunk of the map
@@ -212,8 +229,10 @@ void TrunkMap::reviewPairs(MapUpdate &update)
       if (!gone)
         continue;
       MapTrunk &keep = gone == &a ? b : a;
-      const bool is_duplicate = isAnotherVisit(a, b);
-      if (is_duplicate) {
+      const bool is_another_visit = areSeenApart(a, b) && mayBeTheSame(a, b);
+      if (is_another_visit && gone->status == TrunkStatus::candidate) // must earn its place first
+        continue;
+      if (is_another_visit) {
         joinVisits(update, keep, *gone);
         continue;
       }

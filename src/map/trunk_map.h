@@ -7,8 +7,8 @@
 /// trunk, learnt from flights with known trunks. Several hypotheses for the same lines may compete as candidates (the
 /// silhouette, the edge of a shadow on the bark, a gap between two trunks). The one with the best log-odds is
 /// confirmed and the others go, since two trunks cannot stand in the same place (paper, Section 7, which leaves
-/// duplicates in the map). A trunk that comes back as a duplicate hands its views to the one that was there before:
-/// they tie the two visits together. Where the path has drifted so far that no trunk stands on its former place, those
+/// duplicates in the map). A trunk that comes back as a duplicate hands its views, once it was confirmed by itself, to the
+/// one that was there before: they tie the two visits together. Where the path has drifted so far that no trunk stands on its former place, those
 /// in sight are recognised by their constellation. A confirmed trunk that is predicted in view and not found for long
 /// is lost from sight; it stays in the map and comes back under its id.
 
@@ -59,6 +59,7 @@ struct MapOptions
                                    ///< [m], 0 (never) to 100
   double innovation_unit_px = 1;   ///< rms of prediction against what was found that counts as one pixel of a camera
                                    ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
+  double lean_sigma = 0.035;       ///< standard deviation of the lean of trunks [rad], 0.0001 to 0.5
   double usual_radius = 0.15;      ///< median radius of the trunks to be found [m], 0.001 to 10
   int lost_misses = 8;             ///< misses in a row before a trunk is lost, 1 to 1000
   double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6

@@ -66,7 +66,7 @@ void setTrunks(StageOptions &o, const Options::Trunks &trunks)
 {
   o.smoothing.prior_radius = o.map.usual_radius = trunks.radius;
   o.smoothing.prior_log_radius_sigma = trunks.radius_sigma;
-  o.smoothing.prior_lean_sigma = trunks.lean;
+  o.smoothing.prior_lean_sigma = o.map.lean_sigma = trunks.lean;
   o.detection.radius_min = trunks.radius_min;
   o.detection.radius_max = trunks.radius_max;
   /// A trunk that was found may prove thinner or thicker by these factors than what is looked for.
