@@ -7,9 +7,10 @@
 /// trunk, learnt from flights with known trunks. Several hypotheses for the same lines may compete as candidates (the
 /// silhouette, the edge of a shadow on the bark, a gap between two trunks). The one with the best log-odds is
 /// confirmed and the others go, since two trunks cannot stand in the same place (paper, Section 7, which leaves
-/// duplicates in the map). A trunk that comes back as a duplicate hands its views, once it was confirmed by itself, to the
-/// one that was there before: they tie the two visits together. Where the path has drifted so far that no trunk stands on its former place, those
-/// in sight are recognised by their constellation. A confirmed trunk that is predicted in view and not found for long
+/// duplicates in the map). A trunk that comes back as a duplicate hands its views, once it was confirmed by itself, to
+/// the one that was there before: they tie the two visits together. Where the path has drifted so far that no trunk
+/// stands on its former place, those in sight are recognised by their constellation. A confirmed trunk that is
+/// predicted in view and not found for long
 /// is lost from sight; it stays in the map and comes back under its id.
 
 #include "geometry/log_normal.h"
