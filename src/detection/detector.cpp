@@ -247,25 +247,18 @@ double quality(const Detection &detection, const LogNormal &radii)
          (detection.rms_px + 0.2);
 }
 
-/// Of the fit of a trunk at \p range [px]: what its borders are read by, and what the places of the views are off.
-double largestRms(double range, double px_per_q, const DetectorOptions &options)
-{
-  return std::hypot(options.rms_max_px, px_per_q * options.place_sigma / std::max(range, options.range_min));
-}
-
 std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewColumns &columns,
                                 const PairHypothesis &pair, const SweepResult &sweep, double px_per_q,
                                 const DetectorOptions &options)
 {
   const Fit fit = refine(views.back(), columns, pair, sweep.range, px_per_q, options);
-  const Vector2d w = fit.p.head<2>() - views.back().position;
-  if (fit.inliers < kLeastViews || fit.inliers < options.inliers_min * fit.views ||
-      fit.rms_px > largestRms(w.norm(), px_per_q, options))
+  if (fit.inliers < kLeastViews || fit.inliers < options.inliers_min * fit.views || fit.rms_px > options.rms_max_px)
     return std::nullopt;
 
   Detection detection;
   detection.trunk.xy = fit.p.head<2>();
   detection.trunk.log_radius = fit.p(2);
+  const Vector2d w = detection.trunk.xy - views.back().position;
   detection.range = w.norm();
   const double r = detection.trunk.radius();
   Matrix3d information = fit.information;

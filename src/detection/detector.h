@@ -33,8 +33,7 @@ struct DetectorOptions
   double agreement_min = 0.65;   ///< mean agreement of the borders with the window, 0 to 1
   double inliers_min = 0.7;      ///< part of the views within inlier_px of both borders, 0 to 1
   double inlier_px = 2.5;        ///< [px]
-  double rms_max_px = 0.85;      ///< of the inliers, [px], of a trunk that is far away
-  double place_sigma = 0.01;     ///< of a view within the window [m], 0 to 0.1: at 1.5 m it is more pixels than at 5 m
+  double rms_max_px = 0.85;      ///< of the inliers, [px]
   double parallax_min = 0.03;    ///< change of the bearing of a border over the window, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
   double near_range = 5.5;       ///< nearer than this a trunk must be foreground [m], 0 (off) to 100

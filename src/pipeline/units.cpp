@@ -22,7 +22,6 @@ StageOptions inUnits(StageOptions options, double metres)
                          &detection.radius_min,
                          &detection.radius_max,
                          &detection.near_range,
-                         &detection.place_sigma,
                          &map.confirm_position_sigma,
                          &map.near_range,
                          &map.through_range,

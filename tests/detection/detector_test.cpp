@@ -93,27 +93,6 @@ TEST(Detector, OfTwoReadingsOfTheSameLinesPrefersThatOfTheRadiiThatAreExpected)
   EXPECT_NEAR(thinnest(0.4), 0.26, 0.02);
 }
 
-/// Odometry is a centimetre off from view to view: 1.3 px at 1.6 m, and no reason to miss what the drone may touch.
-TEST(Detector, FindsANearTrunkThoughThePlacesOfTheViewsAreACentimetreOff)
-{
-  const DrawnTrunk near{1.9, -0.2, 0.15, 40};
-  const DrawnFlight flight({near}, sweep());
-  std::vector<DetectorView> views = flight.views();
-  for (std::size_t i = 0; i + 1 < views.size(); ++i)
-    views[i].wMc.t.y() += i % 2 == 0 ? 0.01 : -0.01;
-  const auto foundIn = [&](const DetectorOptions &options) {
-    return bestReadings(detectTrunks(views, flight.camera, {}, nullptr, options));
-  };
-  const auto found = foundIn(DetectorOptions());
-  const Detection *detection = nearestTo(found, near);
-  ASSERT_NE(detection, nullptr);
-  EXPECT_LT((detection->trunk.xy - trunkOf(near).xy).norm(), 0.1);
-  EXPECT_NEAR(detection->trunk.radius(), near.radius, 0.02);
-  DetectorOptions sure;
-  sure.place_sigma = 0;
-  EXPECT_TRUE(foundIn(sure).empty());
-}
-
 TEST(Detector, SaysHowWellItKnowsThePlace)
 {
   const DrawnTrunk trunk{5, 0.3, 0.2, 40};
