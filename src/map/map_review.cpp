@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -218,7 +219,7 @@ void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
   }
 }
 
-void TrunkMap::reviewPairs(MapUpdate &update)
+void TrunkMap::reviewPairs(MapUpdate &update, double now_s)
 {
   for (const std::size_t i : m_active)
     for (const std::size_t j : m_active) {
@@ -230,12 +231,12 @@ void TrunkMap::reviewPairs(MapUpdate &update)
         continue;
       MapTrunk &keep = gone == &a ? b : a;
       const bool is_another_visit = areSeenApart(a, b) && mayBeTheSame(a, b);
-      if (is_another_visit && gone->status == TrunkStatus::candidate) // must earn its place first
-        continue;
-      if (is_another_visit) {
+      if (is_another_visit && gone->status != TrunkStatus::candidate) {
         joinVisits(update, keep, *gone);
         continue;
       }
+      if (is_another_visit && now_s - gone->last_seen_s <= m_options.candidate_memory_s) // may still earn its place
+        continue;
       gone->removed = true;
       change(update, *gone, TrunkStatus::merged, TrunkFate::outdone, keep.id);
       update.removed.push_back(gone->smoother_id);
@@ -320,7 +321,7 @@ MapUpdate TrunkMap::review(double now_s, bool has_ranges)
   if (m_options.at_once)
     return update;
   reviewEach(update, has_ranges);
-  reviewPairs(update);
+  reviewPairs(update, now_s);
   reviewPlaces(update, now_s);
   deactivate(update, now_s);
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(),
@@ -342,7 +343,7 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
   MapUpdate update;
   learnRadii();
   reviewEach(update, has_ranges);
-  reviewPairs(update);
+  reviewPairs(update, std::numeric_limits<double>::infinity()); // nothing earns its place any more
   keepActive();
   return update;
 }

@@ -312,7 +312,7 @@ private:
   MapTrunk *chooseRedundant(MapTrunk &a, MapTrunk &b) const;
   void addView(MapTrunk &trunk, const TrunkView &view) const;
   void reviewEach(MapUpdate &update, bool has_ranges);
-  void reviewPairs(MapUpdate &update);
+  void reviewPairs(MapUpdate &update, double now_s);
   void reviewPlaces(MapUpdate &update, double now_s);
   void joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone);
   void deactivate(MapUpdate &update, double now_s);
