@@ -25,14 +25,20 @@ void Smoother::State::measureDampingScale()
   }
 }
 
-/// One solve of the whole graph, linearised at the estimate, with the present damping.
+void Smoother::State::relineariseAll()
+{
+  for (int id = 0; id < static_cast<int>(variables.size()); ++id)
+    if (isOpen(id))
+      relinearise(id);
+}
+
+/// One solve of the whole graph with the present damping.
 void Smoother::State::solveAll(UpdateResult &result)
 {
   for (int id = 0; id < static_cast<int>(variables.size()); ++id) {
     if (!isOpen(id))
       continue;
     variables[id].in_moved = false;
-    relinearise(id);
     touch(id);
   }
   moved.clear();
@@ -54,12 +60,14 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   damping = 0;
   double before = costAtEstimate();
   bool settled = false;
+  relineariseAll();
   while (!settled && result.iterations < max_iterations) {
     solveAll(result);
     const double after = costAtEstimate(), fall = before - after;
     if (std::isfinite(after) && fall >= -1e-13 * std::abs(before)) { // an image's energy is below zero
       settled = fall <= tolerance * std::abs(before);
       before = after;
+      relineariseAll();
       damping = damping < 1e-7 ? 0 : damping / 10;
     }
     else {

@@ -239,6 +239,7 @@ public:
 
   // optimize.cpp
   void measureDampingScale();
+  void relineariseAll();
   void solveAll(UpdateResult &result);
   UpdateResult optimize(double tolerance, int max_iterations);
 
