@@ -77,14 +77,6 @@ bool areSeenApart(const MapTrunk &a, const MapTrunk &b)
   return a.first_seen_s > b.last_seen_s || b.first_seen_s > a.last_seen_s;
 }
 
-/// Of x, y of the axis at breast height and of the log radius.
-Eigen::Matrix3d breastCovariance(const MapTrunk &trunk)
-{
-  Eigen::Matrix<double, 3, 5> J = Eigen::Matrix<double, 3, 5>::Identity();
-  J.topRightCorner<2, 2>() = kBreastHeight * Eigen::Matrix2d::Identity();
-  return J * trunk.covariance * J.transpose();
-}
-
 /// Alike in place and radius within what both are known to: what ties two visits moves all that was seen since.
 bool mayBeTheSame(const MapTrunk &a, const MapTrunk &b)
 {
@@ -93,8 +85,8 @@ bool mayBeTheSame(const MapTrunk &a, const MapTrunk &b)
   Eigen::Vector3d apart;
   apart << (a.trunk.axisAt(kBreastHeight) - b.trunk.axisAt(kBreastHeight)).head<2>(),
       a.trunk.log_radius - b.trunk.log_radius;
-  const Eigen::Matrix3d S =
-      breastCovariance(a) + breastCovariance(b) + kFromItself * kFromItself * Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d S = (a.covarianceAt(kBreastHeight) + b.covarianceAt(kBreastHeight)).topLeftCorner<3, 3>();
+  S.diagonal().array() += kFromItself * kFromItself;
   return apart.dot(S.inverse() * apart) < kGate;
 }
 

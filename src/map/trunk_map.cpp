@@ -7,6 +7,13 @@
 
 namespace bole
 {
+Matrix5d MapTrunk::covarianceAt(double z) const
+{
+  Matrix5d J = Matrix5d::Identity();
+  J.topRightCorner<2, 2>() = z * Eigen::Matrix2d::Identity();
+  return J * covariance * J.transpose();
+}
+
 TrunkMap::TrunkMap(const MapOptions &options) : TrunkMap(options, {}) {}
 
 TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
@@ -186,10 +193,9 @@ TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double br
   record.radius = trunk.trunk.radius();
   record.lean = trunk.trunk.lean;
   record.probability = 1 / (1 + std::exp(-log_odds));
-  Matrix5d J = Matrix5d::Identity(); // of the place at breast height and the radius
-  J.topRightCorner<2, 2>() = breast_z * Eigen::Matrix2d::Identity();
-  J(2, 2) = record.radius;
-  record.covariance = J * trunk.covariance * J.transpose();
+  record.covariance = trunk.covarianceAt(breast_z);
+  record.covariance.row(2) *= record.radius; // of the radius, not of its logarithm
+  record.covariance.col(2) *= record.radius;
   record.observations = trunk.observations;
   record.first_seen_s = trunk.first_seen_s;
   record.last_seen_s = trunk.last_seen_s;

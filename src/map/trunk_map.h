@@ -10,8 +10,7 @@
 /// duplicates in the map). A trunk that comes back as a duplicate hands its views, once it was confirmed by itself, to
 /// the one that was there before: they tie the two visits together. Where the path has drifted so far that no trunk
 /// stands on its former place, those in sight are recognised by their constellation. A confirmed trunk that is
-/// predicted in view and not found for long
-/// is lost from sight; it stays in the map and comes back under its id.
+/// predicted in view and not found for long is lost from sight; it stays in the map and comes back under its id.
 
 #include "geometry/log_normal.h"
 #include <bole/trunk.h>
@@ -60,7 +59,7 @@ struct MapOptions
                                    ///< [m], 0 (never) to 100
   double innovation_unit_px = 1;   ///< rms of prediction against what was found that counts as one pixel of a camera
                                    ///< with f = 200 px [px], 0.1 to 20: in proportion to the focal length
-  double lean_sigma = 0.035;       ///< standard deviation of the lean of trunks [rad], 0.0001 to 0.5
+  double lean_sigma = 0.035;       ///< standard deviation of the lean of trunks [rad], 1e-5 to 0.5
   double usual_radius = 0.15;      ///< median radius of the trunks to be found [m], 0.001 to 10
   int lost_misses = 8;             ///< misses in a row before a trunk is lost, 1 to 1000
   double candidate_memory_s = 5;   ///< a candidate that was not seen for longer is no longer looked for [s], 0.1 to 1e6
@@ -113,6 +112,8 @@ struct MapTrunk
   /// By how much the bearing of a border changed [rad]: sideways motion moves both, approach moves them apart.
   double parallax() const { return std::max(left.high - left.low, right.high - right.low); }
   double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
+  /// Of the axis at the height \p z [m], the log radius and the lean.
+  Matrix5d covarianceAt(double z) const;
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
   double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
 };
