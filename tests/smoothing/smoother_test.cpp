@@ -76,6 +76,30 @@ TEST(Smoother, AnImageIsOptimisedItselfAndTheCostNeverRises)
   EXPECT_GE(arrived, 3) << "a flank leads down, also where it bends the wrong way";
 }
 
+TEST(Smoother, AStepBeyondItsLinearisationIsTakenInPart)
+{
+  constexpr double kThicker = 2, kMost = 0.7; // of log r: what the view asks for, what one step may change
+  SmootherOptions options;
+  options.max_iterations = 1;
+  Smoother smoother(options);
+  smoother.addFirstPose(Pose(), 1e-6 * Matrix6d::Identity());
+  TrunkPrior prior;
+  prior.mean.xy = {4, 0.3};
+  prior.mean.log_radius = std::log(0.05);
+  prior.sigma << 0.01, 0.01, 10, 0.01, 0.01;
+  const std::size_t trunk = smoother.addTrunk(prior.mean, prior);
+  SummaryFactor view;
+  view.optimum = smoother.predictedRelative(trunk).plus({0, 0, 0, kThicker});
+  view.F = 1e4 * Matrix4d::Identity();
+  smoother.addObservation(0, trunk, view);
+
+  smoother.update();
+
+  EXPECT_NEAR(smoother.trunk(trunk).log_radius - prior.mean.log_radius, kMost, 1e-6);
+  smoother.optimize();
+  EXPECT_NEAR(smoother.trunk(trunk).log_radius - prior.mean.log_radius, kThicker, 0.01);
+}
+
 TEST(Smoother, UpdatesAloneStayNearTheBatchSolve)
 {
   FlightOptions o;
