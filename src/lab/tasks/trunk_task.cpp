@@ -30,6 +30,7 @@ constexpr double kTurnedNoise = 0.002;     ///< and of its turn [rad]
 constexpr double kSwing = 0.69;    ///< to either side, where a distance is asked for [m]: 13 degrees of parallax at 3 m
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
+constexpr double kReturn_s = 4;    ///< in which it returns to the way of the sway
 constexpr double kPause_s = 0.25;  ///< without a command it hovered: what was sent before is over
 constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
@@ -199,7 +200,7 @@ void TrunkTask::giveUpTarget()
 {
   m_target = -1;
   forgetFeature();
-  m_sway_start_s = -1;
+  m_sway.reset();
   m_ratio = 0;
   m_sidestep.restart();
   enter(TaskPhase::searching);
@@ -225,7 +226,7 @@ TaskCommand TrunkTask::act(const FrameReport &report)
     return {true, Eigen::Vector4d::Zero(), "too near: hovers"};
   vpFeatureTrunk feature;
   feature.buildFrom(seen, trunk->trunk.radius());
-  const Eigen::Vector2d sway = swayNow(time_s);
+  const Eigen::Vector2d sway = swayNow(time_s, report.wMb.t);
   const double wanted = m_turned_back * m_options.speed + sway.x();
   const bool is_free = isFree(trunk->id, obstacles(report, kWayRange, 1), report.wMb, wanted);
   m_blocked = is_free ? 0 : m_blocked + 1;
@@ -244,15 +245,22 @@ TaskCommand TrunkTask::act(const FrameReport &report)
 }
 
 /// Velocity to the left and up [m/s], as much as may be ordered where nothing was seen; 0 where no distance is asked
-/// for.
-Eigen::Vector2d TrunkTask::swayNow(double time_s)
+/// for. It returns to the way that was begun: wind and hovering would move it to where nobody looked.
+/// \p place: of the drone in the world [m].
+Eigen::Vector2d TrunkTask::swayNow(double time_s, const Eigen::Vector3d &place)
 {
   if (m_options.speed != 0 || m_options.ratio > 0)
     return Eigen::Vector2d::Zero();
-  if (m_sway_start_s < 0)
-    m_sway_start_s = time_s;
+  const Eigen::Vector2d from_trunk = place.head<2>() - m_place;
+  const double azimuth = std::atan2(from_trunk.y(), from_trunk.x());
+  if (!m_sway)
+    m_sway = {time_s, azimuth, place.z()};
   const double rate = kSwayShare * m_options.safety.unseen_speed / kSwing; // rad/s
-  return rate * std::cos(rate * (time_s - m_sway_start_s)) * Eigen::Vector2d(kSwing, kSwingUp);
+  const double angle = rate * (time_s - m_sway->start_s);
+  const Eigen::Vector2d swing(kSwing, kSwingUp);
+  const Eigen::Vector2d flown(-from_trunk.norm() * std::remainder(azimuth - m_sway->azimuth, 2 * M_PI),
+                              place.z() - m_sway->height);
+  return rate * std::cos(angle) * swing + (std::sin(angle) * swing - flown) / kReturn_s;
 }
 
 /// Sent anew where it was cut: of two sent at one time the later counts.

@@ -75,6 +75,14 @@ protected:
   void sent(const Eigen::Vector4d &velocity, const FrameReport &report) override;
 
 private:
+  /// To and fro about where it began.
+  struct Sway
+  {
+    double start_s = 0;
+    double azimuth = 0; ///< of the drone about the target, world [rad]
+    double height = 0;  ///< world [m]
+  };
+
   TaskCommand search(const FrameReport &report, double time_s);
   int choose(const FrameReport &report, double elapsed_s) const;
   int successor(const FrameReport &report) const;
@@ -82,7 +90,7 @@ private:
   std::optional<Eigen::Vector4d> flownTo(const Pose &wMb);
   void forgetFeature();
   void desire(double radius);
-  Eigen::Vector2d swayNow(double time_s);
+  Eigen::Vector2d swayNow(double time_s, const Eigen::Vector3d &place);
   bool isFree(int target, const std::vector<Obstacle> &around, const Pose &wMb, double speed) const;
   void filter(const vpFeatureTrunk &feature, double time_s, const std::optional<Eigen::Vector4d> &flown);
   Eigen::Vector2d lead(const vpFeatureTrunk &feature, double radius, double time_s, double round);
@@ -106,7 +114,7 @@ private:
   int m_misread = 0;                  ///< frames in a row
   double m_turned_back = 1;           ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;                  ///< frames in a row
-  double m_sway_start_s = -1;         ///< -1: has not begun
+  std::optional<Sway> m_sway;         ///< none before it has begun
   bool m_has_feature = false;
 };
 } // namespace bole
