@@ -120,6 +120,34 @@ TEST(Perception, ByTruthADroneHoldsWithoutAnImage)
   EXPECT_EQ(pixels, 0);
 }
 
+TEST(Perception, InAWindItSwaysAboutOnePlace)
+{
+  constexpr double kSwing_s = 9.63; // there and back
+  ServoTrialOptions options = holdBy(PerceptionKind::truth);
+  options.loop.duration_s = 60;
+  options.robot.body.gust = 0.1;
+  options.robot.body.gust_time = 10;
+  std::vector<Eigen::Vector3d> sum;
+  std::vector<int> count;
+  double from_s = -1;
+  runServoTrial(options, [&](const Frame &, const FrameReport &, const LoopSample &sample) {
+    if (sample.phase != TaskPhase::servoing)
+      return true;
+    if (from_s < 0)
+      from_s = sample.time_s;
+    const auto swing = static_cast<std::size_t>((sample.time_s - from_s) / kSwing_s);
+    sum.resize(swing + 1, Eigen::Vector3d::Zero());
+    count.resize(swing + 1);
+    sum[swing] += sample.truth.t;
+    ++count[swing];
+    return true;
+  });
+  ASSERT_GE(sum.size(), 6u);
+  const Eigen::Vector3d first = sum[1] / count[1]; // after the way there
+  for (std::size_t i = 2; i < 6; ++i)
+    EXPECT_LT((sum[i] / count[i] - first).norm(), 0.3) << i << ": .8 where nothing brings it back";
+}
+
 TEST(Perception, ByTheTrueMapTheImagesSayWhereTheDroneIs)
 {
   double worst = 0, odometry = 0;
