@@ -45,13 +45,13 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
          (trunk.column_views == 0 || trunk.column_odds >= m_options.final_odds);
 }
 
-namespace
-{
 double distanceBetween(const Trunk &a, const Trunk &b)
 {
   return (a.axisAt(kBreastHeight) - b.axisAt(kBreastHeight)).head<2>().norm();
 }
 
+namespace
+{
 /// Two trunks of one place and one radius: the same hypothesis about the same lines.
 bool isSameHypothesis(const Trunk &a, const Trunk &b)
 {

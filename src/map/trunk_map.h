@@ -25,6 +25,9 @@
 
 namespace bole
 {
+/// Of the axes of two trunks at breast height [m].
+double distanceBetween(const Trunk &a, const Trunk &b);
+
 /// What a map keeps of its hypotheses; of the rest it keeps a record.
 enum class Memory
 {

@@ -51,8 +51,7 @@ std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
 /// Found again in another frame: on the same bark, and as thick but for a quarter.
 bool isSameReading(const Trunk &a, const Trunk &b)
 {
-  return (a.axisAt(kBreastHeight) - b.axisAt(kBreastHeight)).head<2>().norm() < std::min(a.radius(), b.radius()) &&
-         std::abs(a.log_radius - b.log_radius) < 0.25;
+  return distanceBetween(a, b) < std::min(a.radius(), b.radius()) && std::abs(a.log_radius - b.log_radius) < 0.25;
 }
 
 bool isDropped(SummaryStatus status)

@@ -223,9 +223,7 @@ std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double a
   std::vector<Judged> chosen;
   for (const Judged &one : judged)
     if (std::none_of(chosen.begin(), chosen.end(), [&](const Judged &better) {
-          const double between =
-              (one.trunk.axisAt(kBreastHeight) - better.trunk.axisAt(kBreastHeight)).head<2>().norm();
-          return between < one.trunk.radius() + better.trunk.radius() + apart ||
+          return distanceBetween(one.trunk, better.trunk) < one.trunk.radius() + better.trunk.radius() + apart ||
                  fillSameColumns(one.trunk, better.trunk, views, farthest);
         }))
       chosen.push_back(one);
