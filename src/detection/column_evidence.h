@@ -52,6 +52,9 @@ struct ColumnEvidence
                                             ///< stands there, and the border is one of something behind
 
   double leastBeside() const { return std::min(left, right); }
+  /// Of the border that is the least that of the silhouette: above 0 where the trunk stands inside, the background
+  /// outside of both.
+  double weakestBorder() const { return std::min({left, right, -inside_left, -inside_right}); }
 };
 
 /// Ranges that are tried, over that of the trunk.

@@ -3,6 +3,9 @@
 // those of the silhouette.
 #include "pipeline/engine.h"
 
+#include <algorithm>
+#include <limits>
+
 namespace bole
 {
 namespace
@@ -37,6 +40,7 @@ void Engine::leaveLinesOnBark(std::vector<PredictedTrunk> &predicted) const
 /// the silhouette.
 void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)
 {
+  constexpr double kBeside = 0.12; // least difference beside a border that is not asked again: of most it is .3 to 1.5
   const LevelImage *level =
       m_columns.add(frame.image, newest(), view, m_units.flow.view_spacing, m_units.detection.profile.range);
   if (!level)
@@ -58,10 +62,11 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
     m_map.record(
         ColumnOdds{trunk.id, judgedBy(*evidence, hypothesis).log_odds, evidence->views, evidence->leastBeside()});
-    if (!m_columns.mayReadAgain(trunk.id) || !(goesOnBeside(*evidence) || isBehind(*evidence)))
+    const bool is_doubtful = m_units.flow.leave_bark ? evidence->leastBeside() < kBeside : goesOnBeside(*evidence);
+    if (!m_columns.mayReadAgain(trunk.id) || !(is_doubtful || isBehind(*evidence)))
       continue;
-    const double worst = std::min({evidence->left, evidence->right, -evidence->inside_left, -evidence->inside_right});
-    if (worst < least) {
+    const double worst = evidence->weakestBorder();
+    if (!doubtful || worst < least) {
       doubtful = hypothesis;
       least = worst;
     }
@@ -71,11 +76,15 @@ void Engine::lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &
     readAnew(*doubtful, views, view);
 }
 
-/// A reading of \p doubtful between other borders takes its place where the columns speak for it.
+/// A reading of \p doubtful between other borders takes its place where the columns speak for it: to steer by, where
+/// they are rather those of the silhouette, also by a pixel.
 void Engine::readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view)
 {
+  constexpr double kBetter = 0.05; // of the score
+  const bool is_steered_by = m_units.flow.leave_bark;
+  const double outside_px = is_steered_by ? 1 : std::numeric_limits<double>::infinity();
   m_columns.noteReading(doubtful.id);
-  const auto doubt = doubtBorders(doubtful, views, farthestJudged(), m_units.detection.radius_max);
+  const auto doubt = doubtBorders(doubtful, views, farthestJudged(), m_units.detection.radius_max, outside_px);
   if (!doubt)
     return;
   const auto before = judge(doubtful, views, farthestJudged()); // where it stands now
@@ -85,7 +94,10 @@ void Engine::readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &
   if (static_cast<int>(other.views.size()) < kLeastViews)
     return;
   const auto judged = judge({doubtful.id, other.trunk.trunk, doubtful.online}, views, farthestJudged());
-  if (!judged || !isSilhouetteOf(*judged, *before, *doubt, views, farthestJudged()))
+  if (!judged)
+    return;
+  if (is_steered_by ? silhouetteScore(*judged) < silhouetteScore(*before) + kBetter
+                    : !isSilhouetteOf(*judged, *before, *doubt, views, farthestJudged()))
     return;
   m_smoother.removeTrunk(m_map.readAgain(doubtful.id, hold(other)));
   m_columns.forget(doubtful.id);

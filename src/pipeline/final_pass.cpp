@@ -125,7 +125,7 @@ double oddsAgainst(const Trunk &trunk, const DepthBorders &borders)
 } // namespace
 
 std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::vector<LevelView> &views, double farthest,
-                                        double radius_max)
+                                        double radius_max, double outside_px)
 {
   constexpr double kSigma_px = 1; // of a border by depth
   // by which depth ends a trunk inside a border: more than of 19 in 20 that are read right; enough where the other is
@@ -139,7 +139,8 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
   std::array<double, 2> move{}; // outwards [m]
   for (std::size_t side = 0; side < beyond.size(); ++side)
     if (const double off = borders->likely[side] ? *borders->likely[side] - trunk.radius() : 0;
-        beyond[side] > 0 || -off / borders->px > (beyond[1 - side] > 0 ? kBeside_px : kInside_px))
+        beyond[side] > 0 || off > outside_px * borders->px ||
+        -off / borders->px > (beyond[1 - side] > 0 ? kBeside_px : kInside_px))
       move[side] = off;
   if (move[0] * move[1] < 0) { // beside the trunk: its width is known by more than these views
     move[0] = 0.5 * (move[0] - move[1]);
@@ -168,6 +169,12 @@ bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoub
   const auto borders = depthBorders(other.trunk, views, farthest);
   const double against = borders ? oddsAgainst(other.trunk, *borders) : 0;
   return other.log_odds - against > reading.log_odds - doubt.against + kSure;
+}
+
+double silhouetteScore(const Judged &reading)
+{
+  constexpr double kOdds = 0.3, kClear = 0.5; // weight of a log-odd; a border of more is clear enough
+  return kOdds * reading.log_odds + std::min(reading.evidence.weakestBorder(), kClear);
 }
 
 std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,

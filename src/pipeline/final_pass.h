@@ -12,6 +12,7 @@
 #include "pipeline/adoption.h"
 
 #include <deque>
+#include <limits>
 #include <vector>
 
 namespace bole
@@ -87,12 +88,17 @@ struct BorderDoubt
   double against = 0; ///< what depth says against the borders of the reading [log-odds]
 };
 /// None where the borders of \p reading are its ends, or the guess is wider than \p radius_max [m]. A reading beside
-/// its trunk is moved as wide as it is.
+/// its trunk is moved as wide as it is. \p outside_px: a trunk that likely goes on by more beyond a border is doubted,
+/// else one that surely does.
 std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::vector<LevelView> &views, double farthest,
-                                        double radius_max);
+                                        double radius_max, double outside_px = std::numeric_limits<double>::infinity());
 /// Whether depth speaks for \p other by more than it is less of a trunk than the \p reading in \p doubt.
 bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoubt &doubt,
                     const std::vector<LevelView> &views, double farthest);
+
+/// By which two readings of one trunk are compared in views from nearly one place: a narrow one lies on the bark all
+/// over and has the better odds to be a trunk, but its borders are not those of the silhouette.
+double silhouetteScore(const Judged &reading);
 
 /// Where the bark says that \p reading stands: nearer or farther along the lines of sight, as wide in the images as it
 /// is. None where it stands there, or would be thicker than \p radius_max [m].

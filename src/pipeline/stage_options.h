@@ -54,7 +54,8 @@ struct FlowOptions
   double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
   bool follow_bark = false;     ///< near trunks are followed by their bark from image to image
-  bool leave_bark = false;      ///< a border beside which the trunk goes on by its depth is not read
+  bool leave_bark = false;      ///< a border beside which the trunk goes on by its depth is not read, and looked for
+                                ///< beyond
   double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
   int turned_frames = 0; ///< borders whose contrast changed its sign are accepted after so many frames in a row at

@@ -95,6 +95,24 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   EXPECT_FALSE(isSilhouetteOf(narrow, narrow, *doubt, views, kFarthest));
 }
 
+/// A rim of light of less than two pixels is left out.
+TEST(FinalPass, ForSteeringAPixelBeyondABorderIsEnoughToLookThere)
+{
+  constexpr double kFarthest = 14, kRadiusMax = 0.38;
+  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
+  const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  const auto judged = judge({1, test::trunkOf(without_rim), 3}, views, kFarthest);
+  const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
+  ASSERT_TRUE(judged && right);
+  EXPECT_FALSE(doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax).has_value());
+  const auto doubt = doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax, 1);
+  ASSERT_TRUE(doubt.has_value());
+  EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.01);
+  EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.01);
+  EXPECT_LT(silhouetteScore(*judged) + 0.05, silhouetteScore(*right));
+}
+
 /// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
 TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
 {
