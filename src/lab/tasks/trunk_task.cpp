@@ -30,7 +30,7 @@ constexpr double kTurnedNoise = 0.002;     ///< and of its turn [rad]
 constexpr double kSwing = 0.69;    ///< to either side, where a distance is asked for [m]: 13 degrees of parallax at 3 m
 constexpr double kSwingUp = 0.38;  ///< above and below meanwhile [m]
 constexpr double kSwayShare = 0.9; ///< of SafetyOptions::unseen_speed, for nothing looks sideways; the rest is for drag
-constexpr double kReturn_s = 2;    ///< in which it returns to the way of the sway
+constexpr double kReturn_s = 4;    ///< in which it returns to the way of the sway
 constexpr double kPause_s = 0.25;  ///< without a command it hovered: what was sent before is over
 constexpr double kFirstDrift = 0.3;      ///< standard deviation of the velocity nobody ordered, at first [m/s]
 constexpr double kLargestDrift = 0.5;    ///< that is fed forward [m/s]
@@ -255,12 +255,15 @@ Eigen::Vector2d TrunkTask::swayNow(double time_s, const Eigen::Vector3d &place)
   const double azimuth = std::atan2(from_trunk.y(), from_trunk.x());
   if (!m_sway)
     m_sway = {time_s, azimuth, place.z()};
-  const double rate = kSwayShare * m_options.safety.unseen_speed / kSwing; // rad/s
+  const double fastest = kSwayShare * m_options.safety.unseen_speed;
+  const double rate = fastest / kSwing; // rad/s
   const double angle = rate * (time_s - m_sway->start_s);
   const Eigen::Vector2d swing(kSwing, kSwingUp);
   const Eigen::Vector2d flown(-from_trunk.norm() * std::remainder(azimuth - m_sway->azimuth, 2 * M_PI),
                               place.z() - m_sway->height);
-  return rate * std::cos(angle) * swing + (std::sin(angle) * swing - flown) / kReturn_s;
+  Eigen::Vector2d velocity = rate * std::cos(angle) * swing + (std::sin(angle) * swing - flown) / kReturn_s;
+  velocity.x() = std::clamp(velocity.x(), -fastest, fastest); // what is cut is not what the predictor knows
+  return velocity;
 }
 
 /// Sent anew where it was cut: of two sent at one time the later counts.

@@ -145,7 +145,7 @@ TEST(Perception, InAWindItSwaysAboutOnePlace)
   ASSERT_GE(sum.size(), 6u);
   const Eigen::Vector3d first = sum[1] / count[1]; // after the way there
   for (std::size_t i = 2; i < 6; ++i)
-    EXPECT_LT((sum[i] / count[i] - first).norm(), 0.3) << i << ": .8 where nothing brings it back";
+    EXPECT_LT((sum[i] / count[i] - first).norm(), 0.45) << i << ": .8 where nothing brings it back";
 }
 
 TEST(Perception, ByTheTrueMapTheImagesSayWhereTheDroneIs)
