@@ -167,6 +167,13 @@ std::size_t blockSize(FactorKind kind)
   return static_cast<std::size_t>(rowCount(kind)) * (columns + 1);
 }
 
+void Smoother::State::releaseBlock(Factor &factor)
+{
+  if (factor.linear != nullptr)
+    store.release(factor.linear, blockSize(factor.kind));
+  factor.linear = nullptr;
+}
+
 int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
 {
   Factor factor;
@@ -174,7 +181,6 @@ int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
   factor.data = data;
   factor.a = a;
   factor.b = b;
-  factor.linear = store.allocate(blockSize(kind));
   const int id = placeFactor(factor);
   variables[a].factors.push_back(id);
   touch(a);
@@ -212,12 +218,11 @@ void Smoother::State::dropFactor(int factor)
 void Smoother::State::freeDropped()
 {
   for (const int id : dropped_factors) {
-    const Factor &factor = factors[id];
+    Factor &factor = factors[id];
     free_data[static_cast<std::size_t>(factor.kind)].push_back(factor.data);
     if (factor.kind == FactorKind::image)
       images[factor.data].energy = nullptr;
-    if (factor.linear != nullptr)
-      store.release(factor.linear, blockSize(factor.kind));
+    releaseBlock(factor);
     free_factors.push_back(id);
   }
   dropped_factors.clear();
@@ -230,11 +235,11 @@ void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
 {
   if (!measured.aMb.isFinite())
     throw vpException(vpException::badValue, "odometry, must be finite");
-  const Matrix6d S = squareRootInformation<6>(measured.covariance, "odometry covariance");
+  squareRootInformation(measured);
   const int variable_a = poses[a].variable, variable_b = poses[b].variable;
   if (!isOpen(variable_a) || !isOpen(variable_b))
     return;
-  newFactor(FactorKind::odometry, placeData(odometry, FactorKind::odometry, {measured, S}), variable_a, variable_b);
+  newFactor(FactorKind::odometry, placeData(odometry, FactorKind::odometry, measured), variable_a, variable_b);
 }
 
 /// Opens the trunk, if need be, for what \p pose saw of it.

@@ -34,23 +34,25 @@ Smoother::State::inverseForm(const int *variable, const Eigen::Matrix<double, Co
     const Variable &v = variables[path[slot]];
     Rows y(path_rows[slot].data());
     const int rows = v.dim + v.separator_dim;
-    for (int c = 0; c < v.dim; ++c) {
-      const double *column = v.columns.data() + c * rows;
-      y.col(c) /= column[c];
-      for (int i = c + 1; i < v.dim; ++i)
-        y.col(i) -= column[i] * y.col(c);
-      form += y.col(c) * y.col(c).transpose();
-    }
-    int row = v.dim;
-    for (const int s : v.separator) {
-      Rows b(path_rows[position[s]].data());
-      for (int i = 0; i < variables[s].dim; ++i, ++row) {
-        Eigen::Matrix<double, Columns, 1> left = b.col(i);
-        for (int c = 0; c < v.dim; ++c)
-          left -= v.columns[static_cast<std::size_t>(c * rows + row)] * y.col(c);
-        b.col(i) = left;
+    withColumns(v, [&](const auto *columns) {
+      const auto L = [&](int r, int c) { return double(columns[c * rows + r]); };
+      for (int c = 0; c < v.dim; ++c) {
+        y.col(c) /= L(c, c);
+        for (int i = c + 1; i < v.dim; ++i)
+          y.col(i) -= L(i, c) * y.col(c);
+        form += y.col(c) * y.col(c).transpose();
       }
-    }
+      int row = v.dim;
+      for (const int s : v.separator) {
+        Rows b(path_rows[position[s]].data());
+        for (int i = 0; i < variables[s].dim; ++i, ++row) {
+          Eigen::Matrix<double, Columns, 1> left = b.col(i);
+          for (int c = 0; c < v.dim; ++c)
+            left -= L(row, c) * y.col(c);
+          b.col(i) = left;
+        }
+      }
+    });
   }
   for (const int v : path)
     position[v] = -1;

@@ -40,8 +40,10 @@ template <int Rows, int A> void addUnary(const double *linear, double *front, in
 
 } // namespace
 
-void Smoother::State::assemble(const Factor &factor)
+void Smoother::State::assemble(Factor &factor)
 {
+  if (factor.linear == nullptr && factor.kind != FactorKind::marginal)
+    linearise(factor);
   double *F = front.data();
   const int ld = front_rows;
   switch (factor.kind) {
@@ -182,6 +184,7 @@ void Smoother::State::eliminate(int id)
 
   // keep the columns of L, y, and the contribution
   const int rows = ld - 1;
+  std::vector<float>().swap(v.old_columns);
   v.columns.resize(static_cast<std::size_t>(rows) * v.dim);
   for (int c = 0; c < v.dim; ++c) {
     std::copy_n(front.data() + c * ld, rows, v.columns.data() + c * rows);
@@ -210,41 +213,42 @@ void Smoother::State::eliminate(int id)
 /// Fills \p rhs with y_v - L_sv^T delta_s, and returns how far delta_v is from the solution of
 /// L_vv^T delta_v = rhs, in standard deviations of v given its separator. Half its square is what
 /// the cost of the linearised graph would fall by if v alone were solved again.
-double Smoother::State::staleness(const Variable &v, double *rhs) const
+double Smoother::State::staleness(const Variable &v, double *rhs)
 {
   const int rows = v.dim + v.separator_dim;
-  std::copy_n(v.y.data(), v.dim, rhs);
-  int row = v.dim;
+  separator_delta.resize(std::max(separator_delta.size(), static_cast<std::size_t>(v.separator_dim) + 1));
+  double *to = separator_delta.data();
   for (const int id : v.separator) {
     const Variable &other = variables[id];
+    to = std::copy_n(other.delta.data(), other.dim, to);
+  }
+  return withColumns(v, [&](const auto *columns) {
+    for (int c = 0; c < v.dim; ++c)
+      rhs[c] = v.y[c] - product(columns + c * rows + v.dim, separator_delta.data(), v.separator_dim);
+    double squares = 0;
     for (int c = 0; c < v.dim; ++c) {
-      const double *column = v.columns.data() + c * rows + row;
-      for (int i = 0; i < other.dim; ++i)
-        rhs[c] -= column[i] * other.delta(i);
+      const auto *column = columns + c * rows;
+      double off = rhs[c];
+      for (int i = c; i < v.dim; ++i)
+        off -= column[i] * v.delta(i);
+      squares += off * off;
     }
-    row += other.dim;
-  }
-  double squares = 0;
-  for (int c = 0; c < v.dim; ++c) {
-    const double *column = v.columns.data() + c * rows;
-    double off = rhs[c];
-    for (int i = c; i < v.dim; ++i)
-      off -= column[i] * v.delta(i);
-    squares += off * off;
-  }
-  return std::sqrt(squares);
+    return std::sqrt(squares);
+  });
 }
 
 /// delta_v = L_vv^-T rhs; \p rhs is overwritten.
 void Smoother::State::solve(Variable &v, double *rhs)
 {
   const int rows = v.dim + v.separator_dim;
-  for (int c = v.dim - 1; c >= 0; --c) {
-    const double *column = v.columns.data() + c * rows;
-    for (int i = c + 1; i < v.dim; ++i)
-      rhs[c] -= column[i] * rhs[i];
-    rhs[c] /= column[c];
-  }
+  withColumns(v, [&](const auto *columns) {
+    for (int c = v.dim - 1; c >= 0; --c) {
+      const auto *column = columns + c * rows;
+      for (int i = c + 1; i < v.dim; ++i)
+        rhs[c] -= column[i] * rhs[i];
+      rhs[c] /= column[c];
+    }
+  });
   for (int c = 0; c < v.dim; ++c)
     v.delta(c) = rhs[c];
 }

@@ -31,13 +31,13 @@ Graph Smoother::State::graph() const
     const std::size_t a = place[factor.a], b = factor.b < 0 ? 0 : place[factor.b];
     switch (factor.kind) {
     case FactorKind::pose_prior:
-      graph.pose_priors.push_back({a, pose_priors[factor.data].factor});
+      graph.pose_priors.push_back({a, pose_priors[factor.data]});
       break;
     case FactorKind::odometry:
-      graph.odometry.push_back({a, b, odometry[factor.data].factor});
+      graph.odometry.push_back({a, b, odometry[factor.data]});
       break;
     case FactorKind::relative_pose:
-      graph.relative_poses.push_back({a, b, relative_poses[factor.data].factor});
+      graph.relative_poses.push_back({a, b, relative_poses[factor.data]});
       break;
     case FactorKind::observation:
       graph.observations.push_back({a, b, observations[factor.data].factor()});
@@ -55,11 +55,11 @@ std::size_t Smoother::State::memoryBytes() const
   std::size_t bytes = store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
                       poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
                       closed_covariances.size() * sizeof(Matrix6d) + observations.size() * sizeof(SquareRootSummary) +
-                      odometry.size() * sizeof(OdometryData) + relative_poses.size() * sizeof(RelativePoseData) +
-                      pose_priors.size() * sizeof(PosePriorData);
+                      odometry.size() * sizeof(Odometry) + relative_poses.size() * sizeof(RelativePoseMeasurement) +
+                      pose_priors.size() * sizeof(PosePrior);
   for (const Variable &v : variables)
     bytes +=
-        (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) +
+        (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) + v.old_columns.capacity() * sizeof(float) +
         (v.factors.capacity() + v.children.capacity() + v.separator.capacity() + v.assembled.capacity()) * sizeof(int);
   for (const MarginalData &data : marginals)
     bytes += sizeof(MarginalData) + static_cast<std::size_t>(data.H.size() + 2 * data.g.size()) * sizeof(double);

@@ -20,6 +20,18 @@ using Matrix56d = Eigen::Matrix<double, 5, 6>;
 /// naming \p name when \p covariance is not finite, symmetric and positive definite.
 template <int N>
 Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N, N> &covariance, const char *name);
+inline Matrix6d squareRootInformation(const PosePrior &prior)
+{
+  return squareRootInformation<6>(prior.covariance, "pose prior covariance");
+}
+inline Matrix6d squareRootInformation(const Odometry &odometry)
+{
+  return squareRootInformation<6>(odometry.covariance, "odometry covariance");
+}
+inline Matrix5d squareRootInformation(const RelativePoseMeasurement &measurement)
+{
+  return squareRootInformation<5>(measurement.covariance, "relative pose covariance");
+}
 
 /// Residuals. \p S is the square root information; Jacobians may be null.
 Vector6d residual(const PosePrior &prior, const Matrix6d &S, const Pose &wMb, Matrix6d *J);

@@ -60,6 +60,26 @@ BOLE_VECTOR_CLONES
 void subtractProductsOf6(double *front, int ld) { subtractProducts<6>(front, ld); }
 } // namespace
 
+BOLE_VECTOR_CLONES
+double product(const double *a, const double *b, int count)
+{
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < count; ++i)
+    sum += a[i] * b[i];
+  return sum;
+}
+
+BOLE_VECTOR_CLONES
+double product(const float *a, const double *b, int count)
+{
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < count; ++i)
+    sum += a[i] * b[i];
+  return sum;
+}
+
 int factorFront(double *front, int ld, int columns)
 {
   const int held = factorColumns(front, ld, columns);

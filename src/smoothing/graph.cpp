@@ -12,15 +12,15 @@ double cost(const Graph &graph)
   double sum = 0;
   const auto pose = [&](std::size_t i) -> const Pose & { return graph.poses[i].wMb; };
   for (const Graph::PosePriorEdge &edge : graph.pose_priors) {
-    const Matrix6d S = squareRootInformation<6>(edge.prior.covariance, "pose prior covariance");
+    const Matrix6d S = squareRootInformation(edge.prior);
     sum += 0.5 * residual(edge.prior, S, pose(edge.pose), nullptr).squaredNorm();
   }
   for (const Graph::OdometryEdge &edge : graph.odometry) {
-    const Matrix6d S = squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
+    const Matrix6d S = squareRootInformation(edge.odometry);
     sum += 0.5 * residual(edge.odometry, S, pose(edge.a), pose(edge.b), nullptr, nullptr).squaredNorm();
   }
   for (const Graph::RelativePoseEdge &edge : graph.relative_poses) {
-    const Matrix5d S = squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
+    const Matrix5d S = squareRootInformation(edge.measurement);
     const Vector5d r = residual(edge.measurement, S, graph.bMc, pose(edge.a), pose(edge.b), nullptr, nullptr);
     sum += 0.5 * graph.direction_loss.rho(r.squaredNorm());
   }
@@ -99,7 +99,7 @@ void validate(const Graph &graph)
       fail("pose prior", i, "must name a pose");
     if (!edge.prior.mean.isFinite())
       fail("pose prior", i, "must be finite");
-    squareRootInformation<6>(edge.prior.covariance, "pose prior covariance");
+    squareRootInformation(edge.prior);
   }
   for (std::size_t i = 0; i < graph.odometry.size(); ++i) {
     const Graph::OdometryEdge &edge = graph.odometry[i];
@@ -107,7 +107,7 @@ void validate(const Graph &graph)
       fail("odometry", i, "must name two poses");
     if (!edge.odometry.aMb.isFinite())
       fail("odometry", i, "must be finite");
-    squareRootInformation<6>(edge.odometry.covariance, "odometry covariance");
+    squareRootInformation(edge.odometry);
   }
   for (std::size_t i = 0; i < graph.relative_poses.size(); ++i) {
     const Graph::RelativePoseEdge &edge = graph.relative_poses[i];
@@ -115,7 +115,7 @@ void validate(const Graph &graph)
       fail("relative pose", i, "must name two poses");
     if (!edge.measurement.caRcb.allFinite() || !(std::abs(edge.measurement.direction.norm() - 1) < 1e-6))
       fail("relative pose", i, "must be finite with a direction of length 1");
-    squareRootInformation<5>(edge.measurement.covariance, "relative pose covariance");
+    squareRootInformation(edge.measurement);
   }
   for (std::size_t i = 0; i < graph.observations.size(); ++i) {
     const Graph::ObservationEdge &edge = graph.observations[i];

@@ -44,26 +44,29 @@ void Smoother::State::linearise(Factor &factor)
 {
   if (!factor.stale)
     constant_cost -= factor.cost;
+  if (factor.linear == nullptr && factor.kind != FactorKind::marginal)
+    factor.linear = store.allocate(blockSize(factor.kind));
   const auto pose = [this](int v) -> const Pose & { return poses[variables[v].number].point; };
   switch (factor.kind) {
   case FactorKind::pose_prior: {
     Matrix6d J;
-    const PosePriorData &data = pose_priors[factor.data];
-    const Vector6d r = residual(data.factor, data.S, pose(factor.a), &J);
+    const PosePrior &data = pose_priors[factor.data];
+    const Vector6d r = residual(data, squareRootInformation(data), pose(factor.a), &J);
     factor.cost = store1<6, 6>(J, r, factor.linear);
     break;
   }
   case FactorKind::odometry: {
     Matrix6d J_a, J_b;
-    const OdometryData &data = odometry[factor.data];
-    const Vector6d r = residual(data.factor, data.S, pose(factor.a), pose(factor.b), &J_a, &J_b);
+    const Odometry &data = odometry[factor.data];
+    const Vector6d r = residual(data, squareRootInformation(data), pose(factor.a), pose(factor.b), &J_a, &J_b);
     factor.cost = store2<6, 6, 6>(Loss(), J_a, J_b, r, factor.linear);
     break;
   }
   case FactorKind::relative_pose: {
     Matrix56d J_a, J_b;
-    const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), &J_a, &J_b);
+    const RelativePoseMeasurement &data = relative_poses[factor.data];
+    const Vector5d r =
+        residual(data, squareRootInformation(data), options.bMc, pose(factor.a), pose(factor.b), &J_a, &J_b);
     factor.cost = store2<5, 6, 6>(options.direction_loss, J_a, J_b, r, factor.linear);
     break;
   }
@@ -113,16 +116,18 @@ double Smoother::State::costAtEstimate(const Factor &factor) const
   const auto pose = [this](int v) { return estimate(poses[variables[v].number]); };
   switch (factor.kind) {
   case FactorKind::pose_prior: {
-    const PosePriorData &data = pose_priors[factor.data];
-    return 0.5 * residual(data.factor, data.S, pose(factor.a), nullptr).squaredNorm();
+    const PosePrior &data = pose_priors[factor.data];
+    return 0.5 * residual(data, squareRootInformation(data), pose(factor.a), nullptr).squaredNorm();
   }
   case FactorKind::odometry: {
-    const OdometryData &data = odometry[factor.data];
-    return 0.5 * residual(data.factor, data.S, pose(factor.a), pose(factor.b), nullptr, nullptr).squaredNorm();
+    const Odometry &data = odometry[factor.data];
+    return 0.5 *
+           residual(data, squareRootInformation(data), pose(factor.a), pose(factor.b), nullptr, nullptr).squaredNorm();
   }
   case FactorKind::relative_pose: {
-    const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r = residual(data.factor, data.S, options.bMc, pose(factor.a), pose(factor.b), nullptr, nullptr);
+    const RelativePoseMeasurement &data = relative_poses[factor.data];
+    const Vector5d r =
+        residual(data, squareRootInformation(data), options.bMc, pose(factor.a), pose(factor.b), nullptr, nullptr);
     return 0.5 * options.direction_loss.rho(r.squaredNorm());
   }
   case FactorKind::observation: {

@@ -58,6 +58,7 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   UpdateResult result;
   held_directions = 0;
   damping = 0;
+  is_optimizing = true;
   double before = costAtEstimate();
   bool settled = false;
   relineariseAll();
@@ -79,6 +80,10 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   }
   damping = 0; // the factorisation left behind is that of the graph itself
   solveAll(result);
+  is_optimizing = false;
+  for (Variable &v : variables)
+    if (v.eliminated)
+      releaseOld(v);
   const double after = costAtEstimate();
   if (!(after <= before))
     for (Variable &v : variables)

@@ -14,8 +14,11 @@ constexpr std::size_t kFactorsProbed = 6; ///< of a trunk, newest to oldest, for
 } // namespace
 
 /// Whitened residual that the linearisation predicts at the estimates.
-Vector6d Smoother::State::linearPrediction(const Factor &factor) const
+Vector6d Smoother::State::linearPrediction(Factor &factor)
 {
+  const bool is_old = factor.linear == nullptr;
+  if (is_old)
+    linearise(factor);
   const int rows = rowCount(factor.kind);
   Vector6d r = Vector6d::Zero();
   const double *column = factor.linear;
@@ -28,6 +31,8 @@ Vector6d Smoother::State::linearPrediction(const Factor &factor) const
   }
   for (int i = 0; i < rows; ++i)
     r(i) -= column[i];
+  if (is_old)
+    releaseBlock(factor);
   return r;
 }
 
@@ -60,7 +65,7 @@ double modelError(const Loss &loss, double cost, const Eigen::Matrix<double, N, 
 } // namespace
 
 /// How far, in standard deviations, the true residual at the estimates is from its linear model.
-double Smoother::State::linearisationError(const Factor &factor) const
+double Smoother::State::linearisationError(Factor &factor)
 {
   if (factor.stale)
     return 0;
@@ -70,15 +75,16 @@ double Smoother::State::linearisationError(const Factor &factor) const
     return modelError<4>(options.summary_loss, factor.cost, r, linearPrediction(factor).head<4>());
   }
   if (factor.kind == FactorKind::odometry) {
-    const OdometryData &data = odometry[factor.data];
-    const Vector6d r = residual(data.factor, data.S, estimate(poses[variables[factor.a].number]),
+    const Odometry &data = odometry[factor.data];
+    const Vector6d r = residual(data, squareRootInformation(data), estimate(poses[variables[factor.a].number]),
                                 estimate(poses[variables[factor.b].number]), nullptr, nullptr);
     return (r - linearPrediction(factor)).norm();
   }
   if (factor.kind == FactorKind::relative_pose) {
-    const RelativePoseData &data = relative_poses[factor.data];
-    const Vector5d r = residual(data.factor, data.S, options.bMc, estimate(poses[variables[factor.a].number]),
-                                estimate(poses[variables[factor.b].number]), nullptr, nullptr);
+    const RelativePoseMeasurement &data = relative_poses[factor.data];
+    const Vector5d r =
+        residual(data, squareRootInformation(data), options.bMc, estimate(poses[variables[factor.a].number]),
+                 estimate(poses[variables[factor.b].number]), nullptr, nullptr);
     return modelError<5>(options.direction_loss, factor.cost, r, linearPrediction(factor).head<5>());
   }
   return 0;
@@ -130,7 +136,7 @@ void Smoother::State::rememberProbe(Variable &variable) const
 
 /// Probes the factors only where the estimate has moved on since they were last found good. Pose
 /// priors are linear enough never to ask for more than their pose's own factors do.
-bool Smoother::State::movedTooFar(Variable &variable) const
+bool Smoother::State::movedTooFar(Variable &variable)
 {
   if (inThresholds(variable, ownStep(variable)) <= 1)
     return false;
@@ -147,7 +153,7 @@ bool Smoother::State::movedTooFar(Variable &variable) const
   const std::size_t count = variable.factors.size();
   const std::size_t every = variable.is_pose ? 1 : std::max<std::size_t>(1, count / kFactorsProbed);
   for (std::size_t i = 0; i < count; i += every) {
-    const Factor &factor = factors[variable.factors[count - 1 - i]];
+    Factor &factor = factors[variable.factors[count - 1 - i]];
     if (isWhole(factor) && linearisationError(factor) > options.linearisation_tolerance)
       return true;
   }

@@ -138,9 +138,8 @@ void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseM
           "relative pose, must be finite with a direction of length 1");
   if (!m_state->isOpen(variable_a) || !m_state->isOpen(variable_b))
     return;
-  const int data =
-      m_state->placeData(m_state->relative_poses, FactorKind::relative_pose,
-                         {measurement, squareRootInformation<5>(measurement.covariance, "relative pose covariance")});
+  squareRootInformation(measurement);
+  const int data = m_state->placeData(m_state->relative_poses, FactorKind::relative_pose, measurement);
   m_state->newFactor(FactorKind::relative_pose, data, variable_a, variable_b);
 }
 
@@ -157,8 +156,8 @@ void Smoother::addPosePrior(std::size_t pose, const PosePrior &prior)
   m_state->checkPose(pose);
   require(m_state->isOpen(m_state->poses[pose].variable), "pose, must be inside the lag");
   require(prior.mean.isFinite(), "pose prior, must be finite");
-  const int data = m_state->placeData(m_state->pose_priors, FactorKind::pose_prior,
-                                      {prior, squareRootInformation<6>(prior.covariance, "pose prior covariance")});
+  squareRootInformation(prior);
+  const int data = m_state->placeData(m_state->pose_priors, FactorKind::pose_prior, prior);
   m_state->newFactor(FactorKind::pose_prior, data, m_state->poses[pose].variable, -1);
 }
 

@@ -63,6 +63,7 @@ struct Variable
   std::int64_t order = -1;
   std::vector<int> children, separator, assembled;
   std::vector<double> columns;      ///< (dim + separator_dim) x dim, column-major: L_vv over L_sv
+  std::vector<float> old_columns;   ///< in their place where the variable is old: half the memory to read and to keep
   std::vector<double> contribution; ///< packed lower triangle on the separator, then its right-hand side
   std::array<double, 6> y{};
   double share = 0; ///< of the cost of the linearised graph
@@ -86,7 +87,7 @@ struct Factor
   int data = 0;             ///< index among the data of its kind
   int a = -1, b = -1;       ///< variables (marginal: see its data)
   int assembled_at = -1;    ///< variable whose front takes it in
-  double *linear = nullptr; ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual
+  double *linear = nullptr; ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual; old: null
   double cost = 0;          ///< rho / 2 at the point of linearisation
 };
 
@@ -95,21 +96,6 @@ int rowCount(FactorKind kind);
 /// Doubles of its linearisation (not of a marginal).
 std::size_t blockSize(FactorKind kind);
 
-struct PosePriorData
-{
-  PosePrior factor;
-  Matrix6d S;
-};
-struct OdometryData
-{
-  Odometry factor;
-  Matrix6d S;
-};
-struct RelativePoseData
-{
-  RelativePoseMeasurement factor;
-  Matrix5d S;
-};
 struct ImageData
 {
   ImageEnergy energy;
@@ -159,9 +145,9 @@ public:
   std::deque<TrunkState> trunks;
   std::vector<Matrix6d> closed_covariances; ///< of every kCovarianceEvery-th closed pose
   std::deque<Factor> factors;
-  std::deque<PosePriorData> pose_priors;
-  std::deque<OdometryData> odometry;
-  std::deque<RelativePoseData> relative_poses;
+  std::deque<PosePrior> pose_priors;
+  std::deque<Odometry> odometry;
+  std::deque<RelativePoseMeasurement> relative_poses;
   std::deque<SquareRootSummary> observations;
   std::deque<MarginalData> marginals;
   std::deque<ImageData> images;
@@ -175,6 +161,7 @@ public:
   int newFactor(FactorKind kind, int data, int a, int b);
   int placeFactor(const Factor &factor);
   template <typename Data> int placeData(std::deque<Data> &list, FactorKind kind, Data data);
+  void releaseBlock(Factor &factor);
   void dropFactor(int factor);
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
@@ -198,20 +185,20 @@ public:
   Eigen::Vector3d ownDisplacement(const Variable &variable) const;
   Vector6d ownStep(const Variable &variable) const;
   void rememberProbe(Variable &variable) const;
-  bool movedTooFar(Variable &variable) const;
+  bool movedTooFar(Variable &variable);
   double inThresholds(const Variable &variable, const Vector6d &step) const;
   bool isInside(const Variable &variable) const;
-  double linearisationError(const Factor &factor) const;
-  Vector6d linearPrediction(const Factor &factor) const;
+  double linearisationError(Factor &factor);
+  Vector6d linearPrediction(Factor &factor);
   Pose estimate(const PoseState &pose) const;
   Trunk estimate(const TrunkState &trunk) const;
   Vector5d limitedTrunkStep(const TrunkState &trunk, const Vector5d &delta) const;
 
   // elimination.cpp
   void eliminate(int variable);
-  void assemble(const Factor &factor);
+  void assemble(Factor &factor);
   void assembleChild(const Variable &child);
-  double staleness(const Variable &variable, double *rhs) const;
+  double staleness(const Variable &variable, double *rhs);
   void solve(Variable &variable, double *rhs);
 
   // update.cpp
@@ -230,7 +217,7 @@ public:
   int reachBack(const Variable &variable) const;
   void moveLinearisation(UpdateResult &result);
   Eigen::Vector3d shiftBeyondAffected() const;
-  void dropContribution(Variable &v);
+  void releaseOld(Variable &v);
 
   // lag.cpp
   void closeBehindLag();
@@ -263,7 +250,8 @@ public:
   std::size_t memoryBytes() const;
 
   // work space
-  double damping = 0; ///< Levenberg's, added to the diagonal scaled by damping_scale
+  bool is_optimizing = false; ///< the batch optimum is wanted to the last digit
+  double damping = 0;         ///< Levenberg's, added to the diagonal scaled by damping_scale
   std::vector<Vector6d> damping_scale;
   double constant_cost = 0;
   struct Descent
@@ -276,7 +264,7 @@ public:
   std::array<std::vector<int>, 7> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
   std::vector<Descent> stack;
-  std::vector<double> front;
+  std::vector<double> front, separator_delta;
   std::vector<int> position, child_map; ///< of a variable in the front
   std::vector<int> child_run;           ///< where the rows end that stand together in the front
   std::vector<std::array<double, 36>> path_rows;
@@ -290,6 +278,12 @@ public:
   int oldest_open_pose = 0;
   BlockStore store;
 };
+/// What \p use makes of the columns of L that belong to \p v.
+template <typename Use> auto withColumns(const Variable &v, Use &&use)
+{
+  return v.old_columns.empty() ? use(v.columns.data()) : use(v.old_columns.data());
+}
+
 /// Where one was freed, or at the end.
 template <typename Data> int Smoother::State::placeData(std::deque<Data> &list, FactorKind kind, Data data)
 {

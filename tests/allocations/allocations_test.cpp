@@ -111,7 +111,7 @@ TEST(Memory, ALiveFlightKeepsTheGraphOfItsViews)
 {
   const double kept = keptAFrame(0, 4);
   RecordProperty("bytes_a_frame", std::to_string(kept));
-  EXPECT_LT(kept, 46e3); // 43.6e3 now
+  EXPECT_LT(kept, 15e3); // 14.1e3 now
   EXPECT_GT(kept, 1e3);  // else nothing was counted
 }
 
