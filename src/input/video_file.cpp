@@ -273,7 +273,10 @@ std::int64_t VideoFile::stampOf(std::int64_t pts)
       m_first_pts = pts;
       m_has_first = true;
     }
-    stamp_ns = av_rescale_q(pts - m_first_pts, stream.time_base, nanoseconds);
+    constexpr double kLongest_s = 1e8; // three years: a time beyond it is damaged, and the rate goes on
+    const double after_s = (static_cast<double>(pts) - static_cast<double>(m_first_pts)) * av_q2d(stream.time_base);
+    if (std::abs(after_s) <= kLongest_s)
+      stamp_ns = av_rescale_q(pts - m_first_pts, stream.time_base, nanoseconds);
   }
   if (stamp_ns <= m_last_stamp_ns)
     stamp_ns = m_last_stamp_ns + 1; // a file whose times go back: keep the order of presentation

@@ -300,6 +300,17 @@ TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHas)
   EXPECT_THAT(messageOf([&] { readTrajectory(path("poses.tum")); }), HasSubstr("stamps must be in seconds"));
 }
 
+/// Differences of stamps are taken everywhere, and have to fit.
+TEST_F(Sources, RefusesStampsThatNoClockHas)
+{
+  std::ofstream(path("poses.csv")) << "-9223372036854775808,0,0,1,1,0,0,0\n350000000,0,0,1,1,0,0,0\n";
+  std::ofstream(path("poses.tum")) << "-9223372036854775808 0 0 1 0 0 0 1\n";
+  std::ofstream(path("powers.tum")) << "1e300 0 0 1 0 0 0 1\n";
+  for (const char *name : {"poses.csv", "poses.tum", "powers.tum"})
+    EXPECT_THAT(messageOf([&] { readTrajectory(path(name)); }),
+                testing::AllOf(HasSubstr(name), HasSubstr("must be at most 4e+09 s from the epoch")));
+}
+
 TEST(Trajectory, InterpolatesOnSe3)
 {
   const Pose a(expSo3({0.1, 0.2, 0.3}), {1, 2, 3}), b(expSo3({0.4, -0.2, 1.3}), {2, 2, 5});
