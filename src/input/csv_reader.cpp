@@ -58,10 +58,12 @@ std::string shownField(std::string_view text)
   return text.size() > kLongest ? shown + "..." : shown;
 }
 
+constexpr std::int64_t kFarthest_s = 4'000'000'000; ///< of a stamp from the epoch: in ns differences fit as well
+constexpr std::int64_t kFarthest_ns = kFarthest_s * 1'000'000'000;
+
 /// Seconds in decimal notation as nanoseconds, without a detour through floating point.
 bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
 {
-  constexpr std::int64_t kMost_s = 9'000'000'000;
   const auto point = text.find('.');
   const std::string_view whole = text.substr(0, point);
   std::string fraction(point == std::string_view::npos ? "" : text.substr(point + 1));
@@ -70,7 +72,7 @@ bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
   fraction = (fraction + "000000000").substr(0, 9);
   std::int64_t seconds = 0, nanoseconds = 0;
   const auto end = whole.data() + whole.size();
-  if (std::from_chars(whole.data(), end, seconds).ptr != end || seconds < -kMost_s || seconds > kMost_s)
+  if (std::from_chars(whole.data(), end, seconds).ptr != end || seconds < -kFarthest_s || seconds > kFarthest_s)
     return false;
   std::from_chars(fraction.data(), fraction.data() + fraction.size(), nanoseconds);
   stamp_ns = seconds * 1'000'000'000 + (whole.front() == '-' ? -nanoseconds : nanoseconds);
@@ -172,10 +174,9 @@ std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
 
 std::int64_t CsvReader::rising(std::int64_t stamp_ns)
 {
-  constexpr std::int64_t kFarthest_ns = 4'000'000'000'000'000'000; // 126 years from the epoch; differences fit as well
   if (stamp_ns < -kFarthest_ns || stamp_ns > kFarthest_ns)
     fail(fmt::format("timestamp = {:.3g} s, must be at most {:g} s from the epoch", 1e-9 * double(stamp_ns),
-                     1e-9 * double(kFarthest_ns)));
+                     double(kFarthest_s)));
   if (m_rows > 1 && stamp_ns <= m_last_stamp_ns)
     fail(fmt::format("timestamp = {} ns, must be later than the {} ns of the row before", stamp_ns, m_last_stamp_ns));
   m_last_stamp_ns = stamp_ns;

@@ -216,7 +216,7 @@ void Smoother::State::eliminate(int id)
 double Smoother::State::staleness(const Variable &v, double *rhs)
 {
   const int rows = v.dim + v.separator_dim;
-  separator_delta.resize(std::max(separator_delta.size(), static_cast<std::size_t>(v.separator_dim) + 1));
+  separator_delta.resize(std::max(separator_delta.size(), static_cast<std::size_t>(v.separator_dim)));
   double *to = separator_delta.data();
   for (const int id : v.separator) {
     const Variable &other = variables[id];

@@ -58,27 +58,23 @@ void subtractProductsOf5(double *front, int ld) { subtractProducts<5>(front, ld)
 
 BOLE_VECTOR_CLONES
 void subtractProductsOf6(double *front, int ld) { subtractProducts<6>(front, ld); }
+
+template <typename Number>
+[[gnu::always_inline]] inline double sumOfProducts(const Number *a, const double *b, int count)
+{
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < count; ++i)
+    sum += a[i] * b[i];
+  return sum;
+}
 } // namespace
 
 BOLE_VECTOR_CLONES
-double product(const double *a, const double *b, int count)
-{
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < count; ++i)
-    sum += a[i] * b[i];
-  return sum;
-}
+double product(const double *a, const double *b, int count) { return sumOfProducts(a, b, count); }
 
 BOLE_VECTOR_CLONES
-double product(const float *a, const double *b, int count)
-{
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < count; ++i)
-    sum += a[i] * b[i];
-  return sum;
-}
+double product(const float *a, const double *b, int count) { return sumOfProducts(a, b, count); }
 
 int factorFront(double *front, int ld, int columns)
 {

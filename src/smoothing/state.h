@@ -278,6 +278,7 @@ public:
   int oldest_open_pose = 0;
   BlockStore store;
 };
+
 /// What \p use makes of the columns of L that belong to \p v.
 template <typename Use> auto withColumns(const Variable &v, Use &&use)
 {
