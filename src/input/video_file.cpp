@@ -264,9 +264,8 @@ std::int64_t VideoFile::stampOf(std::int64_t pts)
 {
   const AVStream &stream = *m_libav->format->streams[m_libav->stream];
   const AVRational nanoseconds{1, 1'000'000'000};
-  const double rate = av_q2d(stream.avg_frame_rate);
-  const std::int64_t after_last =
-      m_last_stamp_ns < 0 ? 0 : m_last_stamp_ns + std::llround(1e9 / (rate > 0 ? rate : 25));
+  const double said_hz = av_q2d(stream.avg_frame_rate), rate_hz = said_hz > 1e-3 && said_hz < 1e6 ? said_hz : 25;
+  const std::int64_t after_last = m_last_stamp_ns < 0 ? 0 : m_last_stamp_ns + std::llround(1e9 / rate_hz);
   std::int64_t stamp_ns = after_last;
   if (pts != AV_NOPTS_VALUE) {
     if (!m_has_first) {

@@ -202,6 +202,25 @@ TEST_F(Sources, RefusesOdometryThatBeginsAfterTheVideoOrIsOverBeforeIt)
   }
 }
 
+/// A header that says a frame lasts 68 years.
+TEST_F(Sources, ARateThatNoCameraHasIsNotBelieved)
+{
+  writeVideo("v.avi", 5, 10);
+  {
+    std::fstream file(path("v.avi"), std::ios::in | std::ios::out | std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    constexpr std::size_t kScale = 28; // of the stream's header: ticks a frame, then ticks a second
+    file.clear();
+    file.seekp(static_cast<std::streamoff>(bytes.find("strh") + kScale));
+    file.write("\xff\xff\xff\x7f\1\0\0\0", 8);
+  }
+  VideoSource source(path("v.avi"));
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 5u);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 40000000) << "25 frames a second";
+}
+
 TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
 {
   writeVideo("v.avi", 10, 10);
