@@ -76,7 +76,8 @@ struct Options
     double confirm_probability = 0.6225;  ///< that a candidate is a trunk, at which it is confirmed
     double confirm_sigma = 0.4;           ///< standard deviation of its place at which it may be confirmed [m]
     double merge_distance = 0.3;          ///< trunks with less than this between their bark are one [m]
-    double candidate_memory = 5;          ///< a candidate not seen for longer is no longer looked for [s]
+    double candidate_memory = 5;          ///< a candidate not seen for longer is no longer looked for, a trunk only
+                                          ///< while its bearing is known to its width [s]
     double lag = 0;                       ///< poses older than this are marginalised [s]; 0: all stay open
   } map;                                  ///< how trunks are kept
 

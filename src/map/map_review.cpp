@@ -71,10 +71,11 @@ bool mayBeEdgeOf(const MapTrunk &known, const Trunk &wide)
   return !known.is_silhouette && isInside(known.trunk, wide);
 }
 
-/// What is seen at the same time shares its views' image lines, which must not count twice.
-bool areSeenApart(const MapTrunk &a, const MapTrunk &b)
+/// From the last view of the one to the first of the other [s]. Not above 0: what is seen at the same time shares its
+/// views' image lines, which must not count twice.
+double secondsApart(const MapTrunk &a, const MapTrunk &b)
 {
-  return a.first_seen_s > b.last_seen_s || b.first_seen_s > a.last_seen_s;
+  return std::max(a.first_seen_s - b.last_seen_s, b.first_seen_s - a.last_seen_s);
 }
 
 /// Alike in place and radius within what both are known to: what ties two visits moves all that was seen since.
@@ -213,6 +214,7 @@ void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
 
 void TrunkMap::reviewPairs(MapUpdate &update, double now_s)
 {
+  const bool is_over = std::isinf(now_s);
   for (const std::size_t i : m_active)
     for (const std::size_t j : m_active) {
       MapTrunk &a = m_trunks[i], &b = m_trunks[j];
@@ -222,13 +224,16 @@ void TrunkMap::reviewPairs(MapUpdate &update, double now_s)
       if (!gone)
         continue;
       MapTrunk &keep = gone == &a ? b : a;
-      const bool is_another_visit = areSeenApart(a, b) && mayBeTheSame(a, b);
-      if (is_another_visit && gone->status != TrunkStatus::candidate) {
+      const double apart_s = secondsApart(a, b), memory_s = m_options.candidate_memory_s;
+      const bool is_another_visit = apart_s > 0 && mayBeTheSame(a, b);
+      const bool is_candidate = gone->status == TrunkStatus::candidate;
+      if (is_another_visit && !is_candidate) {
         joinVisits(update, keep, *gone);
         continue;
       }
-      if (is_another_visit && now_s - gone->last_seen_s <= m_options.candidate_memory_s) // may still earn its place
-        continue;
+      const bool may_be_another = is_another_visit || apart_s > memory_s; // the path may have drifted since
+      if (may_be_another && (is_candidate ? now_s - gone->last_seen_s <= memory_s : !is_over))
+        continue; // it may still earn its place, or its tie
       gone->removed = true;
       change(update, *gone, TrunkStatus::merged, TrunkFate::outdone, keep.id);
       update.removed.push_back(gone->smoother_id);

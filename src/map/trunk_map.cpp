@@ -79,6 +79,13 @@ void TrunkMap::refresh(const TrunkEstimate &estimate)
     trunk.covariance = *estimate.covariance;
 }
 
+void TrunkMap::loseSight(int id)
+{
+  MapTrunk &trunk = at(id);
+  if (trunk.status == TrunkStatus::confirmed)
+    trunk.misses_in_a_row = std::max(trunk.misses_in_a_row, m_options.lost_misses);
+}
+
 void TrunkMap::end(int id)
 {
   MapTrunk &trunk = at(id);

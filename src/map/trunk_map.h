@@ -10,7 +10,9 @@
 /// duplicates in the map). A trunk that comes back as a duplicate hands its views, once it was confirmed by itself, to
 /// the one that was there before: they tie the two visits together. Where the path has drifted so far that no trunk
 /// stands on its former place, those in sight are recognised by their constellation. A confirmed trunk that is
-/// predicted in view and not found for long is lost from sight; it stays in the map and comes back under its id.
+/// predicted in view and not found for long is lost from sight; it stays in the map and comes back under its id. One
+/// that was out of sight while the path drifted by more than its width is not looked for at all, as its neighbour would
+/// be taken for it: each visit is a trunk of its own until both are known well enough to be tied.
 
 #include "geometry/log_normal.h"
 #include <bole/trunk.h>
@@ -268,6 +270,8 @@ public:
   /// Returns what the smoother is to forget.
   std::size_t readAgain(int id, const NewTrunk &reading);
   void refresh(const TrunkEstimate &estimate);
+  /// From the next review() on a confirmed trunk counts as lost from sight.
+  void loseSight(int id);
   /// Stops looking for a trunk, which stays in the map as it is.
   void end(int id);
 

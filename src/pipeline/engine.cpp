@@ -108,6 +108,7 @@ FrameReport Engine::process(const Frame &frame)
       return complete(std::move(report), frame, motion);
     }
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
+    loseUnplaced(predicted, view);
     if (m_units.flow.leave_bark)
       leaveLinesOnBark(predicted);
     if (m_units.flow.follow_bark && view.has_ranges && newest() > 0)
@@ -189,6 +190,19 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
       translation = TranslationPrior{pMc.t, kTranslation * kTranslation * Eigen::Matrix3d::Identity()};
   }
   return m_saliency.update(frame.image, rotation, translation);
+}
+
+/// A trunk that was out of sight while the path drifted by more than its width is not looked for, where its neighbour
+/// might be taken for it: it is detected anew, and the map ties the two visits once both are known.
+void Engine::loseUnplaced(std::vector<PredictedTrunk> &predicted, const Viewpoint &view)
+{
+  const auto isUnplaced = [&](const PredictedTrunk &one) {
+    return !one.is_placed && view.time_s - m_map.trunk(one.id).last_seen_s > m_units.map.candidate_memory_s;
+  };
+  for (const PredictedTrunk &one : predicted)
+    if (isUnplaced(one))
+      m_map.loseSight(one.id);
+  predicted.erase(std::remove_if(predicted.begin(), predicted.end(), isUnplaced), predicted.end());
 }
 
 /// Replaces the image of each trunk tracked by a summary factor.

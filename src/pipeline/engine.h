@@ -64,6 +64,7 @@ private:
   Motion move(const Frame &frame);
   Viewpoint extend(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
+  void loseUnplaced(std::vector<PredictedTrunk> &predicted, const Viewpoint &view);
   void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
   void adoptBest(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view);

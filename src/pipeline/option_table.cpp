@@ -148,7 +148,7 @@ std::vector<OptionEntry> optionTable(Options &o)
        "standard deviation of its place at which it may be confirmed"},
       {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
       {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
-       "a candidate not seen for longer is no longer looked for"},
+       "a candidate not seen for longer is no longer looked for, a trunk only while its bearing is known to its width"},
       {"map.lag", &o.map.lag, 0, 1e5, "s",
        "older poses are fixed, which bounds time and memory of a long flight; 0: never"},
 

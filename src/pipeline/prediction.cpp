@@ -70,6 +70,8 @@ std::vector<PredictedTrunk> predictTrunks(const TrunkMap &map, const Smoother &s
       continue;
     prediction.missed_variance = missedVariance(trunk.misses_in_a_row, view.camera.fx, options);
     tracking.covariance = smoother.relativeCovariance(trunk.smoother_id);
+    prediction.is_placed =
+        !view.has_ranges || 3 * std::sqrt(tracking.covariance(2, 2)) * prediction.range < 2 * trunk.trunk.radius();
     tracking.covariance(2, 2) += prediction.missed_variance;
     tracking.range = elevationOf(tracking.relative, trunk.trunk, view, options);
     tracking.left_contrast = trunk.left_contrast;

@@ -34,6 +34,7 @@ struct PredictedTrunk
   double range = 0; ///< [m]
   TrackingPrediction tracking;
   double missed_variance = 0; ///< part of the variance of the bearing that is there for the misses before [rad^2]
+  bool is_placed = true;      ///< within three standard deviations of its bearing there is room for its borders alone
 };
 
 struct HiddenBorders

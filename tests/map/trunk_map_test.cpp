@@ -571,8 +571,25 @@ TEST_F(Life, AVisitOfAnotherWidthOrPlaceTiesNothing)
     see(visit, 20);
     const MapUpdate update = review();
     EXPECT_TRUE(update.merged.empty());
+    EXPECT_FALSE(at(old).removed || at(visit).removed); // the path may have drifted: the constellation may tie them
+    m_map.reviewAll();
     EXPECT_TRUE(at(old).removed || at(visit).removed); // two do not stand in one place
   }
+}
+
+TEST_F(Life, ATrunkWhosePlaceIsNotKnownAnyMoreIsLostFromSight)
+{
+  const int trunk = confirmed(trunkAt(3, 1), 60), candidate = add(trunkAt(6, -2));
+  see(candidate, 3);
+  m_map.loseSight(trunk);
+  m_map.loseSight(candidate);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+  EXPECT_FALSE(at(trunk).removed);
+  EXPECT_EQ(at(candidate).status, TrunkStatus::candidate);
+  see(trunk, 1);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
 }
 
 TEST_F(Life, WhatLeansFartherThanTrunksDoIsNone)

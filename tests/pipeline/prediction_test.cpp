@@ -83,6 +83,34 @@ TEST(Inhibition, TakesTheColumnsOfConfirmedTrunksAndOfCandidatesOnRequest)
   EXPECT_LT(known[0].q_left - known[0].q_right, 2 * (0.15 / 4 + 2 / eye().camera.fx));
 }
 
+/// The path drifts by a centimetre a frame: after n frames by sqrt(n) cm, which thrice is more than 2 * 0.15 m from 100
+/// on.
+TEST(Prediction, ATrunkIsPlacedWhileTheDriftIsNoMoreThanItsWidth)
+{
+  Matrix6d drift = 1e-10 * Matrix6d::Identity();
+  drift(1, 1) = 1e-4; // [m^2], sideways
+  Smoother smoother;
+  smoother.addFirstPose(Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.2}), 1e-10 * Matrix6d::Identity());
+  MapTrunk known;
+  known.status = TrunkStatus::confirmed;
+  known.trunk = trunkAt(4, 0.5);
+  const TrunkPrior prior{known.trunk, Vector5d::Constant(1e-4)};
+  known.smoother_id = smoother.addTrunk(known.trunk, prior);
+  const TrunkMap map(MapOptions(), {known});
+  Viewpoint view = eye();
+  for (int frame = 1; frame <= 140; ++frame) {
+    smoother.addPose(Pose(), drift);
+    smoother.update();
+    const auto predicted = predictTrunks(map, smoother, view, StageOptions());
+    ASSERT_EQ(predicted.size(), 1u);
+    if (std::abs(frame - 100) > 3) {
+      EXPECT_EQ(predicted[0].is_placed, frame < 100) << frame;
+    }
+  }
+  view.has_ranges = false; // its range is a guess
+  EXPECT_TRUE(predictTrunks(map, smoother, view, StageOptions())[0].is_placed);
+}
+
 TEST(Elevation, IsThatOfTwoHeightsOverTheGround)
 {
   StageOptions options;
