@@ -7,22 +7,6 @@
 
 namespace bole
 {
-double *BlockStore::allocate(std::size_t count)
-{
-  if (std::vector<double *> &free = m_free[count]; !free.empty()) {
-    double *block = free.back();
-    free.pop_back();
-    return block;
-  }
-  if (m_used + count > kChunk) {
-    m_chunks.emplace_back(kChunk);
-    m_used = 0;
-  }
-  double *block = m_chunks.back().data() + m_used;
-  m_used += count;
-  return block;
-}
-
 void Smoother::State::checkPose(std::size_t pose) const
 {
   if (pose >= poses.size())
@@ -146,15 +130,15 @@ int rowCount(FactorKind kind)
   }
 }
 
-int Smoother::State::placeFactor(const Factor &factor)
+int Smoother::State::placeFactor(Factor factor)
 {
   if (free_factors.empty()) {
-    factors.push_back(factor);
+    factors.push_back(std::move(factor));
     return static_cast<int>(factors.size()) - 1;
   }
   const int id = free_factors.back();
   free_factors.pop_back();
-  factors[id] = factor;
+  factors[id] = std::move(factor);
   return id;
 }
 
@@ -167,13 +151,6 @@ std::size_t blockSize(FactorKind kind)
   return static_cast<std::size_t>(rowCount(kind)) * (columns + 1);
 }
 
-void Smoother::State::releaseBlock(Factor &factor)
-{
-  if (factor.linear != nullptr)
-    store.release(factor.linear, blockSize(factor.kind));
-  factor.linear = nullptr;
-}
-
 int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
 {
   Factor factor;
@@ -181,7 +158,7 @@ int Smoother::State::newFactor(FactorKind kind, int data, int a, int b)
   factor.data = data;
   factor.a = a;
   factor.b = b;
-  const int id = placeFactor(factor);
+  const int id = placeFactor(std::move(factor));
   variables[a].factors.push_back(id);
   touch(a);
   if (b >= 0) {
@@ -222,7 +199,7 @@ void Smoother::State::freeDropped()
     free_data[static_cast<std::size_t>(factor.kind)].push_back(factor.data);
     if (factor.kind == FactorKind::image)
       images[factor.data].energy = nullptr;
-    releaseBlock(factor);
+    factor.linear.reset();
     free_factors.push_back(id);
   }
   dropped_factors.clear();

@@ -48,17 +48,17 @@ void Smoother::State::assemble(Factor &factor)
   const int ld = front_rows;
   switch (factor.kind) {
   case FactorKind::pose_prior:
-    addUnary<6, 6>(factor.linear, F, ld, position[factor.a]);
+    addUnary<6, 6>(factor.linear.get(), F, ld, position[factor.a]);
     break;
   case FactorKind::odometry:
-    addBinary<6, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    addBinary<6, 6, 6>(factor.linear.get(), F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::relative_pose:
-    addBinary<5, 6, 6>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    addBinary<5, 6, 6>(factor.linear.get(), F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::observation:
   case FactorKind::image:
-    addBinary<4, 6, 5>(factor.linear, F, ld, position[factor.a], position[factor.b]);
+    addBinary<4, 6, 5>(factor.linear.get(), F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::marginal: {
     const MarginalData &data = marginals[factor.data];

@@ -52,7 +52,7 @@ Graph Smoother::State::graph() const
 
 std::size_t Smoother::State::memoryBytes() const
 {
-  std::size_t bytes = store.bytes() + variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
+  std::size_t bytes = variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
                       poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
                       closed_covariances.size() * sizeof(Matrix6d) + observations.size() * sizeof(SquareRootSummary) +
                       odometry.size() * sizeof(Odometry) + relative_poses.size() * sizeof(RelativePoseMeasurement) +
@@ -61,6 +61,8 @@ std::size_t Smoother::State::memoryBytes() const
     bytes +=
         (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) + v.old_columns.capacity() * sizeof(float) +
         (v.factors.capacity() + v.children.capacity() + v.separator.capacity() + v.assembled.capacity()) * sizeof(int);
+  for (const Factor &factor : factors)
+    bytes += factor.linear ? blockSize(factor.kind) * sizeof(double) : 0;
   for (const MarginalData &data : marginals)
     bytes += sizeof(MarginalData) + static_cast<std::size_t>(data.H.size() + 2 * data.g.size()) * sizeof(double);
   return bytes;

@@ -59,7 +59,7 @@ void Smoother::State::closeVariable(int id)
     factor.stale = false;
     factor.a = v.separator.front();
     factor.assembled_at = v.parent;
-    const int id_factor = placeFactor(factor);
+    const int id_factor = placeFactor(std::move(factor));
     for (const int other : v.separator) {
       const Variable &neighbour = variables[other];
       data.poses.push_back(neighbour.is_pose ? poses[neighbour.number].point : Pose());

@@ -45,21 +45,21 @@ void Smoother::State::linearise(Factor &factor)
   if (!factor.stale)
     constant_cost -= factor.cost;
   if (factor.linear == nullptr && factor.kind != FactorKind::marginal)
-    factor.linear = store.allocate(blockSize(factor.kind));
+    factor.linear = std::make_unique<double[]>(blockSize(factor.kind));
   const auto pose = [this](int v) -> const Pose & { return poses[variables[v].number].point; };
   switch (factor.kind) {
   case FactorKind::pose_prior: {
     Matrix6d J;
     const PosePrior &data = pose_priors[factor.data];
     const Vector6d r = residual(data, squareRootInformation(data), pose(factor.a), &J);
-    factor.cost = store1<6, 6>(J, r, factor.linear);
+    factor.cost = store1<6, 6>(J, r, factor.linear.get());
     break;
   }
   case FactorKind::odometry: {
     Matrix6d J_a, J_b;
     const Odometry &data = odometry[factor.data];
     const Vector6d r = residual(data, squareRootInformation(data), pose(factor.a), pose(factor.b), &J_a, &J_b);
-    factor.cost = store2<6, 6, 6>(Loss(), J_a, J_b, r, factor.linear);
+    factor.cost = store2<6, 6, 6>(Loss(), J_a, J_b, r, factor.linear.get());
     break;
   }
   case FactorKind::relative_pose: {
@@ -67,7 +67,7 @@ void Smoother::State::linearise(Factor &factor)
     const RelativePoseMeasurement &data = relative_poses[factor.data];
     const Vector5d r =
         residual(data, squareRootInformation(data), options.bMc, pose(factor.a), pose(factor.b), &J_a, &J_b);
-    factor.cost = store2<5, 6, 6>(options.direction_loss, J_a, J_b, r, factor.linear);
+    factor.cost = store2<5, 6, 6>(options.direction_loss, J_a, J_b, r, factor.linear.get());
     break;
   }
   case FactorKind::observation: {
@@ -75,7 +75,7 @@ void Smoother::State::linearise(Factor &factor)
     Matrix45d J_trunk;
     const Vector4d r = residual(observations[factor.data], options.bMc, pose(factor.a),
                                 trunks[variables[factor.b].number].point, &J_pose, &J_trunk);
-    factor.cost = store2<4, 6, 5>(options.summary_loss, J_pose, J_trunk, r, factor.linear);
+    factor.cost = store2<4, 6, 5>(options.summary_loss, J_pose, J_trunk, r, factor.linear.get());
     break;
   }
   case FactorKind::image: {
@@ -87,7 +87,7 @@ void Smoother::State::linearise(Factor &factor)
     if (status == SummaryStatus::indefinite || status == SummaryStatus::not_finite)
       data.root = SquareRootSummary(); // nothing is known there, and nothing pulls
     const Vector4d r = residual(data.root, options.bMc, pose(factor.a), trunk, &J_pose, &J_trunk);
-    factor.cost = store2<4, 6, 5>(Loss(), J_pose, J_trunk, r, factor.linear) + data.root.constant;
+    factor.cost = store2<4, 6, 5>(Loss(), J_pose, J_trunk, r, factor.linear.get()) + data.root.constant;
     break;
   }
   case FactorKind::marginal: {

@@ -19,9 +19,9 @@ void Smoother::State::measureDampingScale()
     if (!factor.alive || factor.kind == FactorKind::marginal)
       continue;
     const int rows = rowCount(factor.kind);
-    add(factor.a, factor.linear, rows);
+    add(factor.a, factor.linear.get(), rows);
     if (factor.b >= 0)
-      add(factor.b, factor.linear + rows * variables[factor.a].dim, rows);
+      add(factor.b, factor.linear.get() + rows * variables[factor.a].dim, rows);
   }
 }
 

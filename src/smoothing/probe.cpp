@@ -21,7 +21,7 @@ Vector6d Smoother::State::linearPrediction(Factor &factor)
     linearise(factor);
   const int rows = rowCount(factor.kind);
   Vector6d r = Vector6d::Zero();
-  const double *column = factor.linear;
+  const double *column = factor.linear.get();
   for (const int v : {factor.a, factor.b}) {
     if (v < 0)
       continue;
@@ -32,7 +32,7 @@ Vector6d Smoother::State::linearPrediction(Factor &factor)
   for (int i = 0; i < rows; ++i)
     r(i) -= column[i];
   if (is_old)
-    releaseBlock(factor);
+    factor.linear.reset();
   return r;
 }
 

@@ -15,25 +15,10 @@
 
 #include <array>
 #include <deque>
-#include <map>
+#include <memory>
 
 namespace bole
 {
-/// Stable blocks of doubles; a block given back is the next of its size.
-class BlockStore
-{
-public:
-  double *allocate(std::size_t count);
-  void release(double *block, std::size_t count) { m_free[count].push_back(block); }
-  std::size_t bytes() const { return m_chunks.size() * kChunk * sizeof(double); }
-
-private:
-  static constexpr std::size_t kChunk = 1 << 15;
-  std::deque<std::vector<double>> m_chunks;
-  std::map<std::size_t, std::vector<double *>> m_free; ///< by size
-  std::size_t m_used = kChunk;
-};
-
 enum class Life : unsigned char
 {
   open,
@@ -83,12 +68,13 @@ struct Factor
 {
   FactorKind kind = FactorKind::pose_prior;
   bool alive = true;
-  bool stale = true;        ///< linearise before the next elimination
-  int data = 0;             ///< index among the data of its kind
-  int a = -1, b = -1;       ///< variables (marginal: see its data)
-  int assembled_at = -1;    ///< variable whose front takes it in
-  double *linear = nullptr; ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual; old: null
-  double cost = 0;          ///< rho / 2 at the point of linearisation
+  bool stale = true;                ///< linearise before the next elimination
+  int data = 0;                     ///< index among the data of its kind
+  int a = -1, b = -1;               ///< variables (marginal: see its data)
+  int assembled_at = -1;            ///< variable whose front takes it in
+  std::unique_ptr<double[]> linear; ///< rows x (dim a + dim b + 1), column-major: whitened Jacobians, minus residual;
+                                    ///< old: none
+  double cost = 0;                  ///< rho / 2 at the point of linearisation
 };
 
 /// Rows of the whitened residual (not of a marginal).
@@ -159,9 +145,8 @@ public:
   std::size_t newTrunk(const Trunk &point, const TrunkPrior &prior);
   void reopenTrunk(int trunk);
   int newFactor(FactorKind kind, int data, int a, int b);
-  int placeFactor(const Factor &factor);
+  int placeFactor(Factor factor);
   template <typename Data> int placeData(std::deque<Data> &list, FactorKind kind, Data data);
-  void releaseBlock(Factor &factor);
   void dropFactor(int factor);
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
@@ -209,9 +194,13 @@ public:
   void reeliminate(UpdateResult &result);
   void backSubstitute(UpdateResult &result);
   int reach();
-  void visitBelow(int deepest, UpdateResult &result);
+  struct Descent
+  {
+    int variable, below, quiet; ///< how much deeper to go; variables in a row above it that were settled
+  };
+  void visitBelow(std::vector<Descent> &open, int &visits, UpdateResult &result);
   void fetchAhead(int pose) const;
-  void pushChildren(int id, int depth, int quiet);
+  void pushChildren(std::vector<Descent> &open, int id, int below, int quiet) const;
   void settle(Variable &v, int id, double *rhs, UpdateResult &result);
   int movableAge() const;
   int reachBack(const Variable &variable) const;
@@ -254,16 +243,12 @@ public:
   double damping = 0;         ///< Levenberg's, added to the diagonal scaled by damping_scale
   std::vector<Vector6d> damping_scale;
   double constant_cost = 0;
-  struct Descent
-  {
-    int variable, depth, quiet;
-  };
   std::vector<int> dropped_factors, removed_variables; ///< still named by what is to be eliminated again
   std::vector<int> free_factors, free_variables;
   std::vector<int> free_trunks;              ///< under a lag, which has no end
   std::array<std::vector<int>, 7> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
-  std::vector<Descent> stack;
+  std::vector<Descent> descents, postponed; ///< of the present back-substitution, and what those before left
   std::vector<double> front, separator_delta;
   std::vector<int> position, child_map; ///< of a variable in the front
   std::vector<int> child_run;           ///< where the rows end that stand together in the front
@@ -276,7 +261,6 @@ public:
   int held_directions = 0;
   std::int64_t next_order = 0;
   int oldest_open_pose = 0;
-  BlockStore store;
 };
 
 /// What \p use makes of the columns of L that belong to \p v.

@@ -10,13 +10,14 @@ namespace bole
 {
 namespace
 {
-constexpr int kRecentPoses = 64;                  ///< behind the newest; what is older keeps less
-constexpr int kContributionEvery = 32;            ///< older poses that keep it; the rest is eliminated again if needed
-constexpr int kReach = 256;                       ///< variables below the eliminated ones that a pass visits
+constexpr int kRecentPoses = 64;       ///< behind the newest; what is older keeps less
+constexpr int kContributionEvery = 32; ///< older poses that keep it; the rest is eliminated again if needed
+constexpr int kReach = 256;            ///< variables below the eliminated ones that a pass visits
+constexpr int kVisits = 640;           ///< of variables in one update; a deeper pass goes on in the next ones
 constexpr int kFetchNodes = 8, kFetchColumns = 3; ///< poses ahead of the one that is visited
 constexpr unsigned kPassesBetween = 4;            ///< until one goes twice as deep
 constexpr int kNearAge = 100;          ///< poses behind the newest: points that reach no farther may always move
-constexpr unsigned kFartherEvery = 16; ///< passes until some may reach twice as far, and so on
+constexpr unsigned kFartherEvery = 25; ///< passes until some may reach twice as far, and so on
 constexpr int kQuiet = 16;             ///< variables in a row that are near their solution: the rest is left
 } // namespace
 
@@ -128,15 +129,17 @@ void Smoother::State::fetchAhead(int pose) const
   fetch(v.children.data(), v.children.size() * sizeof(int));
 }
 
-/// Visits what is below \p stack, no deeper than \p deepest, and settles whatever stands too far
-/// from its solution given those above it.
-void Smoother::State::visitBelow(int deepest, UpdateResult &result)
+/// Visits what is \p open and what is below it, as long as \p visits remain, and settles whatever stands too far from
+/// its solution given those above it.
+void Smoother::State::visitBelow(std::vector<Descent> &open, int &visits, UpdateResult &result)
 {
   double rhs[6];
-  while (!stack.empty()) {
-    const auto [id, depth, quiet] = stack.back();
-    stack.pop_back();
+  for (; !open.empty() && visits > 0; --visits) {
+    const auto [id, below, quiet] = open.back();
+    open.pop_back();
     Variable &v = variables[id];
+    if (!isOpen(id) || v.affected == stamp) // since it was put there
+      continue;
     if (v.is_pose)
       fetchAhead(v.number);
     v.visited = passes;
@@ -144,16 +147,16 @@ void Smoother::State::visitBelow(int deepest, UpdateResult &result)
     if (stale)
       settle(v, id, rhs, result);
     const int still = stale ? 0 : quiet + 1;
-    if (still < kQuiet && depth < deepest)
-      pushChildren(id, depth + 1, still);
+    if (still < kQuiet && below > 0)
+      pushChildren(open, id, below - 1, still);
   }
 }
 
-void Smoother::State::pushChildren(int id, int depth, int quiet)
+void Smoother::State::pushChildren(std::vector<Descent> &open, int id, int below, int quiet) const
 {
   for (const int c : variables[id].children)
     if (variables[c].affected != stamp)
-      stack.push_back({c, depth, quiet});
+      open.push_back({c, below, quiet});
 }
 
 void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &result)
@@ -171,8 +174,7 @@ void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &res
 }
 
 /// How deep below what was eliminated again this pass goes. Every kPassesBetween-th pass goes twice as deep, of those
-/// again every kPassesBetween-th, and so on: variables far back are brought up to date too, but less often. Each pass
-/// is made in one go, since its end leaves an inconsistency that stays until a deeper pass.
+/// again every kPassesBetween-th, and so on: variables far back are brought up to date too, but less often.
 int Smoother::State::reach()
 {
   if (options.propagation_threshold == 0)
@@ -183,19 +185,25 @@ int Smoother::State::reach()
   return depth;
 }
 
-/// From the roots down: all that was eliminated again, then some way below it.
+/// From the roots down: all that was eliminated again, then some way below it. A deep pass is spread over as many
+/// updates as it takes at kVisits each, after what each of them has to do itself: a variable that is settled later is
+/// so by the estimates above it then.
 void Smoother::State::backSubstitute(UpdateResult &result)
 {
   double rhs[6];
   ++passes;
-  stack.clear();
+  const int below = reach();
   for (auto id = affected.rbegin(); id != affected.rend(); ++id) {
     variables[*id].visited = passes;
     staleness(variables[*id], rhs);
     settle(variables[*id], *id, rhs, result);
-    pushChildren(*id, 1, 0);
+    pushChildren(descents, *id, below - 1, 0);
   }
-  visitBelow(reach(), result);
+  int visits = options.propagation_threshold == 0 ? std::numeric_limits<int>::max() : kVisits;
+  visitBelow(descents, visits, result);
+  visitBelow(postponed, visits, result);
+  postponed.insert(postponed.end(), descents.begin(), descents.end());
+  descents.clear();
   const auto isFine = [this](int id) {
     variables[id].in_moved = variables[id].in_moved && movedTooFar(variables[id]);
     return !variables[id].in_moved;
@@ -222,7 +230,7 @@ void Smoother::State::releaseOld(Variable &v)
     return;
   for (const int id : v.assembled)
     if (factors[id].alive && factors[id].kind != FactorKind::image)
-      releaseBlock(factors[id]);
+      factors[id].linear.reset();
   v.old_columns.assign(v.columns.begin(), v.columns.end());
   std::vector<double>().swap(v.columns);
 }
