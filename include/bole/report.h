@@ -37,7 +37,8 @@ struct KnownTrunk
   Trunk trunk;                                 ///< in the world
   int observations = 0;                        ///< frames in which it was measured
   double log_odds = 0;                         ///< to be a trunk and no chance pair of lines
-  double seen_through = 0;                     ///< points seen behind it for each on its bark
+  double seen_through = 0;                     ///< points seen behind it for each on its bark; 0 where it is in less
+                                               ///< than every second frame
   double log_radius_variance = 0;              ///< [1]
   /// Of its bearing from the camera [rad^2]: how well its place relative to the camera is known. It leaves out the
   /// drift of the world, which moves camera and trunk alike.

@@ -121,6 +121,9 @@ struct MapTrunk
   Matrix5d covarianceAt(double z) const;
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
   double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
+  /// Whether points are seen through it in every second frame, as between two trunks: a track that slipped from the
+  /// border of a dark trunk is seen behind it for some frames only.
+  bool isGap() const { return 2 * points_behind > hits + misses; }
 };
 
 /// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.

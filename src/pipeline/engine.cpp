@@ -365,7 +365,7 @@ std::vector<KnownTrunk> Engine::known(const std::vector<PredictedTrunk> &predict
                             : is_new ? (J * trunk.covariance * J.transpose())(2, 2)
                                      : m_smoother.bearingVariance(trunk.smoother_id);
     trunks.push_back({trunk.id, trunk.status, trunk.trunk, trunk.observations, m_map.evidence(trunk),
-                      trunk.lookedThrough(), trunk.covariance(2, 2), variance});
+                      trunk.isGap() ? trunk.lookedThrough() : 0, trunk.covariance(2, 2), variance});
   }
   return trunks;
 }

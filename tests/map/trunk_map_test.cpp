@@ -577,6 +577,21 @@ TEST_F(Life, AVisitOfAnotherWidthOrPlaceTiesNothing)
   }
 }
 
+/// A track that slipped from its border was behind it for ten frames.
+TEST_F(Life, ATrunkSeenLongIsNoGapForATrackThatSlipped)
+{
+  const int trunk = add(trunkAt(3, 1)), gap = add(trunkAt(6, -2));
+  for (int frame = 0; frame < 100; ++frame) {
+    see(trunk, 1);
+    see(gap, 1);
+    m_map.record(PointCount{trunk, 0, frame < 10 ? 1 : 0});
+    m_map.record(PointCount{gap, 0, frame % 3 > 0 ? 1 : 0});
+  }
+  EXPECT_GT(at(trunk).lookedThrough(), 4);
+  EXPECT_FALSE(at(trunk).isGap());
+  EXPECT_TRUE(at(gap).isGap());
+}
+
 TEST_F(Life, ATrunkWhosePlaceIsNotKnownAnyMoreIsLostFromSight)
 {
   const int trunk = confirmed(trunkAt(3, 1), 60), candidate = add(trunkAt(6, -2));

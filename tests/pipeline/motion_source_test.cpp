@@ -180,6 +180,7 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
   ASSERT_TRUE(slot && post); // two borders with parallax are all that a trunk is asked for at first
   EXPECT_FALSE(post->removed);
   EXPECT_GT(slot->lookedThrough(), 2);
+  EXPECT_TRUE(slot->isGap());
   EXPECT_GT(post->points_on, 0);
   EXPECT_EQ(post->lookedThrough(), 0);
 }
