@@ -122,6 +122,8 @@ FrameReport Engine::process(const Frame &frame)
     m_window.push(gradient, newest(), view, m_smoother, m_units);
     lookAtColumns(frame, tracked, view);
     adoptNew(view, background(saliency)); // Eq. 18-21
+    if (m_units.flow.look_leaning)
+      adoptLeaning(gradient, view, background(saliency));
     lap("detection");
     report.trunks = inView(tracked, m_map, view.has_ranges);
     report.points = points();

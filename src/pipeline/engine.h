@@ -68,6 +68,8 @@ private:
   void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   void adoptNew(const Viewpoint &view, const vpImage<float> *p_background);
   void adoptBest(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view);
+  void adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const Viewpoint &view,
+                    const vpImage<float> *p_background);
   int adopt(const Adoption &adoption);
   NewTrunk hold(const Adoption &adoption);
   void readAnew(const Hypothesis &doubtful, const std::vector<LevelView> &views, const Viewpoint &view);
@@ -84,7 +86,7 @@ private:
                                   AlbumGradients &gradients) const;
   std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
                                  AlbumGradients &gradients) const;
-  void detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients);
+  void detectLeaning(const TrunkMap &likely, AlbumGradients &gradients);
   void placeByBark();
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
@@ -108,6 +110,7 @@ private:
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
+  DetectionWindow m_leaning[2];     ///< of lines that lean to the left, to the right
   std::deque<TriedReading> m_tried; ///< of the last half window
   BarkFollower m_bark;
   RecentColumns m_columns;

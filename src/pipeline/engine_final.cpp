@@ -165,44 +165,6 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   return readings;
 }
 
-/// Trunks that lean are too smeared in upright columns for the detector. In flight there is no time for more, so what
-/// stands between the likely ones is looked for now, along lines that lean to either side.
-void Engine::detectLeaning(const std::vector<Judged> &judged, AlbumGradients &gradients)
-{
-  constexpr double kLean = 0.05;    // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
-  constexpr double kHides = 0.5;    // log-odds at which one hides what stands behind it
-  constexpr std::size_t kEvery = 3; // frames: a window holds many more
-  // a border kLean aslant is smeared as wide as a thinner trunk
-  const double thinnest = 0.5 * kLean * (m_units.flow.trunk_high - m_units.flow.trunk_low);
-  const TrunkMap likely = m_map.withTrunks(idsOf(judged, kHides));
-  StageOptions options[2] = {m_units, m_units};
-  DetectionWindow windows[2];
-  for (const int side : {0, 1}) {
-    options[side].detection.profile.lean = side == 0 ? -kLean : kLean;
-    options[side].detection.radius_min = std::max(options[side].detection.radius_min, thinnest);
-  }
-  for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
-    const KeptFrame &frame = m_album.frames()[i];
-    const Viewpoint at = viewpointOf(frame);
-    for (const int side : {0, 1})
-      windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
-    if (i % kEvery != 0)
-      continue;
-    std::vector<Detection> found;
-    for (const int side : {0, 1}) {
-      const auto leaning = detectInWindow(windows[side], m_smoother, likely, at, nullptr, options[side]);
-      found.insert(found.end(), leaning.begin(), leaning.end());
-    }
-    // lines are smeared where they are added up along another lean
-    const auto sharpness = [](const Detection &one) {
-      return one.quality * std::min(std::abs(one.left_contrast), std::abs(one.right_contrast));
-    };
-    std::sort(found.begin(), found.end(),
-              [&](const Detection &a, const Detection &b) { return sharpness(a) > sharpness(b); });
-    adoptBest(std::move(found), windows[0], at);
-  }
-}
-
 /// The last word on where the trunks stand. It moves no pose: bark and borders share the path by which both are
 /// measured.
 void Engine::placeByBark()
@@ -217,13 +179,14 @@ void Engine::placeByBark()
 void Engine::decideByAllFrames()
 {
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
+  constexpr double kHides = 0.5;   // log-odds at which one hides what leans behind it
   MapOptions unsure = m_units.map; // metres are as sure as the scale is: those of a plain video are a guess
   unsure.confirm_position_sigma *= std::exp(m_motion->scale().sigma);
   m_map.setOptions(unsure);
   const std::vector<LevelView> views = levelViews(m_album.frames());
   const std::vector<Judged> before = judgeAll(views);
   AlbumGradients gradients(m_album.frames(), m_units.gradient);
-  detectLeaning(before, gradients);
+  detectLeaning(m_map.withTrunks(idsOf(before, kHides)), gradients);
   const double apart = m_units.map.merge_distance;
   m_judged = judgeAll(views, before);
   std::vector<Reading> readings =

@@ -124,6 +124,7 @@ void setServoing(StageOptions &o)
 {
   o.flow.follow_bark = true;      // its borders slip: along lines of light and shade, and to what passes behind
   o.flow.leave_bark = true;       // light and shade walk over a trunk that it goes round
+  o.flow.look_leaning = true;     // a trunk of the task may lean, and there is no last look
   o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
   o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
   o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright

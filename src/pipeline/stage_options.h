@@ -56,6 +56,7 @@ struct FlowOptions
   bool follow_bark = false;     ///< near trunks are followed by their bark from image to image
   bool leave_bark = false;      ///< a border beside which the trunk goes on by its depth is not read, and looked for
                                 ///< beyond
+  bool look_leaning = false;    ///< trunks that lean are looked for in flight, too
   double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
                                 ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
   int turned_frames = 0; ///< borders whose contrast changed its sign are accepted after so many frames in a row at

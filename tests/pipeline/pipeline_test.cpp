@@ -76,17 +76,16 @@ TEST(Pipeline, AnOdometryThatBeginsAfterTheImagesIsNamed)
   EXPECT_EQ(report.verdicts[0].text, "odometry: begins at 0.5 s, after the images, and is not used");
 }
 
-/// In flight its borders are smeared over the upright lines of the detector, and nothing that stands there is
-/// confirmed.
-TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown)
+/// Its borders are smeared over the upright lines of the detector, along which it looks in flight.
+void findThinLeaningTrunk(const Options &options, int frames)
 {
   constexpr double kLean = 0.1;
   std::vector<Cylinder> wood = test::smallWood();
   Cylinder &leaning = wood[1];
   leaning.radius = 0.1;
   leaning.top.y() += kLean * leaning.top.z();
-  Pipeline pipeline(kCamera, kMount);
-  for (int k = 0; k < 30; ++k)
+  Pipeline pipeline(kCamera, kMount, options);
+  for (int k = 0; k < frames; ++k)
     pipeline.process(byHand(k, wood));
   pipeline.finish();
   const Eigen::Vector2d at_breast = leaning.foot.head<2>() + Eigen::Vector2d(0, kLean * kBreastHeight);
@@ -98,6 +97,15 @@ TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown)
       EXPECT_NEAR(trunk.radius, leaning.radius, 0.01);
     }
   EXPECT_EQ(found, 1);
+}
+
+TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown) { findThinLeaningTrunk(Options(), 30); }
+
+TEST(Pipeline, FindsAThinLeaningTrunkInServoing)
+{
+  Options options;
+  options.stages.servoing = true;
+  findThinLeaningTrunk(options, 60);
 }
 
 TEST(Pipeline, OfWhatIsNoTrunkItTellsWhy)

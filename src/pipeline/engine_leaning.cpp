@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Trunks that lean are too smeared in upright columns for the detector: it looks along lines that lean, too. In
+// servoing, where one trunk that is missed is what the task is about, in flight; else when the flight is over.
+#include "pipeline/engine.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bole
+{
+namespace
+{
+/// Options of the detector for lines that lean to the left (side 0) or to the right (1).
+StageOptions alongLeaning(StageOptions options, int side)
+{
+  constexpr double kLean = 0.05; // tan: a trunk that leans by half of it is 3 px aslant to a line at f = 200 px
+  options.detection.profile.lean = side == 0 ? -kLean : kLean;
+  // a border kLean aslant is smeared as wide as a thinner trunk
+  const double thinnest = 0.5 * kLean * (options.flow.trunk_high - options.flow.trunk_low);
+  options.detection.radius_min = std::max(options.detection.radius_min, thinnest);
+  return options;
+}
+
+/// Lines are smeared where they are added up along another lean.
+void sortBySharpness(std::vector<Detection> &found)
+{
+  const auto sharpness = [](const Detection &one) {
+    return one.quality * std::min(std::abs(one.left_contrast), std::abs(one.right_contrast));
+  };
+  std::sort(found.begin(), found.end(),
+            [&](const Detection &a, const Detection &b) { return sharpness(a) > sharpness(b); });
+}
+} // namespace
+
+/// To either side in turn.
+void Engine::adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const Viewpoint &view,
+                          const vpImage<float> *p_background)
+{
+  constexpr std::size_t kEvery = 3; // frames of a side: a window holds many more
+  const int side = static_cast<int>(newest() % 2);
+  const StageOptions options = alongLeaning(m_units, side);
+  m_leaning[side].push(gradient, newest(), view, m_smoother, options);
+  if (newest() / 2 % kEvery != 0 || !m_motion->isTranslationMeasured())
+    return;
+  std::vector<Detection> found = detectInWindow(m_leaning[side], m_smoother, m_map, view, p_background, options);
+  sortBySharpness(found);
+  adoptBest(std::move(found), m_leaning[side], view);
+}
+
+/// What stands between the \p likely ones.
+void Engine::detectLeaning(const TrunkMap &likely, AlbumGradients &gradients)
+{
+  constexpr std::size_t kEvery = 3; // frames: a window holds many more
+  const StageOptions options[2] = {alongLeaning(m_units, 0), alongLeaning(m_units, 1)};
+  DetectionWindow windows[2];
+  for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
+    const KeptFrame &frame = m_album.frames()[i];
+    const Viewpoint at = viewpointOf(frame);
+    for (const int side : {0, 1})
+      windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
+    if (i % kEvery != 0)
+      continue;
+    std::vector<Detection> found;
+    for (const int side : {0, 1}) {
+      const auto leaning = detectInWindow(windows[side], m_smoother, likely, at, nullptr, options[side]);
+      found.insert(found.end(), leaning.begin(), leaning.end());
+    }
+    sortBySharpness(found);
+    adoptBest(std::move(found), windows[0], at);
+  }
+}
+} // namespace bole
