@@ -10,6 +10,8 @@ namespace bole
 {
 namespace
 {
+constexpr std::size_t kLeaningEvery = 3; ///< frames of a window in which one looks for trunks: it holds many more
+
 /// Options of the detector for lines that lean to the left (side 0) or to the right (1).
 StageOptions alongLeaning(StageOptions options, int side)
 {
@@ -36,11 +38,10 @@ void sortBySharpness(std::vector<Detection> &found)
 void Engine::adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const Viewpoint &view,
                           const vpImage<float> *p_background)
 {
-  constexpr std::size_t kEvery = 3; // frames of a side: a window holds many more
   const int side = static_cast<int>(newest() % 2);
   const StageOptions options = alongLeaning(m_units, side);
   m_leaning[side].push(gradient, newest(), view, m_smoother, options);
-  if (newest() / 2 % kEvery != 0 || !m_motion->isTranslationMeasured())
+  if (newest() / 2 % kLeaningEvery != 0 || !m_motion->isTranslationMeasured())
     return;
   std::vector<Detection> found = detectInWindow(m_leaning[side], m_smoother, m_map, view, p_background, options);
   sortBySharpness(found);
@@ -50,7 +51,6 @@ void Engine::adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const
 /// What stands between the \p likely ones.
 void Engine::detectLeaning(const TrunkMap &likely, AlbumGradients &gradients)
 {
-  constexpr std::size_t kEvery = 3; // frames: a window holds many more
   const StageOptions options[2] = {alongLeaning(m_units, 0), alongLeaning(m_units, 1)};
   DetectionWindow windows[2];
   for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
@@ -58,7 +58,7 @@ void Engine::detectLeaning(const TrunkMap &likely, AlbumGradients &gradients)
     const Viewpoint at = viewpointOf(frame);
     for (const int side : {0, 1})
       windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
-    if (i % kEvery != 0)
+    if (i % kLeaningEvery != 0)
       continue;
     std::vector<Detection> found;
     for (const int side : {0, 1}) {

@@ -196,7 +196,7 @@ public:
   int reach();
   struct Descent
   {
-    int variable, below, quiet; ///< how much deeper to go; variables in a row above it that were settled
+    int variable, below, quiet; ///< how much deeper to go; variables in a row above it that were near their solution
   };
   void visitBelow(std::vector<Descent> &open, int &visits, UpdateResult &result);
   void fetchAhead(int pose) const;

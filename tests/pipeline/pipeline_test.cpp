@@ -76,7 +76,7 @@ TEST(Pipeline, AnOdometryThatBeginsAfterTheImagesIsNamed)
   EXPECT_EQ(report.verdicts[0].text, "odometry: begins at 0.5 s, after the images, and is not used");
 }
 
-/// Its borders are smeared over the upright lines of the detector, along which it looks in flight.
+/// Its borders are smeared over upright lines, the only ones that the detector looks along in flight but for servoing.
 void findThinLeaningTrunk(const Options &options, int frames)
 {
   constexpr double kLean = 0.1;
