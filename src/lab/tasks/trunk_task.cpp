@@ -266,10 +266,12 @@ Eigen::Vector2d TrunkTask::swayNow(double time_s, const Eigen::Vector3d &place)
   return velocity;
 }
 
-/// Sent anew where it was cut: of two sent at one time the later counts.
+/// Sent anew where it was cut: of two sent at one time the later counts. The next one sideways will be cut alike.
 void TrunkTask::sent(const Eigen::Vector4d &velocity, const FrameReport &report)
 {
-  m_response.send(secondsOf(report.stamp_ns), obeying(velocity, response().obeyed()));
+  const Eigen::Vector4d flown = obeying(velocity, response().obeyed());
+  m_uncut = m_round != 0 ? std::clamp(flown.y() / m_round, 0.0, 1.0) : 1;
+  m_response.send(secondsOf(report.stamp_ns), flown);
 }
 
 /// Whether no other trunk stands near on the side to which \p speed leads (positive: left).
@@ -338,7 +340,7 @@ Eigen::Vector2d TrunkTask::lead(const vpFeatureTrunk &feature, double radius, do
   const double ratio = m_log_ratio.value() + there(1) + J.row(1).dot(approach) + response.speed_lag * drift(1);
   m_current.buildFrom(m_bearing.value() + there(0) + response.turn_lag * (J.row(0).dot(ahead.velocity()) + drift(0)),
                       feature.inclination(), feature.tip(), std::min(ratio, std::log(kNearestRatio)), radius);
-  ahead.send(time_s, {0, round, 0, 0});
+  ahead.send(time_s, {0, m_uncut * round, 0, 0});
   ahead.advance(time_s + response.delay + response.turn_lag); // the turn lags too: it is to match what is flown then
   return drift + J.col(1) * ahead.velocity().y();
 }
@@ -357,6 +359,7 @@ Eigen::Vector4d TrunkTask::velocityFor(const vpFeatureTrunk &feature, double rad
   const Eigen::Vector2d flat = limited({v[0], round}, m_options.largest_speed);
   Eigen::Vector4d velocity(std::max(flat.x(), -kRetreat), flat.y(), 0,
                            std::clamp(v[1], -kLargestTurnRate, kLargestTurnRate));
+  m_round = velocity.y();
   m_response.send(time_s, velocity);
   return obeying(velocity, 1 / response().obeyed());
 }

@@ -112,6 +112,8 @@ private:
   std::int64_t m_radius_ns = 0;       ///< of the frame that told it last
   double m_bearing_noise;             ///< of the feature seen last [rad]
   int m_misread = 0;                  ///< frames in a row
+  double m_round = 0;                 ///< ordered sideways last [m/s]
+  double m_uncut = 1;                 ///< share of it that the laws of safety left
   double m_turned_back = 1;           ///< -1: goes round the other way, since a trunk stood in it
   int m_blocked = 0;                  ///< frames in a row
   std::optional<Sway> m_sway;         ///< none before it has begun

@@ -148,6 +148,28 @@ TEST(Perception, InAWindItSwaysAboutOnePlace)
     EXPECT_LT((sum[i] / count[i] - first).norm(), 0.45) << i << ": .8 where nothing brings it back";
 }
 
+/// Half a metre a second and more for drag is more than the laws of safety allow where nothing looks, so it is cut.
+TEST(Perception, OnACircleTheBearingIsKeptAlsoWhereTheSpeedIsCut)
+{
+  ServoTrialOptions options = holdBy(PerceptionKind::truth);
+  options.scenario.kind = ServoKind::circle;
+  options.loop.duration_s = 60;
+  options.robot.body.gust = 0;
+  double sum = 0;
+  int count = 0;
+  const ServoTrialResult result =
+      runServoTrial(options, [&](const Frame &, const FrameReport &, const LoopSample &sample) {
+        if (sample.phase == TaskPhase::servoing && sample.time_s > 30) {
+          sum += sample.real.at(0).second;
+          ++count;
+        }
+        return true;
+      });
+  ASSERT_TRUE(result.is_success) << result.outcome;
+  ASSERT_GT(count, 100);
+  EXPECT_NEAR(sum / count, 0, 0.06) << "degrees; -.11 where what is ordered is fed forward";
+}
+
 TEST(Perception, ByTheTrueMapTheImagesSayWhereTheDroneIs)
 {
   double worst = 0, odometry = 0;
