@@ -86,12 +86,32 @@ void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const
   m_verdicts.push_back({toString(sensor), kind, since_s, text});
 }
 
-/// A sensor that was silent or stuck agrees with the points again.
+/// Whether the gyro agreed with the points for three seconds in which the body turned about each axis by more than both
+/// err: at rest, or about one axis, swapped and negated rates agree as well.
+bool SensorMonitor::hasGyroAgreedInTurns() const
+{
+  constexpr double kAgreed_s = 3, kTurned = 100; // squared turns about an axis over their variance
+  const std::int64_t from_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
+  Vector3d turned = Vector3d::Zero();
+  for (const Comparison &c : m_comparisons) {
+    if (c.b_ns <= from_ns)
+      continue;
+    if (!c.gyro || c.gyro_points > 0.5 * m_options.limit_points)
+      return false;
+    turned += logSo3(*c.points).cwiseAbs2().cwiseQuotient(c.error_covariance.diagonal());
+  }
+  return m_comparisons.front().a_ns <= from_ns && turned.minCoeff() > kTurned;
+}
+
+/// A sensor that was silent or stuck agrees with the points again, or a gyro that contradicted them for a moment.
 void SensorMonitor::checkReturn(Sensor sensor)
 {
   const int s = static_cast<int>(sensor);
   const auto window = static_cast<std::size_t>(m_options.window);
   if (!has(sensor) || !m_may_return[s] || m_comparisons.size() < window)
+    return;
+  const std::string &kind = m_verdicts[*m_may_return[s]].kind;
+  if (kind != "ended" && kind != "stuck" && !hasGyroAgreedInTurns())
     return;
   const bool is_gyro = sensor == Sensor::gyro;
   for (auto c = m_comparisons.end() - static_cast<std::ptrdiff_t>(window); c != m_comparisons.end(); ++c)
@@ -170,6 +190,7 @@ void SensorMonitor::checkStamps()
 {
   constexpr std::size_t kLeast = 10; // comparisons
   constexpr double kMostEach = 6;    // of one comparison: more would be a wrong match
+  constexpr double kMostTurn = 0.5;  // that an image is late by [rad]: beyond it the rates are wrong
   constexpr double kSigmas_s[] = {0.004, 0.008, 0.016, 0.032};
   if (m_comparisons.size() < kLeast)
     return;
@@ -178,7 +199,7 @@ void SensorMonitor::checkStamps()
     double ratio = 0, left = 0;
     int count = 0;
     for (const Comparison &c : m_comparisons) {
-      if (!c.gyro)
+      if (!c.gyro || c.error.norm() > kMostTurn)
         continue;
       const Matrix3d scattered =
           c.error_covariance + sigma_s * sigma_s * (c.rate_a * c.rate_a.transpose() + c.rate_b * c.rate_b.transpose());
@@ -203,7 +224,8 @@ void SensorMonitor::checkStamps()
         together += c.error.dot(c.rate_b) * next.error.dot(next.rate_a);
   if (together < 0)
     raise(Sensor::gyro, "stamps", secondsOf(m_comparisons.front().a_ns),
-          fmt::format("gyro: the stamps of the images scatter against it, by {:.0f} ms or more", 1e3 * best_sigma_s));
+          fmt::format("gyro: the stamps of the images scatter against it, by {:.0f} ms or more", 1e3 * best_sigma_s),
+          Lasts::until_agree);
 }
 
 /// A gyro that repeats its value or says nothing more.
@@ -311,7 +333,8 @@ void SensorMonitor::checkRotations()
   else if (gyro_failed && oddsOfPoints() < m_options.limit_odds && !has(Sensor::images)) {
     raise(Sensor::gyro, "rotation", since_s,
           fmt::format("gyro: contradicts the points {}since {:.1f} s", gyro_odometry > 0 ? "and the odometry " : "",
-                      since_s));
+                      since_s),
+          Lasts::until_agree);
     nameGyro();
   }
   else if (odometry_failed && gyro_points == 0 && !has(Sensor::images))

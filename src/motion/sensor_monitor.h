@@ -121,6 +121,7 @@ private:
   void checkRotations();
   std::deque<Comparison>::const_iterator windowBegin() const;
   double oddsOfPoints() const;
+  bool hasGyroAgreedInTurns() const;
   void checkReturn(Sensor sensor);
   void checkStamps();
   void checkDirection();

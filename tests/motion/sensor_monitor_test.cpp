@@ -14,15 +14,15 @@ using Eigen::Vector3d;
 using test::MadeFlight;
 constexpr double kBegins_s = 5;
 
-/// Eight seconds; \p damage changes a frame before the monitor sees it.
-SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10)
+/// \p damage changes a frame before the monitor sees it.
+SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8)
 {
   MadeFlight flight;
   flight.frame_rate = rate;
   flight.odometry_noise = 0.012;
   flight.force_noise = 0.1;
   SensorMonitor monitor(forwardCamera());
-  for (std::size_t i = 0; i < static_cast<std::size_t>(8 * rate); ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(duration_s * rate); ++i) {
     Frame frame = flight.frame(i);
     damage(frame);
     monitor.process(frame, flight.seen(i));
@@ -153,18 +153,22 @@ TEST(SensorMonitor, ASensorThatAgreesAgainAfterASilenceIsTrustedAgain)
   }
 }
 
-/// Eight seconds in which each image was taken at another time than its stamp says, by normal errors and by a constant.
-SensorMonitor flyByWrongStamps(double sigma_s, double late_s)
+/// A flight in which each image until \p until_s was taken at another time than its stamp says, by normal errors and by
+/// a constant.
+SensorMonitor flyByWrongStamps(double sigma_s, double late_s, double duration_s = 8, double until_s = 1e3)
 {
   MadeFlight flight;
   std::mt19937 random(3);
-  std::normal_distribution<double> normal(0, sigma_s);
+  std::normal_distribution<double> normal(0, 1);
   std::vector<std::int64_t> stamps;
   SensorMonitor monitor(forwardCamera());
-  for (std::size_t i = 0; i < 80; ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(10 * duration_s); ++i) {
     Frame frame = flight.frame(i);
     std::vector<RelativeMotion> seen = flight.seen(i);
-    stamps.push_back(frame.stamp_ns + MadeFlight::nanoseconds(late_s + std::clamp(normal(random), -0.04, 0.04)));
+    if (0.1 * double(i) >= until_s)
+      sigma_s = late_s = 0;
+    stamps.push_back(frame.stamp_ns +
+                     MadeFlight::nanoseconds(late_s + std::clamp(sigma_s * normal(random), -0.04, 0.04)));
     frame.stamp_ns = stamps.back();
     for (RelativeMotion &motion : seen) {
       motion.a_ns = stamps[i - 3];
@@ -175,6 +179,28 @@ SensorMonitor flyByWrongStamps(double sigma_s, double late_s)
   return monitor;
 }
 
+/// A second of rates that no drone has.
+TEST(SensorMonitor, AGyroThatWasWrongForAMomentIsTrustedAgainAndOneThatStaysWrongIsNot)
+{
+  const auto spiked = [](Frame &f) {
+    if (isLate(f) && f.stamp_ns < MadeFlight::nanoseconds(kBegins_s + 1))
+      eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 30)); });
+  };
+  const SensorMonitor during = fly(spiked, 10, kBegins_s + 1);
+  EXPECT_FALSE(during.trusts(Sensor::gyro));
+  const SensorMonitor after = fly(spiked, 10, 14);
+  ASSERT_EQ(after.verdicts().size(), 1u);
+  EXPECT_EQ(after.verdicts()[0].kind, "rotation");
+  EXPECT_NEAR(after.verdicts()[0].since_s, kBegins_s, 0.3);
+  EXPECT_NE(after.verdicts()[0].text.find(" until "), std::string::npos) << after.verdicts()[0].text;
+  EXPECT_TRUE(after.trusts(Sensor::gyro));
+  for (const Fault &fault : faults()) {
+    if (fault.sensor == Sensor::gyro) {
+      EXPECT_FALSE(fly(fault.damage, 10, 30).trusts(Sensor::gyro)) << fault.name;
+    }
+  }
+}
+
 TEST(SensorMonitor, StampsThatScatterAreNamedAndLeaveTheGyroOut)
 {
   const SensorMonitor monitor = flyByWrongStamps(0.015, 0);
@@ -183,6 +209,8 @@ TEST(SensorMonitor, StampsThatScatterAreNamedAndLeaveTheGyroOut)
   EXPECT_LT(monitor.verdicts().front().since_s, 2);
   EXPECT_FALSE(monitor.trusts(Sensor::gyro));
   EXPECT_TRUE(monitor.trusts(Sensor::odometry) && monitor.trusts(Sensor::images));
+  EXPECT_FALSE(flyByWrongStamps(0.015, 0, 30).trusts(Sensor::gyro));
+  EXPECT_TRUE(flyByWrongStamps(0.015, 0, 14, 5).trusts(Sensor::gyro)) << "again";
 }
 
 TEST(SensorMonitor, StampsThatHoldOrAreLateAllAlikeDoNotScatter)
