@@ -17,6 +17,7 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kMemory_s = 4;
+constexpr double kAgreed_s = 3; // after which a gyro that contradicted the points is trusted again
 
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
@@ -90,7 +91,7 @@ void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const
 /// err: at rest, or about one axis, swapped and negated rates agree as well.
 bool SensorMonitor::hasGyroAgreedInTurns() const
 {
-  constexpr double kAgreed_s = 3, kTurned = 100; // squared turns about an axis over their variance
+  constexpr double kTurned = 100; // squared turns about an axis over their variance
   const std::int64_t from_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
   Vector3d turned = Vector3d::Zero();
   for (const Comparison &c : m_comparisons) {
@@ -124,6 +125,9 @@ void SensorMonitor::checkReturn(Sensor sensor)
   if (!is_gyro && std::any_of(m_steps.begin(), m_steps.end(),
                               [back_ns](const Step &step) { return step.stamp_ns > back_ns && step.is_held; }))
     return;
+  const std::int64_t agreed_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
+  while (is_gyro && m_comparisons.front().b_ns <= agreed_ns) // what was before is judged
+    m_comparisons.pop_front();
   m_distrusted[s] = false;
   m_verdicts[*m_may_return[s]].text += fmt::format(" until {:.1f} s", secondsOf(back_ns));
   m_may_return[s].reset();
