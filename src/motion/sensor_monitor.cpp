@@ -50,8 +50,11 @@ SensorMonitor::SensorMonitor(const Pose &bMc, const SensorMonitorOptions &option
 
 void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
-  collect(frame);
   std::fill(std::begin(m_wrong_now), std::end(m_wrong_now), false);
+  const Turns turns = turnsTo(frame);
+  if (const auto wrong = impossible(turns))
+    m_wrong_now[static_cast<int>(*wrong)] = true;
+  collect(frame);
   checkGyroSamples(frame);
   checkSteps(frame, motions);
   for (const RelativeMotion &motion : motions)
@@ -64,11 +67,45 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
   checkReturn(Sensor::odometry);
   checkDirection();
   checkTilt(frame);
+  if (turns.gyro && trustsNow(Sensor::gyro))
+    m_turning = *turns.gyro / turns.dt;
+  else if (turns.odometry && trustsNow(Sensor::odometry))
+    m_turning = *turns.odometry / turns.dt;
+}
+
+SensorMonitor::Turns SensorMonitor::turnsTo(const Frame &frame) const
+{
+  Turns turns;
+  if (m_steps.empty() || frame.stamp_ns <= m_steps.back().stamp_ns)
+    return turns;
+  const Step &last = m_steps.back();
+  turns.dt = secondsOf(frame.stamp_ns - last.stamp_ns);
+  const GyroRotation turned = integrateGyro(frame.gyro, last.stamp_ns, frame.stamp_ns);
+  if (turned.complete)
+    turns.gyro = logSo3(turned.R);
+  if (frame.wMb_odometry)
+    turns.odometry = logSo3(orthonormalized(last.wMb.R.transpose() * frame.wMb_odometry->R));
+  return turns;
+}
+
+/// Of gyro and odometry the one whose turn is the farther from how the body turned until then, where they differ so
+/// much that one of them would put all points elsewhere.
+std::optional<Sensor> SensorMonitor::impossible(const Turns &turns) const
+{
+  constexpr double kApart = 0.3, kDrift = 0.1; // [rad], forty times what they err by; [rad/s]
+  if (!turns.gyro || !turns.odometry || !trusts(Sensor::gyro) || !trusts(Sensor::odometry) ||
+      logSo3(expSo3(-*turns.gyro) * expSo3(*turns.odometry)).norm() < kApart + kDrift * turns.dt)
+    return std::nullopt;
+  const Vector3d expected = turns.dt * m_turning;
+  const bool is_gyro = (*turns.gyro - expected).norm() > (*turns.odometry - expected).norm();
+  return is_gyro ? Sensor::gyro : Sensor::odometry;
 }
 
 const Frame &SensorMonitor::withoutLiars(const Frame &frame, Frame &room) const
 {
-  return only(frame, trusts(Sensor::gyro), trusts(Sensor::odometry), room);
+  const std::optional<Sensor> wrong = impossible(turnsTo(frame));
+  return only(frame, trusts(Sensor::gyro) && wrong != Sensor::gyro,
+              trusts(Sensor::odometry) && wrong != Sensor::odometry, room);
 }
 
 const Frame &SensorMonitor::trusted(const Frame &frame, Frame &room) const

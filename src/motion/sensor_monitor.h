@@ -14,7 +14,9 @@
 /// is more likely: its two squared differences are summed over the window.
 ///
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
-/// taken, and nothing wrong enters the map before the alarm. A sensor that was silent or repeated itself is trusted
+/// taken, and nothing wrong enters the map before the alarm. A turn that gyro and odometry tell so differently that no
+/// point would be found where the wrong one puts it is decided before the points are looked for, by how fast the body
+/// turned until then. A sensor that was silent or repeated itself is trusted
 /// again once all of a window agrees with the points.
 ///
 /// False alarms: three rotations of normal errors exceed the limit of 25 once in 60,000 comparisons; four of six do so
@@ -79,7 +81,8 @@ public:
   bool trusts(Sensor sensor) const { return !m_distrusted[static_cast<int>(sensor)]; }
   /// Whether what a sensor says of the motion to the newest frame may be used.
   bool trustsNow(Sensor sensor) const { return trusts(sensor) && !m_wrong_now[static_cast<int>(sensor)]; }
-  /// \p frame without the sensors whose verdict lasts: for a frame that is yet to be processed.
+  /// \p frame without the sensors whose verdict lasts or that tell a turn which cannot be: for a frame that is yet to
+  /// be processed.
   const Frame &withoutLiars(const Frame &frame, Frame &room) const;
   /// The frame processed last, without what is not trusted in it.
   const Frame &trusted(const Frame &frame, Frame &room) const;
@@ -109,6 +112,13 @@ private:
     bool is_held = false; ///< the pose before once more, while the points moved
   };
 
+  struct Turns ///< from the frame processed last to another one [rad]
+  {
+    std::optional<Eigen::Vector3d> gyro, odometry;
+    double dt = 0; ///< [s]
+  };
+  Turns turnsTo(const Frame &frame) const;
+  std::optional<Sensor> impossible(const Turns &turns) const;
   void collect(const Frame &frame);
   void compare(const Frame &frame, const RelativeMotion &motion);
   void checkGyroSamples(const Frame &frame);
@@ -144,7 +154,8 @@ private:
   std::deque<GyroSample> m_samples; ///< of the last seconds
   std::deque<Comparison> m_comparisons;
   std::deque<Step> m_steps;
-  std::optional<std::int64_t> m_gyro_changed_ns; ///< when the gyro's value was last another one
+  Eigen::Vector3d m_turning = Eigen::Vector3d::Zero(); ///< the body, by what was trusted last [rad/s]
+  std::optional<std::int64_t> m_gyro_changed_ns;       ///< when the gyro's value was last another one
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;
   bool m_had_gyro = false, m_had_odometry = false;
   std::vector<SensorVerdict> m_verdicts;

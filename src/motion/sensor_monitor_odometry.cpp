@@ -40,7 +40,7 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
     const double dt = std::max(1e-3, secondsOf(step.stamp_ns - before.stamp_ns));
     step.velocity = (step.wMb.t - before.wMb.t) / dt;
     step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
-    is_wrong = step.is_held || before.is_held; // the step after a pause makes up for it
+    is_wrong |= step.is_held || before.is_held; // the step after a pause makes up for it
     if (m_steps.size() > 1) {
       const Vector3d change = (step.velocity - before.velocity) * dt;
       constexpr double kAcceleration = 3; // that flights reach for long [m/s^2]

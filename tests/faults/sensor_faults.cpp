@@ -91,6 +91,13 @@ std::vector<Fault> lies()
            }),
       gyro("gyro_bias", "the gyro off by 0.05 rad/s about z",
            [](Table &table, std::size_t i) { table.set(i, 3, table.number(i, 3) + 0.05); }),
+      {"sensors", "gyro_spike", "the gyro off by 30 rad/s about x for a second", Duty::survive,
+       [](SpoiltFlight &flight) {
+         const std::int64_t begin = beginOf(flight), end = begin + 1'000'000'000;
+         for (std::size_t i = 0; i < flight.imu.rows.size(); ++i)
+           if (flight.imu.stamp(i) >= begin && flight.imu.stamp(i) < end)
+             flight.imu.set(i, 1, flight.imu.number(i, 1) + 30);
+       }},
       {"sensors", "gyro_ends", "no gyro from then on", Duty::survive,
        [](SpoiltFlight &flight) {
          auto &rows = flight.imu.rows;

@@ -257,6 +257,34 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
   EXPECT_TRUE(monitor.trusts(Sensor::gyro));
 }
 
+/// What is left of each frame before its points are looked for, which a turn that is far off would lead astray.
+TEST(SensorMonitor, ATurnThatCannotBeIsLeftOutBeforeThePointsAreLookedFor)
+{
+  constexpr std::size_t kFrom = 30, kTo = 40;
+  const auto leftOut = [](const std::function<void(Frame &)> &damage) {
+    MadeFlight flight;
+    SensorMonitor monitor(forwardCamera());
+    std::pair<int, int> without; // gyro, odometry
+    for (std::size_t i = 0; i < kTo; ++i) {
+      Frame frame = flight.frame(i), room;
+      if (i >= kFrom)
+        damage(frame);
+      const Frame &looked_at = monitor.withoutLiars(frame, room);
+      without.first += i > 0 && looked_at.gyro.empty();
+      without.second += !looked_at.wMb_odometry;
+      monitor.process(frame, flight.seen(i));
+    }
+    return without;
+  };
+  const auto turned = [](Frame &frame, double angle) {
+    frame.wMb_odometry->R = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix() * frame.wMb_odometry->R;
+  };
+  EXPECT_EQ(leftOut([](Frame &) {}), std::make_pair(0, 0));
+  const auto wild = [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); }); };
+  EXPECT_EQ(leftOut(wild), std::make_pair(10, 0));
+  EXPECT_EQ(leftOut([&](Frame &f) { turned(f, 0.5); }), std::make_pair(0, 1)) << "a heading that is corrected once";
+}
+
 TEST(SensorMonitor, AnOdometryThatGoesOnJumpingIsNamedInAFewLinesAndLeftOut)
 {
   const SensorMonitor monitor = fly([](Frame &f) {
