@@ -12,6 +12,7 @@ namespace bole
 namespace
 {
 constexpr double kLargestGyroGap_s = 0.05; // beyond, the rotation between two samples is a guess
+constexpr double kLargestTurn_rad = 1;     // beyond, hardly a point is in both pictures, and a gyro is wrong
 constexpr double kLeastGap_s = 0.5;        // as a gyro or an odometry is called silent; a gap of less costs no trunk
 constexpr double kUnusual = 3;             // two frames in a row that did not come
 constexpr std::size_t kFewestIntervals = 3, kMostIntervals = 15; // that tell what is usual
@@ -45,7 +46,8 @@ MeasuredRotation FrameHealth::motionTo(const Frame &frame) const
     return motion;
   motion.elapsed_s = 1e-9 * static_cast<double>(frame.stamp_ns - *m_last_stamp_ns);
   const Eigen::Matrix3d cRb = m_bMc.R.transpose();
-  if (const auto angle = integrated(frame.gyro, *m_last_stamp_ns, frame.stamp_ns))
+  if (const auto angle = integrated(frame.gyro, *m_last_stamp_ns, frame.stamp_ns);
+      angle && angle->norm() < kLargestTurn_rad)
     motion.gyro = cRb * *angle;
   if (m_last_odometry && frame.wMb_odometry)
     motion.odometry = cRb * logSo3(orthonormalized(m_last_odometry->R.transpose() * frame.wMb_odometry->R));
