@@ -87,7 +87,7 @@ private:
   std::vector<Reading> readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
                                  AlbumGradients &gradients) const;
   void detectLeaning(const TrunkMap &likely, AlbumGradients &gradients);
-  void placeByBark();
+  void placeByColumns();
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void followScale(double seconds_passed);

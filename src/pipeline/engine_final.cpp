@@ -165,14 +165,18 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   return readings;
 }
 
-/// The last word on where the trunks stand. It moves no pose: bark and borders share the path by which both are
+/// The last word on where the trunks stand. It moves no pose: columns and borders share the path by which both are
 /// measured.
-void Engine::placeByBark()
+void Engine::placeByColumns()
 {
   const std::vector<LevelView> views = levelViews(m_album.frames());
-  for (const MapTrunk &trunk : m_map.trunks())
-    if (!trunk.removed)
-      m_map.refresh({trunk.id, placedByBark(trunk.trunk, views, farthestJudged()), std::nullopt});
+  for (const MapTrunk &trunk : m_map.trunks()) {
+    if (trunk.removed)
+      continue;
+    TrunkEstimate estimate = endedByDepth({trunk.id, trunk.trunk, trunk.covariance}, views, farthestJudged());
+    estimate.trunk = placedByBark(estimate.trunk, views, farthestJudged());
+    m_map.refresh(estimate);
+  }
 }
 
 /// Every hypothesis in the light of all frames.
@@ -218,7 +222,7 @@ void Engine::decideByAllFrames()
     m_smoother.removeTrunk(gone);
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  placeByBark();
+  placeByColumns();
   m_map.doubtPlaces();
 }
 } // namespace bole

@@ -104,6 +104,25 @@ Trunk movedAlong(const Eigen::Vector2d &line_of_sight, Trunk trunk, double by)
   return trunk;
 }
 
+Eigen::Vector2d leftOf(const Eigen::Vector2d &toward) { return Eigen::Vector2d(-toward.y(), toward.x()).normalized(); }
+
+/// \p trunk with its borders moved outwards, left and right [m].
+Trunk withBordersMoved(Trunk trunk, const std::array<double, 2> &move, const Eigen::Vector2d &leftwards)
+{
+  trunk.xy += 0.5 * (move[0] - move[1]) * leftwards;
+  trunk.log_radius = std::log(trunk.radius() + 0.5 * (move[0] + move[1]));
+  return trunk;
+}
+
+/// Of place and logarithm of the radius, by variances of the borders [m^2].
+Eigen::Matrix3d covarianceByBorders(const std::array<double, 2> &variance, const Eigen::Vector2d &leftwards,
+                                    double radius)
+{
+  Eigen::Matrix<double, 3, 2> J;
+  J << 0.5 * leftwards, -0.5 * leftwards, 0.5 / radius, 0.5 / radius;
+  return J * Eigen::Vector2d(variance[0], variance[1]).asDiagonal() * J.transpose();
+}
+
 /// How far \p trunk surely goes on outside of its borders [px], left and right.
 std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &borders)
 {
@@ -148,17 +167,12 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
   }
   if (move[0] == 0 && move[1] == 0)
     return std::nullopt;
-  const Eigen::Vector2d toward = meanLineOfSight(trunk, views, farthest);
-  const Eigen::Vector2d leftwards = Eigen::Vector2d(-toward.y(), toward.x()).normalized();
-  const double radius = trunk.radius() + 0.5 * (move[0] + move[1]);
+  const double radius = trunk.radius() + 0.5 * (move[0] + move[1]), variance = std::pow(kSigma_px * borders->px, 2);
   if (radius < borders->px || radius > radius_max)
     return std::nullopt;
-  Hypothesis guess{reading.id, trunk, reading.online};
-  guess.trunk.xy += 0.5 * (move[0] - move[1]) * leftwards;
-  guess.trunk.log_radius = std::log(radius);
-  const double sigma = kSigma_px * borders->px;
-  guess.covariance.topLeftCorner<2, 2>() = 0.5 * sigma * sigma * leftwards * leftwards.transpose();
-  guess.covariance(2, 2) = 0.5 * std::pow(sigma / radius, 2);
+  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(trunk, views, farthest));
+  Hypothesis guess{reading.id, withBordersMoved(trunk, move, leftwards), reading.online};
+  guess.covariance.topLeftCorner<3, 3>() = covarianceByBorders({variance, variance}, leftwards, radius);
   return BorderDoubt{guess, oddsAgainst(trunk, *borders)};
 }
 
@@ -190,6 +204,28 @@ std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::
   along << toward, 1;
   guess.covariance.topLeftCorner<3, 3>() = kSigma * kSigma * along * along.transpose();
   return guess;
+}
+
+TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> &views, double farthest)
+{
+  constexpr double kDepth = 0.4;    // its share: borders are off less often, and by more
+  constexpr double kMost_px = 2;    // by which depth differs that counts
+  constexpr double kSigma_px = 0.5; // of a border, the same in all views: what light and shade move it by
+  const std::optional<DepthBorders> borders = depthBorders(estimate.trunk, views, farthest);
+  if (!borders)
+    return estimate;
+  const double before = estimate.trunk.radius(), most = std::min(kMost_px * borders->px, before);
+  std::array<double, 2> move{}, variance{};
+  for (std::size_t side = 0; side < move.size(); ++side) {
+    if (borders->likely[0] && borders->likely[1])
+      move[side] = kDepth * std::clamp(*borders->likely[side] - before, -most, most);
+    variance[side] = std::pow(kSigma_px * borders->px, 2) + move[side] * move[side];
+  }
+  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(estimate.trunk, views, farthest));
+  estimate.trunk = withBordersMoved(estimate.trunk, move, leftwards);
+  if (estimate.covariance)
+    estimate.covariance->topLeftCorner<3, 3>() += covarianceByBorders(variance, leftwards, estimate.trunk.radius());
+  return estimate;
 }
 
 Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)

@@ -105,6 +105,10 @@ double silhouetteScore(const Judged &reading);
 std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,
                                           double farthest, double radius_max);
 
+/// Between the borders that it was read from, moved towards where depth ends the trunk, and as sure of them as depth
+/// agrees; as it is where depth tells of none.
+TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> &views, double farthest);
+
 /// Where \p trunk stands by its bark as well as by its borders: at the mean of both ranges.
 Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
 

@@ -136,6 +136,33 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
   EXPECT_FALSE(isBehind(right->evidence));
 }
 
+/// A reading that leaves a rim of a pixel and a half out on the right.
+TEST(FinalPass, DepthHasItsShareInWhereATrunkEnds)
+{
+  constexpr double kFarthest = 14;
+  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
+  const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
+  const std::vector<LevelView> views = flight.views();
+  const Matrix5d sure = 1e-6 * Matrix5d::Identity();
+  const TrunkEstimate mended = endedByDepth({1, test::trunkOf(without_rim), sure}, views, kFarthest);
+  EXPECT_GT(mended.trunk.radius(), without_rim.radius + 0.003);
+  EXPECT_LT(mended.trunk.radius(), whole.radius);
+  EXPECT_LT(mended.trunk.xy.y(), without_rim.y - 0.003);
+  EXPECT_GT(mended.trunk.xy.y(), whole.y);
+  EXPECT_NEAR(mended.trunk.xy.x(), whole.x, 0.003) << "its range is told by other means";
+  const Matrix5d wider = *mended.covariance - sure;
+  EXPECT_GT(wider(1, 1), std::pow(0.004, 2));
+  EXPECT_LT(wider(1, 1), std::pow(0.02, 2));
+  EXPECT_NEAR(wider(2, 2), wider(1, 1) / std::pow(mended.trunk.radius(), 2), 0.1 * wider(2, 2));
+  const TrunkEstimate right = endedByDepth({1, test::trunkOf(whole), sure}, views, kFarthest);
+  EXPECT_NEAR(right.trunk.radius(), whole.radius, 0.004);
+  EXPECT_NEAR(right.trunk.xy.y(), whole.y, 0.004);
+  EXPECT_LT((*right.covariance - sure)(1, 1), wider(1, 1));
+  const TrunkEstimate unseen = endedByDepth({1, test::trunkOf(whole), sure}, {}, kFarthest);
+  EXPECT_TRUE(unseen.trunk.minus(test::trunkOf(whole)).isZero(0));
+  EXPECT_TRUE((*unseen.covariance - sure).isZero(0));
+}
+
 /// The same lines in the images, a twelfth too near and too far.
 TEST(FinalPass, TheBarkTellsHowFarATrunkStands)
 {
