@@ -270,7 +270,8 @@ double ColumnCurves::least(std::size_t kind, std::size_t first, std::size_t end)
   return best;
 }
 
-LevelView::LevelView(const LevelImage &level, const Pose &wMc) : image(&level), position(wMc.t.head<2>()), z(wMc.t.z())
+LevelView::LevelView(const LevelImage &level, const Pose &wMc, double time)
+    : image(&level), position(wMc.t.head<2>()), z(wMc.t.z()), time_s(time)
 {
   forward = (wMc.R * level.cRl).col(0).head<2>().normalized();
   left = {-forward.y(), forward.x()};

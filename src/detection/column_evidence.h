@@ -21,11 +21,12 @@ namespace bole
 /// A frame of the flight on the ground plane, at its final pose.
 struct LevelView
 {
-  LevelView(const LevelImage &level, const Pose &wMc);
+  LevelView(const LevelImage &level, const Pose &wMc, double time_s = 0);
 
   const LevelImage *image;
   Eigen::Vector2d position, forward, left; ///< of the level camera in the world [m], [1], [1]
   double z;                                ///< its height in the world [m]
+  double time_s;                           ///< stamp
 };
 
 /// Where a trunk stands in a view: bearing from the heading, half width, range.

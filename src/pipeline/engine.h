@@ -127,7 +127,7 @@ template <typename Frames> std::vector<LevelView> Engine::levelViews(const Frame
   std::vector<LevelView> views;
   views.reserve(frames.size());
   for (const auto &frame : frames)
-    views.emplace_back(frame.level, cameraAt(frame.pose));
+    views.emplace_back(frame.level, cameraAt(frame.pose), frame.time_s);
   return views;
 }
 } // namespace bole

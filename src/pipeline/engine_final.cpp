@@ -42,8 +42,11 @@ std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views, const 
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const Judged &one) { return isOf(one, hypothesis); });
-    if (const auto one = known != before.end() ? *known : judge(hypothesis, views, farthestJudged()))
+    if (auto one = known != before.end() ? *known : judge(hypothesis, views, farthestJudged())) {
+      one->first_seen_s = trunk.first_seen_s;
+      one->last_seen_s = trunk.last_seen_s;
       all.push_back(*one);
+    }
   }
   return all;
 }
@@ -111,6 +114,8 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
       reading.is_seen = !followed[i].views.empty();
       if (refit && followed[i].views.size() >= kLeastViews) {
         reading.judged = *refit;
+        reading.judged->first_seen_s = followed[i].trunk.views.front().time_s;
+        reading.judged->last_seen_s = followed[i].trunk.views.back().time_s;
         reading.views = std::move(followed[i]);
       }
       readings.push_back(std::move(reading));

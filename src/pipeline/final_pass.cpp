@@ -237,23 +237,26 @@ Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, doub
 
 namespace
 {
-/// Two hypotheses that fill the same columns in most of the views that show both are made of the same lines.
-bool fillSameColumns(const Trunk &a, const Trunk &b, const std::vector<LevelView> &views, double farthest)
+/// A hypothesis is made of the lines of a \p better one where both fill the same columns in most of the views that it
+/// was read in. What hides it in others does not count.
+bool fillSameColumns(const Judged &one, const Judged &better, const std::vector<LevelView> &views, double farthest)
 {
   constexpr int kLeastShared = 4;
   constexpr double kMostly = 0.5; // of what either fills; of the views
-  int both = 0, same = 0;
+  int read = 0, same = 0;
   for (const LevelView &view : views) {
-    const auto at_a = locate(a, view, farthest), at_b = locate(b, view, farthest);
-    if (!at_a || !at_b)
+    const auto at_a = locate(one.trunk, view, farthest), at_b = locate(better.trunk, view, farthest);
+    if (!at_a || view.time_s < one.first_seen_s || view.time_s > one.last_seen_s)
       continue;
-    ++both;
+    ++read;
+    if (!at_b)
+      continue;
     const double left = std::min(at_a->bearing + at_a->half_angle, at_b->bearing + at_b->half_angle);
     const double right = std::max(at_a->bearing - at_a->half_angle, at_b->bearing - at_b->half_angle);
     const double either = 2 * (at_a->half_angle + at_b->half_angle) - (left - right);
     same += left - right > kMostly * either;
   }
-  return both >= kLeastShared && same > kMostly * both;
+  return same >= kLeastShared && same > kMostly * read;
 }
 } // namespace
 
@@ -267,7 +270,7 @@ std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double a
   for (const Judged &one : judged)
     if (std::none_of(chosen.begin(), chosen.end(), [&](const Judged &better) {
           return distanceBetween(one.trunk, better.trunk) < one.trunk.radius() + better.trunk.radius() + apart ||
-                 fillSameColumns(one.trunk, better.trunk, views, farthest);
+                 fillSameColumns(one, better, views, farthest);
         }))
       chosen.push_back(one);
   return chosen;

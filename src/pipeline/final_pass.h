@@ -61,6 +61,8 @@ struct Judged
   double online = 0;
   ColumnEvidence evidence;
   double log_odds = 0; ///< that it is a trunk
+  double first_seen_s = -std::numeric_limits<double>::infinity(),
+         last_seen_s = std::numeric_limits<double>::infinity(); ///< when its borders were read
 };
 
 /// What the decision rests on: 1, how much its columns differ at its range, by how much more they do at the best range
@@ -113,7 +115,7 @@ TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> 
 Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest);
 
 /// The best first, without those whose odds are below \p least, that stand in the place of a better one (less than
-/// \p apart [m] between their bark) or fill the same columns in most views.
+/// \p apart [m] between their bark) or fill the same columns in most of the views that they were read in.
 std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,
                               const std::vector<LevelView> &views, double farthest);
 } // namespace bole

@@ -20,7 +20,7 @@ const LevelImage *RecentColumns::add(const vpImage<unsigned char> &image, std::s
   m_last = at.wMc.t;
   if (m_frames.size() == kFrames)
     m_frames.pop_front();
-  m_frames.push_back({pose, computeLevelImage(image, at.camera, at.wMc.R, range)});
+  m_frames.push_back({pose, at.time_s, computeLevelImage(image, at.camera, at.wMc.R, range)});
   return &m_frames.back().level;
 }
 

@@ -21,6 +21,7 @@ public:
   struct Frame
   {
     std::size_t pose = 0;
+    double time_s = 0;
     LevelImage level;
   };
   /// The level image of a frame; nullptr where the camera has moved by less than \p spacing [units of the motion] since
