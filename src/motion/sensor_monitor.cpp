@@ -71,34 +71,38 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
     m_turning = *turns.gyro / turns.dt;
   else if (turns.odometry && trustsNow(Sensor::odometry))
     m_turning = *turns.odometry / turns.dt;
+  m_last_ns = frame.stamp_ns;
 }
 
 SensorMonitor::Turns SensorMonitor::turnsTo(const Frame &frame) const
 {
   Turns turns;
-  if (m_steps.empty() || frame.stamp_ns <= m_steps.back().stamp_ns)
+  if (!m_last_ns || frame.stamp_ns <= *m_last_ns)
     return turns;
-  const Step &last = m_steps.back();
-  turns.dt = secondsOf(frame.stamp_ns - last.stamp_ns);
-  const GyroRotation turned = integrateGyro(frame.gyro, last.stamp_ns, frame.stamp_ns);
+  turns.dt = secondsOf(frame.stamp_ns - *m_last_ns);
+  const GyroRotation turned = integrateGyro(frame.gyro, *m_last_ns, frame.stamp_ns);
   if (turned.complete)
     turns.gyro = logSo3(turned.R);
-  if (frame.wMb_odometry)
-    turns.odometry = logSo3(orthonormalized(last.wMb.R.transpose() * frame.wMb_odometry->R));
+  if (!m_steps.empty() && frame.wMb_odometry)
+    turns.odometry = logSo3(orthonormalized(m_steps.back().wMb.R.transpose() * frame.wMb_odometry->R));
   return turns;
 }
 
 /// Of gyro and odometry the one whose turn is the farther from how the body turned until then, where they differ so
-/// much that one of them would put all points elsewhere.
+/// much that one of them would put all points elsewhere. A gyro alone is wrong where no body begins to turn so fast.
 std::optional<Sensor> SensorMonitor::impossible(const Turns &turns) const
 {
   constexpr double kApart = 0.3, kDrift = 0.1; // [rad], forty times what they err by; [rad/s]
-  if (!turns.gyro || !turns.odometry || !trusts(Sensor::gyro) || !trusts(Sensor::odometry) ||
-      logSo3(expSo3(-*turns.gyro) * expSo3(*turns.odometry)).norm() < kApart + kDrift * turns.dt)
+  constexpr double kAcceleration = 100;        // [rad/s^2]: of a racing drone
+  if (!turns.gyro || !trusts(Sensor::gyro))
     return std::nullopt;
   const Vector3d expected = turns.dt * m_turning;
-  const bool is_gyro = (*turns.gyro - expected).norm() > (*turns.odometry - expected).norm();
-  return is_gyro ? Sensor::gyro : Sensor::odometry;
+  const double off = (*turns.gyro - expected).norm();
+  if (!turns.odometry || !trusts(Sensor::odometry))
+    return off > kApart + 0.5 * kAcceleration * turns.dt * turns.dt ? std::optional(Sensor::gyro) : std::nullopt;
+  if (logSo3(expSo3(-*turns.gyro) * expSo3(*turns.odometry)).norm() < kApart + kDrift * turns.dt)
+    return std::nullopt;
+  return off > (*turns.odometry - expected).norm() ? Sensor::gyro : Sensor::odometry;
 }
 
 const Frame &SensorMonitor::withoutLiars(const Frame &frame, Frame &room) const

@@ -154,6 +154,7 @@ private:
   std::deque<GyroSample> m_samples; ///< of the last seconds
   std::deque<Comparison> m_comparisons;
   std::deque<Step> m_steps;
+  std::optional<std::int64_t> m_last_ns;               ///< stamp of the frame processed last
   Eigen::Vector3d m_turning = Eigen::Vector3d::Zero(); ///< the body, by what was trusted last [rad/s]
   std::optional<std::int64_t> m_gyro_changed_ns;       ///< when the gyro's value was last another one
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;

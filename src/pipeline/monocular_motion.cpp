@@ -4,7 +4,6 @@
 #include "geometry/constants.h"
 #include "geometry/median.h"
 #include "geometry/so3.h"
-#include "motion/sensor_monitor.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -55,7 +54,8 @@ MonocularMotion::MonocularMotion(const PinholeCamera &camera, const Pose &bMc, c
       m_camera_height(options.camera_height),
       m_focal_sigma(options.focal_sigma),
       m_model(options.motion, options.points.gyro),
-      m_odometry(camera, options.focal_sigma)
+      m_odometry(camera, options.focal_sigma),
+      m_monitor(bMc)
 {
 }
 
@@ -209,10 +209,12 @@ void MonocularMotion::addBacklog(Motion &motion) const
 /// An odometry that the first frame does not have.
 std::vector<SensorVerdict> MonocularMotion::verdicts() const
 {
-  if (!m_odometry_from_s)
-    return {};
-  return {{toString(Sensor::odometry), "time", *m_odometry_from_s,
-           fmt::format("odometry: begins at {:.1f} s, after the images, and is not used", *m_odometry_from_s)}};
+  std::vector<SensorVerdict> verdicts = m_monitor.verdicts();
+  if (m_odometry_from_s)
+    verdicts.push_back(
+        {toString(Sensor::odometry), "time", *m_odometry_from_s,
+         fmt::format("odometry: begins at {:.1f} s, after the images, and is not used", *m_odometry_from_s)});
+  return verdicts;
 }
 
 MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
@@ -222,6 +224,14 @@ MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const 
   return step;
 }
 
+/// By the points.
+void MonocularMotion::judgeGyro(const Frame &frame)
+{
+  Frame images = frame, room;
+  images.wMb_odometry.reset(); // one that begins late is not used
+  m_monitor.process(images, m_points.process(m_monitor.withoutLiars(images, room)));
+}
+
 Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
 {
   Motion motion;
@@ -229,12 +239,13 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
   if (frame.wMb_odometry && !m_odometry_from_s)
     m_odometry_from_s = secondsOf(frame.stamp_ns);
   motion.is_rotation_seen = true;
-  motion.step = expected(frame, wMa, velocity);
-  motion.step.is_step_measured = false;
-  if (motion.step.turn_from_gyro)
-    m_points.process(frame); // for the bias that it teaches
-  else
+  Frame room;
+  if (frame.gyro.empty())
     m_points.track(frame);
+  else
+    judgeGyro(frame);
+  motion.step = expected(m_monitor.trusted(frame, room), wMa, velocity);
+  motion.step.is_step_measured = false;
   motion.image_fault = m_points.fault();
   if (frame.status == FrameStatus::ok && motion.image_fault.empty())
     see(frame, wMa, motion);

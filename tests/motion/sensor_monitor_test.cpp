@@ -285,6 +285,24 @@ TEST(SensorMonitor, ATurnThatCannotBeIsLeftOutBeforeThePointsAreLookedFor)
   EXPECT_EQ(leftOut([&](Frame &f) { turned(f, 0.5); }), std::make_pair(0, 1)) << "a heading that is corrected once";
 }
 
+TEST(SensorMonitor, WithoutAnOdometryNoBodyBeginsToTurnAsFastAsAWildGyroSays)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 60; ++i) {
+    Frame frame = flight.frame(i), room;
+    frame.wMb_odometry.reset();
+    const bool is_wild = i >= 30 && i < 40;
+    if (is_wild)
+      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); });
+    EXPECT_EQ(monitor.withoutLiars(frame, room).gyro.empty(), i == 0 || is_wild || !monitor.trusts(Sensor::gyro)) << i;
+    monitor.process(frame, flight.seen(i));
+    EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30 || (!is_wild && monitor.trusts(Sensor::gyro))) << i;
+  }
+  ASSERT_EQ(monitor.verdicts().size(), 1u);
+  EXPECT_EQ(monitor.verdicts()[0].sensor, "gyro");
+}
+
 TEST(SensorMonitor, AnOdometryThatGoesOnJumpingIsNamedInAFewLinesAndLeftOut)
 {
   const SensorMonitor monitor = fly([](Frame &f) {
