@@ -208,20 +208,24 @@ std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::
 
 TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> &views, double farthest)
 {
-  constexpr double kDepth = 0.4;    // its share: borders are off less often, and by more
-  constexpr double kMost_px = 2;    // by which depth differs that counts
-  constexpr double kSigma_px = 0.5; // of a border, the same in all views: what light and shade move it by
+  constexpr double kBorder2 = 0.67, kDepth2 = 1; // variances of the ends by borders and by depth [px^2]
+  constexpr double kMost_px = 2;                 // by which depth differs that counts
+  constexpr double kSigma_px = 0.7; // of a border then, the same in all views: what light and shade move it by
   const std::optional<DepthBorders> borders = depthBorders(estimate.trunk, views, farthest);
   if (!borders)
     return estimate;
+  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(estimate.trunk, views, farthest));
+  const LevelImage &image = *views.back().image;
+  const double band = std::abs(image.elevation[0] - image.elevation[1]); // over which columns are added up [tan]
+  const double smeared_px = band * std::abs(leftwards.dot(estimate.trunk.lean)) / image.step;
+  const double share = kBorder2 / (kBorder2 + kDepth2 + smeared_px * smeared_px);
   const double before = estimate.trunk.radius(), most = std::min(kMost_px * borders->px, before);
   std::array<double, 2> move{}, variance{};
   for (std::size_t side = 0; side < move.size(); ++side) {
     if (borders->likely[0] && borders->likely[1])
-      move[side] = kDepth * std::clamp(*borders->likely[side] - before, -most, most);
+      move[side] = share * std::clamp(*borders->likely[side] - before, -most, most);
     variance[side] = std::pow(kSigma_px * borders->px, 2) + move[side] * move[side];
   }
-  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(estimate.trunk, views, farthest));
   estimate.trunk = withBordersMoved(estimate.trunk, move, leftwards);
   if (estimate.covariance)
     estimate.covariance->topLeftCorner<3, 3>() += covarianceByBorders(variance, leftwards, estimate.trunk.radius());
