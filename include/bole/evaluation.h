@@ -62,6 +62,9 @@ struct TrajectoryReport
   double scale = kNotMeasured;              ///< by which Alignment::xy_yaw_scale multiplies the estimate
   RelativeErrors over_frame;                ///< between consecutive frames, and over 1 s
   RelativeErrors over_second;               ///< between consecutive frames, and over 1 s
+  /// Of the online positions in the plane at the last scale, which their covariances leave out: mean, near 1 when these
+  /// are honest. Where the scale is the odometry's.
+  double nees_half = kNotMeasured;
 };
 
 /// What a flight saw of a trunk of the truth.

@@ -5,11 +5,13 @@
 #include "geometry/failure.h"
 #include "input/asl_source.h"
 #include "input/truth.h"
+#include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 
 #include <filesystem>
+#include <map>
 
 namespace bole
 {
@@ -134,6 +136,15 @@ std::vector<PosePair> pairsOf(const std::string &path, std::int64_t shift_ns, co
   return pairs;
 }
 
+/// Of the positions in the plane as they were known online, by stamp.
+std::map<std::int64_t, Eigen::Matrix2d> statedCovariances(const std::string &run, std::int64_t shift_ns)
+{
+  std::map<std::int64_t, Eigen::Matrix2d> covariances;
+  for (const FrameTrace &frame : readFrames(run))
+    covariances[frame.stamp_ns + shift_ns] = frame.covariance_xy;
+  return covariances;
+}
+
 /// First frame on first frame, less the frames that a live run may have lost.
 std::int64_t shiftOf(const std::string &path, const Reference &reference)
 {
@@ -172,8 +183,13 @@ Evaluation evaluate(const std::string &run, const std::string &sequence, const E
   };
   const std::vector<PosePair> pairs = levelled("trajectory.tum");
   evaluation.smoothed = report(pairs);
-  if (std::filesystem::exists(in_run("trajectory_online.tum")))
-    evaluation.online = report(levelled("trajectory_online.tum"));
+  if (std::filesystem::exists(in_run("trajectory_online.tum"))) {
+    const std::vector<PosePair> online = levelled("trajectory_online.tum");
+    evaluation.online = report(online);
+    if (world.scale == ScaleSource::odometry && std::filesystem::exists(in_run("frames.csv")))
+      evaluation.online->nees_half =
+          consistency(online, statedCovariances(run, shift_ns), align(online, Alignment::first_pose));
+  }
   if (!reference.odometry.empty()) {
     std::vector<PosePair> odometry;
     for (const PosePair &pair : pairs)

@@ -3,6 +3,7 @@
 #include "output/figure.h"
 #include <bole/evaluation.h>
 
+#include <cmath>
 #include <fmt/format.h>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -211,6 +212,9 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
     addTrajectory(text, "online", *evaluation.online);
   if (evaluation.odometry)
     addTrajectory(text, "odometry", *evaluation.odometry);
+  if (evaluation.online && std::isfinite(evaluation.online->nees_half))
+    add(text, "  online positions: NEES/2 {} (first pose as gauge; 1 when honest)\n",
+        figure(evaluation.online->nees_half, 0, 2));
   if (evaluation.trunks) {
     addTrunks(text, *evaluation.trunks, evaluation.is_against_run);
     if (verbose)
@@ -227,8 +231,10 @@ std::string toJson(const Evaluation &evaluation)
     json["time_shift_s"] = *evaluation.time_shift_s;
   json["reference"] = evaluation.reference.empty() ? Json() : Json(evaluation.reference);
   json["trajectory"]["smoothed"] = toJson(evaluation.smoothed);
-  if (evaluation.online)
+  if (evaluation.online) {
     json["trajectory"]["online"] = toJson(*evaluation.online);
+    json["trajectory"]["online"]["nees_half"] = evaluation.online->nees_half;
+  }
   if (evaluation.odometry)
     json["trajectory"]["odometry"] = toJson(*evaluation.odometry);
   if (evaluation.trunks)

@@ -7,6 +7,7 @@
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 
@@ -124,6 +125,24 @@ TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const Planar
     sum_rotation += logSo3(pair.truth.R.transpose() * aligned.R).squaredNorm();
   }
   return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()), rms(sum_rotation, pairs.size()) / kDegree};
+}
+
+double consistency(const std::vector<PosePair> &pairs, const std::map<std::int64_t, Eigen::Matrix2d> &covariances,
+                   const PlanarTransform &transform)
+{
+  const Eigen::Matrix2d turn = transform.linear();
+  double sum = 0;
+  std::size_t count = 0;
+  for (const PosePair &pair : pairs) {
+    const auto covariance = covariances.find(pair.stamp_ns);
+    if (pair.stamp_ns == pairs.front().stamp_ns || covariance == covariances.end())
+      continue;
+    const Eigen::Vector2d e = (transform * pair.estimate.t - pair.truth.t).head<2>();
+    const Eigen::Matrix2d P = turn * covariance->second * turn.transpose();
+    sum += 0.5 * e.dot(P.ldlt().solve(e));
+    ++count;
+  }
+  return count == 0 ? kNotMeasured : sum / static_cast<double>(count);
 }
 
 RelativeErrors relativeErrors(const std::vector<PosePair> &pairs, double delta_s)

@@ -6,6 +6,7 @@
 #include "input/trajectory.h"
 #include <bole/evaluation.h>
 
+#include <map>
 #include <vector>
 
 namespace bole
@@ -47,6 +48,11 @@ PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
 
 /// Errors after \p transform.
 TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform);
+
+/// Mean of e^T P^-1 e / 2 of the positions in the plane, e their errors after \p transform, P the covariances that the
+/// estimate states, by stamp [m^2]: 1 when they are honest. The first pose is the gauge of both.
+double consistency(const std::vector<PosePair> &pairs, const std::map<std::int64_t, Eigen::Matrix2d> &covariances,
+                   const PlanarTransform &transform);
 
 /// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the
 /// first pose at least \p delta_s (less half a millisecond) after i and no later than twice that.

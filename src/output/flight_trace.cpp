@@ -55,9 +55,9 @@ void writeTrace(const std::string &folder, const FlightTrace &trace)
   writeAtomically(folder + "/evidence.csv", text);
 }
 
-FlightTrace readTrace(const std::string &folder)
+std::vector<FrameTrace> readFrames(const std::string &folder)
 {
-  FlightTrace trace;
+  std::vector<FrameTrace> traces;
   CsvReader frames(folder + "/frames.csv", {10, ',', kFramesHeader});
   while (frames.next()) {
     FrameTrace frame;
@@ -68,8 +68,15 @@ FlightTrace readTrace(const std::string &folder)
     const double xy = frames.number(7, "var_xy");
     frame.covariance_xy << frames.number(6, "var_xx"), xy, xy, frames.number(8, "var_yy");
     frame.reason = frames.text(9);
-    trace.frames.push_back(frame);
+    traces.push_back(frame);
   }
+  return traces;
+}
+
+FlightTrace readTrace(const std::string &folder)
+{
+  FlightTrace trace;
+  trace.frames = readFrames(folder);
   CsvReader views(folder + "/views.csv", {11, ',', kViewsHeader});
   while (views.next()) {
     TrunkTrace view;

@@ -61,4 +61,6 @@ struct FlightTrace
 void writeTrace(const std::string &folder, const FlightTrace &trace);
 /// Reads them. Errors: vpException with file:line.
 FlightTrace readTrace(const std::string &folder);
+/// frames.csv alone.
+std::vector<FrameTrace> readFrames(const std::string &folder);
 } // namespace bole

@@ -206,6 +206,33 @@ TEST(TrajectoryMetrics, IgnoresPosesOutsideTheTruth)
   EXPECT_EQ(pairPoses(estimate, truth).size(), 10u);
 }
 
+/// A walk whose steps scatter by .1 m, and a world that is turned.
+TEST(TrajectoryMetrics, HonestCovariancesOfAWalkAreConsistent)
+{
+  std::mt19937 random(3);
+  std::normal_distribution<double> step(0, 0.1);
+  const PlanarTransform turned{1, 0.7, {3, -2}, 0};
+  double sum = 0;
+  constexpr int kWalks = 200;
+  for (int walk = 0; walk < kWalks; ++walk) {
+    std::vector<PosePair> pairs;
+    std::map<std::int64_t, Eigen::Matrix2d> covariances;
+    Eigen::Vector3d off = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 30; ++k) {
+      PosePair pair;
+      pair.stamp_ns = k;
+      pair.estimate.t = Eigen::Vector3d(k, 0.1 * k, 1) + off;
+      pair.truth = turned * Pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(k, 0.1 * k, 1));
+      pairs.push_back(pair);
+      covariances[k] = Eigen::Vector2d(0.01 * k, 0.04 * k).asDiagonal();
+      off += Eigen::Vector3d(step(random), 2 * step(random), 0);
+    }
+    sum += consistency(pairs, covariances, align(pairs, Alignment::first_pose));
+    EXPECT_TRUE(std::isnan(consistency(pairs, {}, turned)));
+  }
+  EXPECT_NEAR(sum / kWalks, 1, 0.2);
+}
+
 TEST(TrunkMetrics, CountsMatchesMissesDuplicatesAndFalsePositives)
 {
   const std::vector<TruthTrunk> truth = {tree(0, 5, 0), tree(1, 5, 3), tree(2, 8, -2), {10000, {40, 0}, 0, 0}};
