@@ -62,9 +62,6 @@ struct TrajectoryReport
   double scale = kNotMeasured;              ///< by which Alignment::xy_yaw_scale multiplies the estimate
   RelativeErrors over_frame;                ///< between consecutive frames, and over 1 s
   RelativeErrors over_second;               ///< between consecutive frames, and over 1 s
-  /// Of the online positions in the plane at the last scale, which their covariances leave out: mean, near 1 when these
-  /// are honest. Where the scale is the odometry's.
-  double nees_half = kNotMeasured;
 };
 
 /// What a flight saw of a trunk of the truth.
@@ -159,6 +156,9 @@ struct Evaluation
   std::optional<TrajectoryReport> odometry; ///< the pose filter at the frames of trajectory.tum
   std::optional<TrunkMetrics> trunks;       ///< where the sequence has trees.csv
   std::string reference; ///< describe() of the run's scale and gravity, from its summary.json; empty without one
+  /// Mean e^T P^-1 e / 2 of the online positions in the plane at the last scale, which their covariances leave out:
+  /// near 1 when these are honest. Where the scale is the odometry's.
+  double online_nees_half = kNotMeasured;
 };
 
 /// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with another run: then

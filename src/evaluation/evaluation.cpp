@@ -187,7 +187,7 @@ Evaluation evaluate(const std::string &run, const std::string &sequence, const E
     const std::vector<PosePair> online = levelled("trajectory_online.tum");
     evaluation.online = report(online);
     if (world.scale == ScaleSource::odometry && std::filesystem::exists(in_run("frames.csv")))
-      evaluation.online->nees_half =
+      evaluation.online_nees_half =
           consistency(online, statedCovariances(run, shift_ns), align(online, Alignment::first_pose));
   }
   if (!reference.odometry.empty()) {

@@ -212,9 +212,9 @@ std::string toTable(const Evaluation &evaluation, bool verbose)
     addTrajectory(text, "online", *evaluation.online);
   if (evaluation.odometry)
     addTrajectory(text, "odometry", *evaluation.odometry);
-  if (evaluation.online && std::isfinite(evaluation.online->nees_half))
+  if (std::isfinite(evaluation.online_nees_half))
     add(text, "  online positions: NEES/2 {} (first pose as gauge; 1 when honest)\n",
-        figure(evaluation.online->nees_half, 0, 2));
+        figure(evaluation.online_nees_half, 0, 2));
   if (evaluation.trunks) {
     addTrunks(text, *evaluation.trunks, evaluation.is_against_run);
     if (verbose)
@@ -233,7 +233,7 @@ std::string toJson(const Evaluation &evaluation)
   json["trajectory"]["smoothed"] = toJson(evaluation.smoothed);
   if (evaluation.online) {
     json["trajectory"]["online"] = toJson(*evaluation.online);
-    json["trajectory"]["online"]["nees_half"] = evaluation.online->nees_half;
+    json["trajectory"]["online"]["nees_half"] = evaluation.online_nees_half;
   }
   if (evaluation.odometry)
     json["trajectory"]["odometry"] = toJson(*evaluation.odometry);

@@ -7,7 +7,7 @@
 #include "geometry/so3.h"
 #include "geometry/yaw.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 
@@ -127,19 +127,28 @@ TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const Planar
   return {pairs.size(), rms(sum, pairs.size()), rms(sum_xy, pairs.size()), rms(sum_rotation, pairs.size()) / kDegree};
 }
 
-double consistency(const std::vector<PosePair> &pairs, const std::map<std::int64_t, Eigen::Matrix2d> &covariances,
-                   const PlanarTransform &transform)
+double halfNees(const Eigen::Vector2d &xy, const Eigen::Matrix2d &covariance, const Eigen::Vector2d &true_xy,
+                const PlanarTransform &gauge)
 {
-  const Eigen::Matrix2d turn = transform.linear();
+  const Eigen::Matrix2d L = gauge.linear();
+  const Eigen::Matrix2d P = L * covariance * L.transpose();
+  const Eigen::Vector2d error = gauge * xy - true_xy;
+  return P.determinant() > 0 ? 0.5 * error.dot(P.inverse() * error) : kNotMeasured;
+}
+
+double consistency(const std::vector<PosePair> &pairs, const std::map<std::int64_t, Eigen::Matrix2d> &covariances,
+                   const PlanarTransform &gauge)
+{
   double sum = 0;
   std::size_t count = 0;
   for (const PosePair &pair : pairs) {
     const auto covariance = covariances.find(pair.stamp_ns);
     if (pair.stamp_ns == pairs.front().stamp_ns || covariance == covariances.end())
       continue;
-    const Eigen::Vector2d e = (transform * pair.estimate.t - pair.truth.t).head<2>();
-    const Eigen::Matrix2d P = turn * covariance->second * turn.transpose();
-    sum += 0.5 * e.dot(P.ldlt().solve(e));
+    const double nees = halfNees(pair.estimate.t.head<2>(), covariance->second, pair.truth.t.head<2>(), gauge);
+    if (std::isnan(nees))
+      continue;
+    sum += nees;
     ++count;
   }
   return count == 0 ? kNotMeasured : sum / static_cast<double>(count);

@@ -49,10 +49,14 @@ PlanarTransform align(const std::vector<PosePair> &pairs, Alignment alignment);
 /// Errors after \p transform.
 TrajectoryErrors absoluteErrors(const std::vector<PosePair> &pairs, const PlanarTransform &transform);
 
-/// Mean of e^T P^-1 e / 2 of the positions in the plane, e their errors after \p transform, P the covariances that the
-/// estimate states, by stamp [m^2]: 1 when they are honest. The first pose is the gauge of both.
+/// e^T P^-1 e / 2, e the error of \p xy [m] and P its \p covariance [m^2] after \p gauge; NaN where P is singular.
+double halfNees(const Eigen::Vector2d &xy, const Eigen::Matrix2d &covariance, const Eigen::Vector2d &true_xy,
+                const PlanarTransform &gauge);
+
+/// Mean halfNees() of the positions in the plane, with the covariances that the estimate states, by stamp: 1 when they
+/// are honest. The first pose, the gauge of both, is left out.
 double consistency(const std::vector<PosePair> &pairs, const std::map<std::int64_t, Eigen::Matrix2d> &covariances,
-                   const PlanarTransform &transform);
+                   const PlanarTransform &gauge);
 
 /// Relative pose error over \p delta_s: (truth_i^-1 truth_j)^-1 (estimate_i^-1 estimate_j), j the
 /// first pose at least \p delta_s (less half a millisecond) after i and no later than twice that.

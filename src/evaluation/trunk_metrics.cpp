@@ -4,8 +4,6 @@
 #include "evaluation/assignment.h"
 #include "geometry/median.h"
 
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -34,14 +32,6 @@ struct Sum
   double rms() const { return count == 0 ? kNotMeasured : std::sqrt(squares / static_cast<double>(count)); }
 };
 
-double halfNees(const TrunkRecord &estimate, const TruthTrunk &truth, const PlanarTransform &gauge)
-{
-  const Eigen::Matrix2d L = gauge.linear();
-  const Eigen::Matrix2d P = L * estimate.covarianceXy() * L.transpose();
-  const Eigen::Vector2d error = gauge * estimate.xy - truth.xy;
-  return P.determinant() > 0 ? 0.5 * error.dot(P.inverse() * error) : kNotMeasured;
-}
-
 TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth, const TrunkVisibility &visibility,
                    const Alignments &alignments)
 {
@@ -51,7 +41,7 @@ TrunkMatch measure(const TrunkRecord &estimate, const TruthTrunk &truth, const T
   match.visibility = visibility;
   for (std::size_t a = 0; a < alignments.size(); ++a)
     match.error[a] = (alignments[a] * estimate.xy - truth.xy).norm();
-  match.nees_half = halfNees(estimate, truth, at(alignments, Alignment::first_pose));
+  match.nees_half = halfNees(estimate.xy, estimate.covarianceXy(), truth.xy, at(alignments, Alignment::first_pose));
   match.predicted_sigma = estimate.positionSigma();
   if (truth.radius > 0) {
     match.truth_radius = truth.radius;

@@ -16,8 +16,8 @@
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
 /// taken, and nothing wrong enters the map before the alarm. A turn that gyro and odometry tell so differently that no
 /// point would be found where the wrong one puts it is decided before the points are looked for, by how fast the body
-/// turned until then. A sensor that was silent or repeated itself is trusted
-/// again once all of a window agrees with the points.
+/// turned until then. A sensor that was silent or repeated itself is trusted again once all of a window agrees with the
+/// points.
 ///
 /// False alarms: three rotations of normal errors exceed the limit of 25 once in 60,000 comparisons; four of six do so
 /// once in 10^17. What decides in practice are errors that are not normal: see the limits of the options.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/final_pass.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 
@@ -104,8 +106,6 @@ Trunk movedAlong(const Eigen::Vector2d &line_of_sight, Trunk trunk, double by)
   return trunk;
 }
 
-Eigen::Vector2d leftOf(const Eigen::Vector2d &toward) { return Eigen::Vector2d(-toward.y(), toward.x()).normalized(); }
-
 /// \p trunk with its borders moved outwards, left and right [m].
 Trunk withBordersMoved(Trunk trunk, const std::array<double, 2> &move, const Eigen::Vector2d &leftwards)
 {
@@ -170,7 +170,7 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
   const double radius = trunk.radius() + 0.5 * (move[0] + move[1]), variance = std::pow(kSigma_px * borders->px, 2);
   if (radius < borders->px || radius > radius_max)
     return std::nullopt;
-  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(trunk, views, farthest));
+  const Eigen::Vector2d leftwards = meanLineOfSight(trunk, views, farthest).unitOrthogonal();
   Hypothesis guess{reading.id, withBordersMoved(trunk, move, leftwards), reading.online};
   guess.covariance.topLeftCorner<3, 3>() = covarianceByBorders({variance, variance}, leftwards, radius);
   return BorderDoubt{guess, oddsAgainst(trunk, *borders)};
@@ -214,7 +214,7 @@ TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> 
   const std::optional<DepthBorders> borders = depthBorders(estimate.trunk, views, farthest);
   if (!borders)
     return estimate;
-  const Eigen::Vector2d leftwards = leftOf(meanLineOfSight(estimate.trunk, views, farthest));
+  const Eigen::Vector2d leftwards = meanLineOfSight(estimate.trunk, views, farthest).unitOrthogonal();
   const LevelImage &image = *views.back().image;
   const double band = std::abs(image.elevation[0] - image.elevation[1]); // over which columns are added up [tan]
   const double smeared_px = band * std::abs(leftwards.dot(estimate.trunk.lean)) / image.step;
@@ -249,10 +249,13 @@ bool fillSameColumns(const Judged &one, const Judged &better, const std::vector<
   constexpr double kMostly = 0.5; // of what either fills; of the views
   int read = 0, same = 0;
   for (const LevelView &view : views) {
-    const auto at_a = locate(one.trunk, view, farthest), at_b = locate(better.trunk, view, farthest);
-    if (!at_a || view.time_s < one.first_seen_s || view.time_s > one.last_seen_s)
+    if (view.time_s < one.first_seen_s || view.time_s > one.last_seen_s)
+      continue;
+    const auto at_a = locate(one.trunk, view, farthest);
+    if (!at_a)
       continue;
     ++read;
+    const auto at_b = locate(better.trunk, view, farthest);
     if (!at_b)
       continue;
     const double left = std::min(at_a->bearing + at_a->half_angle, at_b->bearing + at_b->half_angle);

@@ -206,7 +206,7 @@ void MonocularMotion::addBacklog(Motion &motion) const
     add(last, newest);
 }
 
-/// An odometry that the first frame does not have.
+/// On the gyro, and on an odometry that the first frame does not have.
 std::vector<SensorVerdict> MonocularMotion::verdicts() const
 {
   std::vector<SensorVerdict> verdicts = m_monitor.verdicts();
