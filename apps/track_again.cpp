@@ -3,12 +3,11 @@
 #include "geometry/failure.h"
 #include "track_arguments.h"
 
+#include "input/regular_file.h"
 #include "output/versions.h"
 
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 namespace bole::apps
@@ -20,10 +19,8 @@ using Json = nlohmann::json;
 
 std::string bytesOf(const fs::path &path)
 {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw ioError("{}: cannot be read", path.string());
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  constexpr std::size_t kMostBytes = 1'000'000'000;
+  return readWholeFile(path.string(), kMostBytes);
 }
 
 Json summaryOf(const fs::path &run)

@@ -2,6 +2,7 @@
 #include "geometry/failure.h"
 #include "geometry/names.h"
 #include "input/camera_plausibility.h"
+#include "input/regular_file.h"
 #include "input/sensor_yaml.h"
 #include "input/yaml_file.h"
 
@@ -209,8 +210,7 @@ Pose forwardCamera()
 
 MountedCamera readCamera(const std::string &path, int width, int height)
 {
-  if (!std::filesystem::is_regular_file(path))
-    throw ioError("{}: no such file", path);
+  openRegularFile(path); // whatever its name
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension != ".xml" && extension != ".yaml" && extension != ".yml")
     throw ioError("{}: a camera file must end in .yaml, .yml or .xml", path);

@@ -4,7 +4,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fmt/format.h>
 
 namespace bole
@@ -19,9 +18,7 @@ std::string_view trimmed(std::string_view text)
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kUtf16Marks[] = {"\xFF\xFE", "\xFE\xFF"};
-constexpr std::size_t kLongestLine = 100'000;
 
 /// "stamp,0,142302,-0,176885": no point anywhere, and every second field is a fraction of at least two digits.
 bool hasDecimalCommas(const std::vector<std::string> &fields)
@@ -80,25 +77,19 @@ bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
 }
 } // namespace
 
-CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_path(path), m_format(std::move(format))
+CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_lines(path), m_format(std::move(format))
 {
-  if (!std::filesystem::is_regular_file(path))
-    throw ioError("{}: no such file", path);
-  m_file.open(path, std::ios::binary);
-  if (!m_file)
-    throw ioError("{}: cannot be read", path);
   if (m_format.header.empty())
     return;
-  std::string line;
-  std::getline(m_file, line);
-  m_line = 1;
-  if (line.substr(0, kByteOrderMark.size()) == kByteOrderMark)
-    line.erase(0, kByteOrderMark.size());
-  if (trimmed(line) != m_format.header)
-    fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(trimmed(line)), m_format.header));
+  m_lines.next();
+  if (trimmed(m_lines.line()) != m_format.header)
+    fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(trimmed(m_lines.line())), m_format.header));
 }
 
-void CsvReader::fail(const std::string &message) const { throw ioError("{}:{}: {}", m_path, m_line, message); }
+void CsvReader::fail(const std::string &message) const
+{
+  throw ioError("{}:{}: {}", m_lines.name(), m_lines.number(), message);
+}
 
 void CsvReader::split(const std::string &line)
 {
@@ -120,16 +111,10 @@ void CsvReader::split(const std::string &line)
 
 bool CsvReader::next()
 {
-  std::string line;
-  while (std::getline(m_file, line)) {
-    ++m_line;
-    std::string_view content = trimmed(line);
-    if (m_line == 1 && content.substr(0, kByteOrderMark.size()) == kByteOrderMark)
-      content.remove_prefix(kByteOrderMark.size());
-    if (m_line == 1 && (content.substr(0, 2) == kUtf16Marks[0] || content.substr(0, 2) == kUtf16Marks[1]))
+  while (m_lines.next()) {
+    const std::string_view content = trimmed(m_lines.line());
+    if (m_lines.number() == 1 && (content.substr(0, 2) == kUtf16Marks[0] || content.substr(0, 2) == kUtf16Marks[1]))
       fail("is text in UTF-16, must be in UTF-8");
-    if (line.size() > kLongestLine)
-      fail(fmt::format("{} characters, must be at most {} in a line", line.size(), kLongestLine));
     if (content.empty() || content.front() == '#' || (m_rows == 0 && isHeader(content)))
       continue;
     split(std::string(content));
@@ -145,8 +130,6 @@ bool CsvReader::next()
     ++m_rows;
     return true;
   }
-  if (m_file.bad())
-    fail("cannot be read");
   return false;
 }
 

@@ -4,10 +4,10 @@
 /// Text tables: CSV and the blank-separated lines of TUM trajectories, read strictly.
 
 #include "geometry/names.h"
+#include "input/regular_file.h"
 
 #include <cstdint>
 #include <fmt/format.h>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -66,10 +66,8 @@ private:
   void split(const std::string &line);
   std::int64_t rising(std::int64_t stamp_ns);
 
-  std::string m_path;
+  TextLines m_lines;
   CsvFormat m_format;
-  std::ifstream m_file;
-  std::size_t m_line = 0;
   std::size_t m_rows = 0;
   std::size_t m_columns = 0;
   std::int64_t m_last_stamp_ns = 0;

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/yaml_file.h"
 #include "geometry/failure.h"
+#include "input/regular_file.h"
 
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 
 namespace bole
 {
@@ -13,7 +11,7 @@ namespace
 {
 constexpr int kDeepest = 32;
 constexpr int kMostNodes = 100000;
-constexpr std::uintmax_t kMostBytes = 1000000; ///< of a file that people write
+constexpr std::size_t kMostBytes = 1000000; ///< of a file that people write
 
 /// The encoding, and brackets that the parser would follow into the depth.
 void checkText(const std::string &path, std::string &text)
@@ -66,17 +64,7 @@ private:
 };
 } // namespace
 
-std::string readSmallFile(const std::string &path)
-{
-  if (!std::filesystem::is_regular_file(path))
-    throw ioError("{}: no such file", path);
-  if (std::filesystem::file_size(path) > kMostBytes)
-    throw ioError("{}: is larger than {} bytes", path, kMostBytes);
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw ioError("{}: cannot be read", path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
+std::string readSmallFile(const std::string &path) { return readWholeFile(path, kMostBytes); }
 
 std::string placeOf(const std::string &path, const YAML::Mark &mark)
 {

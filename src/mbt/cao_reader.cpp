@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "mbt/cao_reader.h"
+#include "input/regular_file.h"
 
 #include <cmath>
 #include <cstdio>
@@ -17,18 +18,13 @@ namespace
 class CaoLines
 {
 public:
-  explicit CaoLines(const std::string &path) : m_path(path), m_file(path)
-  {
-    if (!m_file)
-      throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
-  }
+  explicit CaoLines(const std::string &path) : m_lines(path) {}
 
   /// Next line as words; \p what is missing if there is none.
   std::istringstream next(const char *what)
   {
-    std::string line;
-    while (std::getline(m_file, line)) {
-      ++m_line;
+    while (m_lines.next()) {
+      std::string line = m_lines.line();
       line.erase(std::min(line.find('#'), line.size()));
       const std::size_t last = line.find_last_not_of(" \t\r");
       if (last == std::string::npos)
@@ -36,17 +32,14 @@ public:
       line.erase(last + 1);
       return std::istringstream(line);
     }
-    ++m_line;
     fail(fmt::format("the file ends, must go on with {}", what));
   }
 
   bool atEnd()
   {
-    std::string line;
-    while (std::getline(m_file, line)) {
-      ++m_line;
-      line.erase(std::min(line.find('#'), line.size()));
-      if (line.find_first_not_of(" \t\r") != std::string::npos)
+    while (m_lines.next()) {
+      const std::string &line = m_lines.line();
+      if (line.find_first_not_of(" \t\r") < line.find('#'))
         return false;
     }
     return true;
@@ -54,7 +47,7 @@ public:
 
   [[noreturn]] void fail(const std::string &message) const
   {
-    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", m_path, m_line, message));
+    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", m_lines.name(), m_lines.number(), message));
   }
 
   template <class T> T word(std::istringstream &line, const char *what) const
@@ -91,9 +84,7 @@ public:
   }
 
 private:
-  std::string m_path;
-  std::ifstream m_file;
-  int m_line = 0;
+  TextLines m_lines;
 };
 
 std::string nameOf(const CaoLines &file, std::istringstream &line)

@@ -2,12 +2,11 @@
 #include "mbt/trunk_settings.h"
 
 #include "geometry/require_range.h"
+#include "input/yaml_file.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 #include <visp3/core/vpException.h>
 #include <visp3/core/vpMath.h>
 
@@ -25,13 +24,7 @@ struct Leaf
 class XmlText
 {
 public:
-  explicit XmlText(const std::string &path) : m_path(path)
-  {
-    std::ifstream file(path, std::ios::binary);
-    if (!file)
-      throw vpException(vpException::ioError, fmt::format("{}: cannot be read", path));
-    m_text.assign(std::istreambuf_iterator<char>(file), {});
-  }
+  explicit XmlText(const std::string &path) : m_path(path), m_text(readSmallFile(path)) {}
 
   /// Text of every innermost element, by its path, e.g. "conf/camera/u0".
   std::multimap<std::string, Leaf> leaves()

@@ -3,12 +3,12 @@
 #include "geometry/failure.h"
 #include "geometry/median.h"
 #include "geometry/names.h"
+#include "input/regular_file.h"
 #include "output/atomic_file.h"
 #include "output/verdict.h"
 #include "output/versions.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace bole
@@ -165,8 +165,8 @@ double numberOrZero(const Json &json, const char *key)
 
 Json readObject(const std::string &path)
 {
-  std::ifstream file(path);
-  Json json = Json::parse(file, nullptr, false);
+  constexpr std::size_t kMostBytes = 16'000'000;
+  Json json = Json::parse(readWholeFile(path, kMostBytes), nullptr, false);
   if (!json.is_object())
     throw badValue("{}: is no summary of a run", path);
   return json;

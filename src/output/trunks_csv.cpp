@@ -104,9 +104,9 @@ void writeHypotheses(const std::string &path, const std::vector<TrunkRecord> &ma
 
 std::vector<TrunkRecord> readTrunks(const std::string &path)
 {
-  std::ifstream file(path);
-  std::string header;
-  std::getline(file, header);
+  TextLines first(path);
+  first.next();
+  const std::string &header = first.line();
   const bool has_fate = header == std::string(kTrunksCsvHeader) + kFateColumn;
   CsvReader csv(path, {kColumns + (has_fate ? 1 : 0), ',', has_fate ? header : kTrunksCsvHeader});
   std::vector<TrunkRecord> trunks;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/regular_file.h"
 #include "smoothing/factors.h"
 #include <bole/graph.h>
 
@@ -8,7 +9,6 @@
 #include <cerrno>
 #include <cmath>
 #include <fmt/core.h>
-#include <fstream>
 #include <functional>
 #include <istream>
 #include <sstream>
@@ -22,16 +22,15 @@ namespace
 class Reader
 {
 public:
-  Reader(std::istream &in, const std::string &name) : m_in(in), m_name(name) {}
+  Reader(std::istream &in, const std::string &name) : m_lines(in, name), m_name(name) {}
 
   Graph read()
   {
-    std::string line;
-    while (std::getline(m_in, line)) {
-      ++m_line;
+    while (m_lines.next()) {
+      m_line = m_lines.number();
       m_fields.clear();
       m_next = 0;
-      std::istringstream words(line.substr(0, line.find('#')));
+      std::istringstream words(m_lines.line().substr(0, m_lines.line().find('#')));
       for (std::string word; words >> word;)
         m_fields.push_back(word);
       if (!m_fields.empty())
@@ -288,7 +287,7 @@ private:
     return at->second;
   }
 
-  std::istream &m_in;
+  TextLines m_lines;
   std::string m_name;
   std::size_t m_line = 0, m_next = 0;
   std::vector<std::string> m_fields;
@@ -302,9 +301,7 @@ Graph readG2o(std::istream &in, const std::string &name) { return Reader(in, nam
 
 Graph readG2o(const std::string &path)
 {
-  std::ifstream in(path);
-  if (!in)
-    throw vpException(vpException::ioError, "%s, must be a readable file", path.c_str());
+  std::ifstream in = openRegularFile(path);
   return readG2o(in, path);
 }
 } // namespace bole

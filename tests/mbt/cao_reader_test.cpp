@@ -150,7 +150,7 @@ TEST_F(CaoReader, ACubeIsRefusedAtTheLineOfItsFaces)
 TEST_F(CaoReader, SaysFileLineAndWhatMustBeThere)
 {
   const std::string head = "V1\n2\n0 0 0\n0 0 3\n0\n0\n0\n";
-  EXPECT_THAT(messageOf("/nowhere.cao"), HasSubstr("/nowhere.cao: cannot be read"));
+  EXPECT_THAT(messageOf("/nowhere.cao"), HasSubstr("/nowhere.cao: no such file"));
   EXPECT_THAT(messageOf(file("V2\n")), HasSubstr(":1: version = V2, must be V1"));
   EXPECT_THAT(messageOf(file("V1\n1\n0 zero 0\n")), HasSubstr(":3: '0 zero 0', must be three numbers"));
   EXPECT_THAT(messageOf(file(head)), HasSubstr(":8: the file ends, must go on with cylinders"));
