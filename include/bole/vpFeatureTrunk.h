@@ -4,6 +4,7 @@
 /// A tree trunk as a visual feature for ViSP's vpServo.
 
 #include <bole/trunk.h>
+#include <bole/trunk_record.h>
 
 #include <bole/visp.h>
 #include <visp3/core/vpRGBa.h>
@@ -53,6 +54,8 @@ public:
   /// From a trunk of the map and the camera's pose. Throws vpException where the camera is inside
   /// the trunk.
   void buildFrom(const bole::Trunk &trunk, const bole::Pose &wMc);
+  /// The same of a trunk as vpTrunkMapper::getTrunks() gives it, seen from where getCameraPose() says.
+  void buildFrom(const bole::TrunkRecord &trunk, const vpHomogeneousMatrix &cMw);
   /// From the image lines of its two borders (normalised coordinates, order does not matter); the
   /// trunk is the narrower of the two wedges. Throws vpException for lines that are one or that are
   /// no limbs of an upright trunk.

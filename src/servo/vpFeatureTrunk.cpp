@@ -89,6 +89,13 @@ void vpFeatureTrunk::buildFrom(const bole::Trunk &trunk, const bole::Pose &wMc)
   buildFrom(bole::relativeTrunk(wMc, bole::Pose(), trunk), trunk.radius());
 }
 
+void vpFeatureTrunk::buildFrom(const bole::TrunkRecord &trunk, const vpHomogeneousMatrix &cMw)
+{
+  const double breast_z = trunk.ground_z + bole::kBreastHeight; // where the record has its place
+  buildFrom(bole::Trunk{trunk.xy - breast_z * trunk.lean, std::log(trunk.radius), trunk.lean},
+            bole::Pose::fromVisp(cMw).inverse());
+}
+
 void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine &other_border, double radius)
 {
   Vector3d one = planeOf(border), other = planeOf(other_border);

@@ -149,6 +149,20 @@ TEST(vpFeatureTrunk, BuildersFromMapTrackedTrunkAndLinesAgree)
   EXPECT_NEAR(from_map.relativeTrunk().minus(from_view.relativeTrunk()).norm(), 0, 1e-9);
 }
 
+TEST(vpFeatureTrunk, OfATrunkOfTheMapItIsTheSameAsOfTheTrunk)
+{
+  const Pose wMc = cameraPose();
+  bole::TrunkRecord record; // its place is at breast height over the ground
+  record.ground_z = -0.4;
+  record.xy = leaningTrunk().axisAt(record.ground_z + bole::kBreastHeight).head<2>();
+  record.radius = leaningTrunk().radius();
+  record.lean = leaningTrunk().lean;
+  vpFeatureTrunk feature;
+  feature.buildFrom(record, wMc.inverse().toVisp());
+  EXPECT_LT(feature.error(featureAt(wMc)).infinityNorm(), 1e-12);
+  EXPECT_NEAR(feature.distance(), featureAt(wMc).distance(), 1e-12);
+}
+
 TEST(vpFeatureTrunk, LogRatioIgnoresRotationsAndBearingIgnoresRoll)
 {
   const vpFeatureTrunk before = featureAt(cameraPose());
