@@ -52,7 +52,7 @@ struct LinkCounters
   VideoCounters video;              ///< of the pictures
   std::size_t delivered = 0;        ///< frames given out
   std::size_t frozen = 0;           ///< of them, stale
-  std::size_t dropped = 0;          ///< decoded, but a newer frame came before anyone asked
+  std::size_t dropped = 0;          ///< decoded, but a newer frame came before anyone asked, or its time was over
   std::size_t connections = 0;      ///< of the video, the first one too
   std::size_t clock_jumps = 0;      ///< of the video's clock: reboots
   std::size_t navdata_packets = 0;  ///< used

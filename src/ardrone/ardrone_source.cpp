@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace bole
 {
@@ -67,7 +68,8 @@ struct ArDroneSource::State
   std::atomic<bool> running{true};
   bool first_is_waiting = false; // the frame that the constructor waited for
   std::size_t index = 0;
-  std::int64_t last_stamp_ns = 0, last_new_ns = 0;
+  std::int64_t last_stamp_ns = std::numeric_limits<std::int64_t>::min(), last_new_ns = 0;
+  std::atomic<std::size_t> overtaken{0}; ///< frames of a time that was given out as missing
 
   void chooseCamera(const vpImage<unsigned char> &first)
   {
@@ -96,6 +98,13 @@ struct ArDroneSource::State
     first_is_waiting = grabber.getStatus() == FrameStatus::ok;
   }
 
+  /// The next frame of a later time than what was given out.
+  void acquireNewer(vpImage<unsigned char> &image)
+  {
+    for (grabber.acquire(image); running && grabber.getFrame().stamp_ns <= last_stamp_ns; grabber.acquire(image))
+      ++overtaken;
+  }
+
   /// What came off the air as a frame of the pipeline.
   void fill(Frame &frame, vpImage<unsigned char> &image)
   {
@@ -105,8 +114,7 @@ struct ArDroneSource::State
     frame.status = live.status;
     frame.message = live.message;
     frame.arrival_ns = live.arrival_ns;
-    frame.stamp_ns = std::max(live.stamp_ns, last_stamp_ns + 1);
-    last_stamp_ns = frame.stamp_ns;
+    frame.stamp_ns = last_stamp_ns = live.stamp_ns;
     frame.gyro = live.gyro;
     if (live.body)
       frame.wMb_odometry = live.body->wMb;
@@ -154,7 +162,7 @@ bool ArDroneSource::next(Frame &frame)
   if (state.first_is_waiting)
     state.grabber.getFrame().picture.toGrey(image);
   else
-    state.grabber.acquire(image);
+    state.acquireNewer(image);
   state.first_is_waiting = false;
 
   const std::int64_t now_ns = steadyNowNs();
@@ -173,7 +181,12 @@ Pose ArDroneSource::bMc() const { return m_state->mounted.bMc; }
 std::string ArDroneSource::name() const { return m_state->address.toString(); }
 bool ArDroneSource::hasGyro() const { return m_state->options.grabber.link.full_navdata; }
 void ArDroneSource::stop() noexcept { m_state->running = false; }
-LinkCounters ArDroneSource::counters() const { return m_state->grabber.getCounters(); }
+LinkCounters ArDroneSource::counters() const
+{
+  LinkCounters counters = m_state->grabber.getCounters();
+  counters.dropped += m_state->overtaken;
+  return counters;
+}
 vpArDroneGrabber &ArDroneSource::grabber() { return m_state->grabber; }
 const MountedCamera &ArDroneSource::mountedCamera() const { return m_state->mounted; }
 const LiveFrame &ArDroneSource::liveFrame() const { return m_state->grabber.getFrame(); }

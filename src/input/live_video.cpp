@@ -87,8 +87,8 @@ struct LiveVideoSource::State
   bool is_stopped = false;
   std::thread thread;
 
-  std::int64_t last_stamp_ns = -1; ///< given out
-  std::int64_t heard_ns = 0;
+  std::int64_t last_stamp_ns = -1;           ///< given out
+  std::int64_t picture_ns = 0, heard_ns = 0; ///< stamp of the newest picture, and when it came
 
   ~State()
   {
@@ -144,6 +144,20 @@ struct LiveVideoSource::State
         changed.wait_for(lock, std::chrono::nanoseconds(kRetry_ns), [this] { return is_stopped; });
       }
     }
+  }
+
+  /// Whether there is a picture of a later time than what was given out; others are dropped.
+  bool hasNewer()
+  {
+    if (!newest)
+      return false;
+    picture_ns = newest->stamp_ns;
+    heard_ns = arrival_ns;
+    if (picture_ns > last_stamp_ns)
+      return true;
+    ++counters.dropped;
+    newest.reset();
+    return false;
   }
 
   void take(Picture picture, std::int64_t arrived_ns)
@@ -207,13 +221,13 @@ bool LiveVideoSource::next(Frame &frame)
   std::int64_t stamp_ns = 0, arrival_ns = 0;
   {
     std::unique_lock<std::mutex> lock(state.mutex);
-    state.changed.wait_for(lock, std::chrono::nanoseconds(kFrameTimeout_ns),
-                           [&state] { return state.newest || state.is_stopped; });
+    const auto end = std::chrono::steady_clock::now() + std::chrono::nanoseconds(kFrameTimeout_ns);
+    state.changed.wait_until(lock, end, [&state] { return state.hasNewer() || state.is_stopped; });
     if (state.is_stopped)
       return false;
     if (state.newest) {
-      stamp_ns = state.newest->stamp_ns;
-      arrival_ns = state.heard_ns = state.arrival_ns;
+      stamp_ns = state.picture_ns;
+      arrival_ns = state.heard_ns;
       file.status = state.newest->is_damaged ? FrameStatus::corrupt : FrameStatus::ok;
       file.message = std::move(state.newest->message);
       file.image = std::move(state.newest->image);
@@ -223,12 +237,15 @@ bool LiveVideoSource::next(Frame &frame)
       const std::int64_t now = now_ns();
       if (now - state.heard_ns > state.give_up_ns)
         return false;
-      stamp_ns = now - state.begun_ns;
+      // By the clock of the stream; half a timeout early, so that the picture that comes next is not before.
+      stamp_ns = std::max(state.picture_ns + now - state.heard_ns, state.last_stamp_ns + kFrameTimeout_ns) -
+                 kFrameTimeout_ns / 2;
       file.status = FrameStatus::missing;
-      file.message = state.trouble.empty() ? "no picture came" : state.trouble;
+      file.message = !state.trouble.empty()                    ? state.trouble
+                     : now - state.heard_ns < kFrameTimeout_ns ? "the stamps of its pictures do not advance"
+                                                               : "no picture came";
     }
   }
-  stamp_ns = std::max(stamp_ns, state.last_stamp_ns + 1);
   state.last_stamp_ns = stamp_ns;
   m_builder->build(stamp_ns, std::move(file), frame);
   frame.arrival_ns = arrival_ns;

@@ -28,7 +28,7 @@ public:
   struct Counters
   {
     std::size_t pictures = 0;    ///< that came
-    std::size_t dropped = 0;     ///< that a newer one came before next() asked for
+    std::size_t dropped = 0;     ///< that a newer one came before next() asked for, or of a time that is over
     std::size_t connections = 0; ///< that were made
   };
 

@@ -277,8 +277,8 @@ std::int64_t VideoFile::stampOf(std::int64_t pts)
     if (std::abs(after_s) <= kLongest_s)
       stamp_ns = av_rescale_q(pts - m_first_pts, stream.time_base, nanoseconds);
   }
-  if (stamp_ns <= m_last_stamp_ns)
-    stamp_ns = m_last_stamp_ns + 1; // a file whose times go back: keep the order of presentation
+  if (stamp_ns <= m_last_stamp_ns) // a file whose times go back: the order of presentation is kept, and the rate
+    stamp_ns = after_last;
   m_last_stamp_ns = stamp_ns;
   return stamp_ns;
 }

@@ -9,6 +9,7 @@
 #include "input/video_source.h"
 #include <bole/open_source.h>
 
+#include <fstream>
 #include <gmock/gmock.h>
 #include <opencv2/videoio.hpp>
 
@@ -242,6 +243,25 @@ TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
       last_ns = frame.stamp_ns;
     }
   }
+}
+
+TEST_F(Sources, AVideoWhoseTimesGoBackGoesOnAtItsRate)
+{
+  {
+    cv::VideoWriter writer(path("v.ts"), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', 'g', '2'), 25,
+                           cv::Size(96, 64));
+    ASSERT_TRUE(writer.isOpened());
+    for (std::size_t i = 0; i < 20; ++i)
+      writer.write(picture(i));
+  }
+  std::ifstream once(path("v.ts"), std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(once), std::istreambuf_iterator<char>()};
+  std::ofstream(path("twice.ts"), std::ios::binary) << bytes << bytes; // as a recorder that was started anew
+  VideoSource source(path("twice.ts"));
+  const std::vector<Frame> frames = readAll(source);
+  ASSERT_GE(frames.size(), 38u);
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    EXPECT_NEAR(1e-9 * static_cast<double>(frames[i].stamp_ns - frames[i - 1].stamp_ns), 0.04, 0.005) << i;
 }
 
 TEST_F(Sources, OdometryOfATumFileIsInterpolatedWithItsOffset)
