@@ -9,9 +9,9 @@
 #include "track_output.h"
 
 #include "input/live_video.h"
-#include "motion/focal_length.h"
 #include "motion/sensor_calibration.h"
 #include "output/progress.h"
+#include "pipeline/measured_camera.h"
 #include "report/report_page.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>
@@ -32,67 +32,16 @@ namespace bole::apps
 {
 namespace
 {
-struct FieldOfView
-{
-  double degrees = 0, sigma_degrees = 0; ///< horizontal; 0 where the video does not tell
-};
-
-/// Of a video that came without a camera file, where the camera turns or flies a curve in its first frames.
-FieldOfView fieldOfView(const std::string &input, const SourceOptions &options)
-{
-  constexpr int kFrames = 200;
-  const auto source = openSource(input, options);
-  const PinholeCamera camera = source->camera();
-  PointTracker tracker(camera);
-  FocalFinder focal(camera);
-  Frame frame;
-  for (int i = 0; i < kFrames && source->next(frame); ++i) {
-    if (frame.status != FrameStatus::ok)
-      continue;
-    tracker.track(frame.image);
-    focal.add(tracker);
-  }
-  const FocalEstimate estimate = focal.estimate();
-  if (!estimate.known)
-    return {};
-  const double half = 0.5 * camera.width / (camera.fx * estimate.factor);
-  constexpr double kDegrees = 180 / M_PI;
-  return {2 * std::atan(half) * kDegrees, 2 * estimate.sigma * half / (1 + half * half) * kDegrees};
-}
-
-/// Standard deviation of the log of the focal length of \p source.
-double focalSigma(const FrameSource &source, const RunSummary &made)
-{
-  constexpr double kGiven = 0.03; // of a field of view that the user gives: a degree or two
-  if (source.isCameraKnown())
-    return 0;
-  if (made.field_of_view_sigma_deg == 0)
-    return made.is_camera_known ? kGiven : kGuessedFocalSigma;
-  const PinholeCamera camera = source.camera();
-  return made.field_of_view_sigma_deg * M_PI / 180 / std::sin(2 * std::atan(0.5 * camera.width / camera.fx));
-}
-
-/// A video without a camera file is looked through for turns and curves that tell its field of view.
+/// As it is given, or as the video tells its field of view; \p arguments open the same once more.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
-  const bool is_stream = LiveVideoSource::accepts(arguments.input);
-  auto source = is_stream ? openStream(arguments.input, arguments.source, arguments.give_up_s)
-                          : openSource(arguments.input, arguments.source);
-  made.note = source->note();
-  made.is_camera_known = source->isCameraKnown() || arguments.is_field_of_view_given;
-  if (made.is_camera_known || is_stream)
-    return source;
-  const FieldOfView view = fieldOfView(arguments.input, arguments.source);
-  if (view.degrees == 0)
-    return source;
-  arguments.source.field_of_view_deg = std::clamp(view.degrees, 10.0, 150.0);
-  source = openSource(arguments.input, arguments.source);
-  made.is_camera_known = true;
-  made.field_of_view_sigma_deg = view.sigma_degrees;
-  made.note = fmt::format(
-      "no camera file: the camera moves as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
-      view.degrees, view.sigma_degrees, source->camera().fx);
-  return source;
+  MeasuredSource opened =
+      openMeasured(arguments.input, arguments.source, arguments.is_field_of_view_given, arguments.give_up_s);
+  arguments.source = opened.options;
+  made.note = opened.note;
+  made.is_camera_known = opened.is_camera_known;
+  made.field_of_view_sigma_deg = opened.field_of_view_sigma_deg;
+  return std::move(opened.source);
 }
 
 /// A recording, without the constant errors of its sensors.
@@ -278,7 +227,7 @@ void track(const TrackArguments &asked_for)
   const auto *live = dynamic_cast<const ArDroneSource *>(source.get());
   const bool is_live = live != nullptr || dynamic_cast<const LiveVideoSource *>(source.get()) != nullptr;
   if (options.camera.focal_sigma == 0)
-    options.camera.focal_sigma = focalSigma(*source, made);
+    options.camera.focal_sigma = focalSigma(*source, made.is_camera_known, made.field_of_view_sigma_deg);
   made.preset = arguments.config.empty() ? "default" : arguments.config;
   made.options = toYaml(options);
   widen(options.odometry, calibration);
