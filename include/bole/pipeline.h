@@ -30,7 +30,9 @@
 #include <bole/pose.h>
 #include <bole/report.h>
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace bole
@@ -42,7 +44,7 @@ class Pipeline
 {
 public:
   /// \p camera of the rectified images, at \p bMc in the body.
-  /// \throw vpException naming the option that is out of its range.
+  /// \throw vpException for a camera that cannot be one, or naming the option that is out of its range.
   Pipeline(const PinholeCamera &camera, const Pose &bMc, const Options &options = {});
   Pipeline(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options); ///< for tests and the ablation
   ~Pipeline();
@@ -50,7 +52,11 @@ public:
   Pipeline(Pipeline &&) noexcept;
   Pipeline &operator=(Pipeline &&) noexcept; ///< Moves the flight with all that is known.
 
-  /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted.
+  /// Takes in the next frame. Frames that are not ok pass without vision: their pose is predicted, as is that of one
+  /// whose picture is missing or not of the camera's size.
+  /// \throw vpException naming frame, stamp and value where the stamp is not later than that of the frame before, or
+  /// the stamp, odometry, gyro or accelerometer tells what cannot be (NaN, no rotation, samples out of order): the
+  /// pipeline is then as it was before.
   FrameReport process(const Frame &frame);
   /// Smooths the whole flight once more, everything linearised anew, and judges every hypothesis by all frames
   /// (`stages.final_pass`): trunks may come that were never confirmed in flight, and others go.
@@ -68,6 +74,11 @@ public:
 
 private:
   class Rate;
+  FrameReport take(const Frame &frame);
+
+  PinholeCamera m_camera;
+  std::size_t m_frames = 0;                    ///< taken so far
+  std::optional<std::int64_t> m_last_stamp_ns; ///< of the last of them
   std::unique_ptr<class Engine> m_engine;
   std::unique_ptr<Rate> m_rate; ///< until it is known
 };

@@ -76,6 +76,7 @@ struct FrameReport
   Pose wMc;                                               ///< as known right after this frame
   Matrix6d pose_covariance = Matrix6d::Identity();        ///< of (rho, phi) of wMb, scale error left out
   bool is_translation_seen = false;                       ///< by a pose filter or by points; else it was only expected
+  bool is_odometry_used = false;                          ///< that of the frame; else it had none, or is not believed
   bool has_ranges = true;                                 ///< false while the camera has only rotated
   std::vector<TrunkInView> trunks;                        ///< known trunks looked for
   std::vector<KnownTrunk> map;                            ///< all that a frame has to reckon with, in view or not

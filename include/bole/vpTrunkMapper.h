@@ -26,7 +26,9 @@
 /// \endcode
 ///
 /// A frame that cannot be trusted (dark, frozen, of another size) throws nothing: its pose is predicted, and the next
-/// frame goes on. testTracking() throws for it, as ViSP's trackers do. One mapper a thread.
+/// frame goes on. testTracking() throws for it, as ViSP's trackers do. A frame that a program cannot mean (a stamp that
+/// is not later than the last one, NaN, a matrix that is no rotation) throws vpException, and the mapper is as it was
+/// before. One mapper a thread.
 
 #include <bole/frame.h>
 #include <bole/trunk_record.h>
@@ -47,7 +49,7 @@ class vpTrunkMapper
 {
 public:
   /// A camera at the body's origin that looks forward. \p cam may have ViSP's radial distortion (kud); the size of the
-  /// images is that of the first one.
+  /// images is that of the first one, where a camera that cannot be one is refused.
   explicit vpTrunkMapper(const vpCameraParameters &cam);
   /// \p bMc: the camera in the body.
   vpTrunkMapper(const vpCameraParameters &cam, const vpHomogeneousMatrix &bMc);
@@ -70,19 +72,24 @@ public:
   /// \name A frame each
   ///@{
 
-  /// The next image, 1/camera.rate s after the last.
+  /// The next image, a period of setFrameRate() after the last.
   void track(const vpImage<unsigned char> &I);
-  /// The next image, 1/camera.rate s after the last.
+  /// The next image, a period of setFrameRate() after the last.
   void track(const vpImage<vpRGBa> &I);
   /// The next image at its time [s].
+  /// \throw vpException naming frame, stamp and value for what cannot be; the mapper is then as it was before.
   void track(const vpImage<unsigned char> &I, double stamp_s);
   /// \p wMb: the pose by odometry. All frames have one or none has.
   void track(const vpImage<unsigned char> &I, double stamp_s, const vpHomogeneousMatrix &wMb);
   /// \p gyro: samples since the frame before, oldest first, body frame.
   void track(const vpImage<unsigned char> &I, double stamp_s, const vpHomogeneousMatrix &wMb,
              const std::vector<bole::GyroSample> &gyro);
-  /// \throw vpTrackingException saying why, when the last frame cannot be trusted.
+  /// \throw vpTrackingException saying why, when the last frame cannot be trusted, when gyro and odometry contradict
+  /// the images, or when a flight with odometry has to do without it: it is not there, or contradicts the others. A
+  /// gyro that is not believed throws nothing: the images do without.
   void testTracking() const;
+  /// The sensors that contradicted the others so far: since when, and in what.
+  std::vector<bole::SensorVerdict> getVerdicts() const;
   /// Smooths the whole flight once more; afterwards getTrunks() is as good as it gets.
   void finish();
   ///@}

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/camera_plausibility.h"
 
-#include <Eigen/LU>
+#include "geometry/failure.h"
+#include "geometry/rotation.h"
+
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -14,6 +16,7 @@ constexpr double kDegrees = 180 / M_PI;
 constexpr double kNarrowest_deg = 3, kWidest_deg = 170; // a telephoto lens; beyond, no pinhole shows it
 constexpr double kLargestAspect = 2;                    // of the focal lengths: pixels of video are at most 4:3
 constexpr double kLargestArm_m = 10;                    // of the camera in the body
+constexpr int kSmallest_px = 16, kLargest_px = 16384;   // of a picture: a trunk in a smaller one is a smear
 
 /// Whether the lens maps rays farther out to pixels farther out, up to \p goal (in the normalised picture).
 bool reaches(const CameraModel &model, const Eigen::Vector2d &goal)
@@ -54,6 +57,9 @@ Implausibility implausibility(const MountedCamera &camera)
 {
   using Part = Implausibility::Part;
   const PinholeCamera &p = camera.model.pinhole;
+  if (std::min(p.width, p.height) < kSmallest_px || std::max(p.width, p.height) > kLargest_px)
+    return {Part::pinhole, fmt::format("a picture of {}x{} px, must be {} to {} px wide and high", p.width, p.height,
+                                       kSmallest_px, kLargest_px)};
   const double view_deg = 2 * std::atan(0.5 * p.width / p.fx) * kDegrees;
   if (!(view_deg >= kNarrowest_deg && view_deg <= kWidest_deg))
     return {Part::pinhole, fmt::format("fx = {:g} px at {} columns is a field of view of {:.3g} degrees, must be {:g} "
@@ -73,9 +79,17 @@ Implausibility implausibility(const MountedCamera &camera)
     return {Part::mounting, fmt::format("the camera is {:.4g} m from the body, must be less than {:g} m (millimetres?)",
                                         camera.bMc.t.norm(), kLargestArm_m)};
   if ((camera.bMc.R - Eigen::Matrix3d::Identity()).norm() < 1e-6)
-    return {Part::mounting, "T_BS has no rotation, must take the camera's axes (x right, y down, z ahead) to the "
+    return {Part::mounting, "no rotation in the body, must take the camera's axes (x right, y down, z ahead) to the "
                             "body's (x ahead, y left, z up)"};
+  if (!isRotation(camera.bMc.R))
+    return {Part::mounting, "its pose in the body must be a rigid motion"};
   return {};
+}
+
+void requirePlausible(const MountedCamera &camera)
+{
+  if (const Implausibility fault = implausibility(camera); fault.part != Implausibility::Part::none)
+    throw badValue("camera: {}", fault.text);
 }
 
 double foldThirdCoefficient(const PinholeCamera &pinhole, double k3, double &k1, double &k2)

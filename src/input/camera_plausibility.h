@@ -23,9 +23,11 @@ struct Implausibility
   std::string text = {}; ///< with the limit
 };
 
-/// Looks at field of view, shape of the pixels, principal point, whether the distortion folds the picture, and the
-/// place in the body.
+/// Looks at the size of the picture, field of view, shape of the pixels, principal point, whether the distortion folds
+/// the picture, and the place in the body.
 Implausibility implausibility(const MountedCamera &camera);
+/// Throws for a camera that a program hands over and that cannot be one.
+void requirePlausible(const MountedCamera &camera);
 
 /// k1 and k2 that come closest to k1, k2, k3 over the picture of \p pinhole (OpenCV's calibrations have a third radial
 /// coefficient, CameraModel two). \return the largest difference that is left [px].

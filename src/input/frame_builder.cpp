@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
 #include "geometry/failure.h"
+#include "input/frame_check.h"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -37,17 +38,6 @@ FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &opt
 {
 }
 
-void FrameBuilder::requireSize(Frame &frame) const
-{
-  const int width = static_cast<int>(frame.image.getWidth()), height = static_cast<int>(frame.image.getHeight());
-  if (frame.image.getSize() == 0 || (width == m_rectifier.inputWidth() && height == m_rectifier.inputHeight()))
-    return;
-  frame.status = FrameStatus::resized;
-  frame.message = fmt::format("image of {}x{} px, must be {}x{}", width, height, m_rectifier.inputWidth(),
-                              m_rectifier.inputHeight());
-  frame.image.resize(0, 0);
-}
-
 void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
 {
   frame = Frame();
@@ -64,8 +54,12 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
     if (m_last_stamp_ns && gyro[m_gyro_at].stamp_ns > *m_last_stamp_ns)
       frame.gyro.push_back(gyro[m_gyro_at]);
   m_last_stamp_ns = stamp_ns;
+  complete(frame);
+}
 
-  requireSize(frame);
+void FrameBuilder::complete(Frame &frame)
+{
+  judgePicture(frame, m_rectifier.inputWidth(), m_rectifier.inputHeight());
   m_health.judge(frame);
   if (frame.image.getSize() > 0)
     m_rectifier.apply(frame.image);

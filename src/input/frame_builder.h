@@ -34,6 +34,8 @@ public:
 
   /// Fills \p frame from the raw image \p file taken at \p stamp_ns. Stamps must rise from call to call.
   void build(std::int64_t stamp_ns, ImageFile file, Frame &frame);
+  /// Judges and rectifies the raw picture of a frame that has all else: the sensors are asked, too.
+  void complete(Frame &frame);
 
   /// Size of the images that build() takes [px].
   int inputWidth() const { return m_rectifier.inputWidth(); }
@@ -43,8 +45,6 @@ public:
   const Recording &recording() const { return m_recording; }
 
 private:
-  void requireSize(Frame &frame) const;
-
   Rectifier m_rectifier;
   Pose m_bMc;
   Recording m_recording;

@@ -2,9 +2,9 @@
 #include "input/sensor_yaml.h"
 
 #include "geometry/failure.h"
+#include "geometry/rotation.h"
 #include "input/yaml_file.h"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -116,8 +116,7 @@ Pose SensorYaml::rigidMotion(const std::string &key) const
     fail(key, "16 numbers");
   const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  const bool is_rigid = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-3 && R.determinant() > 0 &&
-                        (T.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() < 1e-9;
+  const bool is_rigid = isRotation(R) && (T.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() < 1e-9;
   if (!is_rigid)
     fail(key, "a rigid motion");
   return Pose(R, T.topRightCorner<3, 1>());

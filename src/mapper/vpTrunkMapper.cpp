@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/vpTrunkMapper.h>
 
+#include "input/camera_plausibility.h"
 #include "input/frame_builder.h"
+#include "input/frame_check.h"
 #include "mbt/cao_reader.h"
 #include "output/palette.h"
 #include <bole/config.h>
 #include <bole/pipeline.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -49,7 +52,11 @@ vpColor colorOf(int id)
 class vpTrunkMapper::Impl
 {
 public:
-  Impl(const vpCameraParameters &cam, const Pose &bMc) : m_cam(cam), m_mounted(mountedCamera(cam, bMc)) {}
+  Impl(const vpCameraParameters &cam, const Pose &bMc) : m_cam(cam), m_mounted(mountedCamera(cam, bMc))
+  {
+    m_report.frame_status = FrameStatus::missing;
+    m_report.reason = "no image was tracked yet";
+  }
 
   void requireUnstarted(const char *what) const
   {
@@ -73,51 +80,49 @@ public:
   double m_next_s = 0; ///< stamp of the next image that comes without one
   std::optional<FrameBuilder> m_builder;
   std::optional<Pipeline> m_pipeline;
-  FrameStatus m_status = FrameStatus::missing;
-  std::string m_message = "no image was tracked yet";
-  Pose m_wMb;
-  std::vector<TrunkInView> m_trunks; ///< of the last frame
+  std::optional<std::int64_t> m_last_stamp_ns;
+  std::size_t m_frames = 0;
+  bool m_has_odometry = false;
+  FrameReport m_report; ///< of the last frame
 
 private:
-  void start(const vpImage<unsigned char> &I);
+  void start(const Frame &first);
   template <typename Pixel>
   void displayBorder(const vpImage<Pixel> &I, const TrunkInView &trunk, Border border, const vpColor &color,
                      unsigned int thickness) const;
 };
 
-void vpTrunkMapper::Impl::start(const vpImage<unsigned char> &I)
+void vpTrunkMapper::Impl::start(const Frame &first)
 {
-  if (I.getSize() == 0)
+  if (first.image.getSize() == 0)
     throw vpException(vpException::dimensionError, "vpTrunkMapper: the first image is empty");
-  m_mounted.model.pinhole =
-      PinholeCamera::fromVisp(m_cam, static_cast<int>(I.getWidth()), static_cast<int>(I.getHeight()));
-  m_builder.emplace(m_mounted, SourceOptions(), Recording());
-  m_pipeline.emplace(m_builder->camera(), m_mounted.bMc, m_options);
+  MountedCamera mounted = m_mounted;
+  mounted.model.pinhole = PinholeCamera::fromVisp(m_cam, static_cast<int>(first.image.getWidth()),
+                                                  static_cast<int>(first.image.getHeight()));
+  requirePlausible(mounted);
+  FrameBuilder builder(mounted, SourceOptions(), Recording());
+  m_pipeline.emplace(builder.camera(), mounted.bMc, m_options);
+  m_builder.emplace(std::move(builder));
+  m_has_odometry = first.wMb_odometry.has_value();
 }
 
 void vpTrunkMapper::Impl::track(const vpImage<unsigned char> &I, double stamp_s, std::optional<Pose> wMb,
                                 const std::vector<GyroSample> &gyro)
 {
-  if (!m_pipeline)
-    start(I);
-  m_next_s = stamp_s + m_period_s;
-  ImageFile file;
-  file.image = I;
-  if (I.getSize() == 0) {
-    file.status = FrameStatus::missing;
-    file.message = "the image is empty";
-  }
   Frame frame;
-  m_builder->build(std::llround(stamp_s * 1e9), std::move(file), frame);
+  frame.index = m_frames;
+  frame.stamp_ns = stampOf(stamp_s, fmt::format("frame {}: stamp", m_frames));
   frame.wMb_odometry = wMb;
   frame.gyro = gyro;
-  m_message = frame.message;
-  const FrameReport report = m_pipeline->process(frame);
-  m_status = report.frame_status;
-  if (!report.reason.empty())
-    m_message = report.reason;
-  m_wMb = report.wMb;
-  m_trunks = report.trunks;
+  frame.image = I;
+  requireSound(frame, m_frames, m_last_stamp_ns);
+  if (!m_pipeline)
+    start(frame);
+  m_builder->complete(frame);
+  m_report = m_pipeline->process(frame);
+  m_last_stamp_ns = frame.stamp_ns;
+  m_next_s = stamp_s + m_period_s;
+  ++m_frames;
 }
 
 template <typename Pixel>
@@ -145,7 +150,7 @@ void vpTrunkMapper::Impl::displayBorder(const vpImage<Pixel> &I, const TrunkInVi
 template <typename Pixel>
 void vpTrunkMapper::Impl::display(const vpImage<Pixel> &I, const vpColor &color, unsigned int thickness) const
 {
-  for (const TrunkInView &trunk : m_trunks) {
+  for (const TrunkInView &trunk : m_report.trunks) {
     if (!trunk.is_tracked || !trunk.relative.isFinite())
       continue;
     const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
@@ -220,13 +225,26 @@ void vpTrunkMapper::track(const vpImage<unsigned char> &I, double stamp_s, const
 
 void vpTrunkMapper::testTracking() const
 {
-  if (m_impl->m_status != FrameStatus::ok)
-    throw vpTrackingException(vpTrackingException::featureLostError, "vpTrunkMapper: frame is %s%s%s",
-                              toString(m_impl->m_status), m_impl->m_message.empty() ? "" : ": ",
-                              m_impl->m_message.c_str());
-  if (!m_impl->m_wMb.isFinite())
-    throw vpTrackingException(vpTrackingException::fatalError, "vpTrunkMapper: the pose is not finite");
+  const FrameReport &report = m_impl->m_report;
+  const auto lost = [](const std::string &why) {
+    return vpTrackingException(vpTrackingException::featureLostError, "vpTrunkMapper: %s", why.c_str());
+  };
+  if (report.frame_status != FrameStatus::ok)
+    throw lost(fmt::format("frame is {}{}{}", toString(report.frame_status), report.reason.empty() ? "" : ": ",
+                           report.reason));
+  if (!report.wMb.isFinite())
+    throw lost("the pose is not finite");
+  for (const SensorVerdict &verdict : report.verdicts)
+    if (verdict.sensor == "images")
+      throw lost(verdict.text);
+  if (m_impl->m_has_odometry && report.index > 0 && !report.is_odometry_used) {
+    const auto last = std::find_if(report.verdicts.rbegin(), report.verdicts.rend(),
+                                   [](const SensorVerdict &verdict) { return verdict.sensor == "odometry"; });
+    throw lost(last != report.verdicts.rend() ? last->text : "no odometry that can be believed");
+  }
 }
+
+std::vector<SensorVerdict> vpTrunkMapper::getVerdicts() const { return m_impl->m_report.verdicts; }
 
 void vpTrunkMapper::finish()
 {
@@ -235,15 +253,15 @@ void vpTrunkMapper::finish()
   m_impl->m_pipeline->finish();
   const auto trajectory = m_impl->m_pipeline->smoothedTrajectory();
   if (!trajectory.empty())
-    m_impl->m_wMb = trajectory.back().wMb;
+    m_impl->m_report.wMb = trajectory.back().wMb;
 }
 
-void vpTrunkMapper::getPose(vpHomogeneousMatrix &wMb) const { wMb = m_impl->m_wMb.toVisp(); }
-vpHomogeneousMatrix vpTrunkMapper::getPose() const { return m_impl->m_wMb.toVisp(); }
+void vpTrunkMapper::getPose(vpHomogeneousMatrix &wMb) const { wMb = getPose(); }
+vpHomogeneousMatrix vpTrunkMapper::getPose() const { return m_impl->m_report.wMb.toVisp(); }
 
 void vpTrunkMapper::getCameraPose(vpHomogeneousMatrix &cMw) const
 {
-  cMw = (m_impl->m_wMb * m_impl->m_mounted.bMc).inverse().toVisp();
+  cMw = (m_impl->m_report.wMb * m_impl->m_mounted.bMc).inverse().toVisp();
 }
 
 std::vector<TrunkRecord> vpTrunkMapper::getTrunks() const

@@ -376,8 +376,10 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
 {
   const Pose wMb = m_smoother.pose(newest());
   if (newest() > 0) {
+    constexpr double kLeast_s = 1e-3; // a stamp that hardly advances tells no velocity
     const double dt = secondsOf(frame.stamp_ns - m_online.back().stamp_ns);
-    m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / std::max(dt, 1e-3);
+    if (dt >= kLeast_s)
+      m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / dt;
     followScale(dt);
   }
   m_online.push_back({frame.stamp_ns, wMb});
@@ -390,6 +392,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
   report.wMc = wMb * m_bMc;
   report.pose_covariance = m_smoother.currentPoseCovariance();
   report.is_translation_seen = motion.step.is_step_measured;
+  report.is_odometry_used = motion.is_odometry_used;
   report.has_ranges = m_motion->hasRanges();
   report.verdicts = m_motion->verdicts();
   toMetres(report, m_bMc, m_metres);

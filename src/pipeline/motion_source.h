@@ -39,6 +39,7 @@ struct Motion
   MotionStep step;                       ///< from the frame before
   std::vector<OdometryBetween> odometry; ///< more of it, also between earlier frames
   std::vector<DirectionBetween> directions;
+  bool is_odometry_used = false; ///< of the frame
   bool is_rotation_seen = false; ///< by gyro, pose filter or points; else it is only expected
   std::string image_fault;       ///< what its points say against the image of the frame: it is not used
   bool has_new_unit = false;     ///< the first parallax came with this frame: ranges before it were guesses

@@ -87,6 +87,7 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   Frame room;
   const Frame &trusted = m_monitor.trusted(frame, room);
   motion.step = m_model.step(trusted, wMa, bias, velocity, m_inertial_step);
+  motion.is_odometry_used = trusted.wMb_odometry.has_value();
   motion.is_rotation_seen = motion.step.is_step_measured || !trusted.gyro.empty();
   if (m_monitor.trustsNow(Sensor::images))
     addPoints(motion, seen);

@@ -1,11 +1,26 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/median.h"
+#include "input/camera_plausibility.h"
+#include "input/frame_check.h"
 #include "pipeline/engine.h"
 
 #include <algorithm>
 
 namespace bole
 {
+namespace
+{
+/// Throws for a camera that cannot be one.
+const PinholeCamera &plausible(const PinholeCamera &camera, const Pose &bMc)
+{
+  MountedCamera mounted;
+  mounted.model.pinhole = camera;
+  mounted.bMc = bMc;
+  requirePlausible(mounted);
+  return camera;
+}
+} // namespace
+
 /// Measures the rate of the frames: what is counted in frames is set by it.
 class Pipeline::Rate
 {
@@ -47,14 +62,14 @@ private:
 };
 
 Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const Options &options)
-    : Pipeline(camera, bMc, stageOptions(options, camera))
+    : Pipeline(camera, bMc, stageOptions(options, plausible(camera, bMc)))
 {
   if (options.camera.rate == 0)
     m_rate = std::make_unique<Rate>(camera, bMc, options);
 }
 
 Pipeline::Pipeline(const PinholeCamera &camera, const Pose &bMc, const StageOptions &options)
-    : m_engine(std::make_unique<Engine>(camera, bMc, options))
+    : m_camera(plausible(camera, bMc)), m_engine(std::make_unique<Engine>(camera, bMc, options))
 {
 }
 
@@ -63,6 +78,19 @@ Pipeline::Pipeline(Pipeline &&) noexcept = default;
 Pipeline &Pipeline::operator=(Pipeline &&) noexcept = default;
 
 FrameReport Pipeline::process(const Frame &frame)
+{
+  requireSound(frame, m_frames, m_last_stamp_ns);
+  ++m_frames;
+  m_last_stamp_ns = frame.stamp_ns;
+  const int width = static_cast<int>(frame.image.getWidth()), height = static_cast<int>(frame.image.getHeight());
+  if (frame.status != FrameStatus::ok || (width == m_camera.width && height == m_camera.height))
+    return take(frame);
+  Frame without = frame;
+  judgePicture(without, m_camera.width, m_camera.height);
+  return take(without);
+}
+
+FrameReport Pipeline::take(const Frame &frame)
 {
   if (m_rate && m_rate->measure(frame, m_engine))
     m_rate.reset();

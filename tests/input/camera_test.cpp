@@ -167,7 +167,7 @@ TEST_F(CameraFile, RefusesCamerasThatCannotBe)
   EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [0,0,1,1.0e+9, -1,0,0,0, 0,-1,0,0, 0,0,0,1]\n"),
               HasSubstr("from the body"));
   EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\nT_BS: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n"),
-              HasSubstr("c.yaml:3: T_BS: T_BS has no rotation"));
+              HasSubstr("c.yaml:3: T_BS: no rotation in the body"));
   EXPECT_THAT(refusal("intrinsics: [200, 2000, 160, 120]\n"), HasSubstr("c.yaml:2: intrinsics: fx / fy"));
   EXPECT_THAT(refusal("intrinsics: [200, 200, 160, 120]\ndistortion_model: equidistant\n"
                       "distortion_coefficients: [-9, 0, 0, 0]\n"),
