@@ -20,8 +20,9 @@ namespace bole
 void readConfig(const std::string &path, Options &options);
 
 /// Sets options from assignments "section.name=value", each option at most once.
+/// \param said_as what a message writes before an assignment
 /// \throw vpException "--set assignment: ..."; \p options is then unchanged.
-void setOptions(const std::vector<std::string> &assignments, Options &options);
+void setOptions(const std::vector<std::string> &assignments, Options &options, const std::string &said_as = "--set ");
 
 /// All options as YAML, with what they do.
 std::string toYaml(const Options &options);

@@ -108,14 +108,14 @@ void readConfig(const std::string &path, Options &options)
   assign(all, options);
 }
 
-void setOptions(const std::vector<std::string> &assignments, Options &options)
+void setOptions(const std::vector<std::string> &assignments, Options &options, const std::string &said_as)
 {
   std::vector<Given> all;
   for (const std::string &assignment : assignments) {
     const auto equals = assignment.find('=');
     if (equals == std::string::npos)
-      fail(fmt::format("--set {}: must be section.name=value", assignment));
-    all.push_back({"--set " + assignment, assignment.substr(0, equals), assignment.substr(equals + 1)});
+      fail(fmt::format("{}{}: must be section.name=value", said_as, assignment));
+    all.push_back({said_as + assignment, assignment.substr(0, equals), assignment.substr(equals + 1)});
   }
   assign(all, options);
 }

@@ -15,9 +15,9 @@ import csv as _csv
 import json as _json
 import os as _os
 
-from ._bole import Frame, Pipeline, Report, Source, open, options  # noqa: A004
+from ._bole import Frame, Pipeline, Report, Source, __version__, open, options  # noqa: A004
 
-__all__ = ["Frame", "Pipeline", "Report", "Run", "Source", "open", "options", "read_run"]
+__all__ = ["Frame", "Pipeline", "Report", "Run", "Source", "__version__", "open", "options", "read_run"]
 
 _file = __builtins__["open"] if isinstance(__builtins__, dict) else __builtins__.open
 
@@ -57,6 +57,9 @@ class Run:
         self.hypotheses = _table(_os.path.join(folder, "hypotheses.csv"))
         self.timing = _table(_os.path.join(folder, "timing.csv"))
         self.trajectory = numpy.loadtxt(_os.path.join(folder, "trajectory.tum"), ndmin=2)
+
+    def __repr__(self):
+        return f"<bole.Run {self.folder}: {len(self.trunks['id'])} trunks, {len(self.trajectory)} poses>"
 
 
 def read_run(folder):
