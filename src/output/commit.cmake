@@ -4,7 +4,8 @@ cmake_minimum_required(VERSION 3.24)
 find_package(Git QUIET)
 set(commit "")
 if(GIT_FOUND)
-  execute_process(COMMAND ${GIT_EXECUTABLE} -C ${SOURCE} describe --always --dirty --abbrev=12 --exclude=*
+  # root may build what is another user's, which git alone would not read
+  execute_process(COMMAND ${GIT_EXECUTABLE} -C ${SOURCE} -c safe.directory=${SOURCE} describe --always --dirty --abbrev=12 --exclude=*
     OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 endif()
 if(commit STREQUAL "")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Runs the tutorials as they are printed, and compares the page of options with what the command prints.
+"""Runs the tutorials as they are printed, and compares the page of options and the README with what the command prints.
 Each page's `sh` blocks run in one shell, in a folder that has data/ as the sources
 have; a `cpp` block before them is built against the build tree as ./tutorial. `py` blocks run in one
 Python (skipped without the module). Blocks without a language are not run.
@@ -42,18 +42,35 @@ def compile_program(text, folder, build, environment):
     return 0, ""
 
 
+def text_of(path):
+    with open(path, encoding="utf-8") as text:
+        return text.read()
+
+
+def check_demonstration(build, source, environment):
+    """The README's first block is what the commands of `./setup.sh demo` print."""
+    commands = re.findall(r"^  (\./bole .*)$", text_of(os.path.join(source, "setup.sh")), re.M)
+    block = re.search(r"^```\n(.*?)^```$", text_of(os.path.join(source, "README.md")), re.S | re.M).group(1)
+    with tempfile.TemporaryDirectory(prefix="bole-demo-") as folder:
+        os.symlink(os.path.join(source, "data"), os.path.join(folder, "data"))
+        os.symlink(os.path.join(build, "bole"), os.path.join(folder, "bole"))
+        status, printed = run(["sh", "-e", "-c", "\n".join(commands)], folder, environment)
+    if status == 0 and printed == block:
+        return 0
+    print(f"README.md: FAILED, `./setup.sh demo` prints\n{printed}")
+    return 1
+
+
 def main():
     build, source = (os.path.abspath(p) for p in sys.argv[1:3])
     pages = sys.argv[3:] or sorted(glob.glob(os.path.join(source, "src/doc/tutorial-*.md")))
     environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"], PYTHONPATH=build + "/python")
-    failed = 0
-    with open(os.path.join(source, "src/doc/options.md"), encoding="utf-8") as text:
-        if run(["bole", "options", "--markdown"], source, environment)[1] not in text.read():
-            print("options.md: FAILED, it is not what `bole options --markdown` prints")
-            failed += 1
+    failed = check_demonstration(build, source, environment)
+    if run(["bole", "options", "--markdown"], source, environment)[1] not in text_of(os.path.join(source, "src/doc/options.md")):
+        print("options.md: FAILED, it is not what `bole options --markdown` prints")
+        failed += 1
     for page in pages:
-        with open(page, encoding="utf-8") as text:
-            blocks = re.findall(r"^```(sh|cpp|py)\n(.*?)^```$", text.read(), re.S | re.M)
+        blocks = re.findall(r"^```(sh|cpp|py)\n(.*?)^```$", text_of(page), re.S | re.M)
         with tempfile.TemporaryDirectory(prefix="bole-tutorial-") as folder:
             os.symlink(os.path.join(source, "data"), os.path.join(folder, "data"))
             shell, python, status, output = "set -eu\n", "", 0, ""

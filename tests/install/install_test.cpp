@@ -26,11 +26,11 @@ std::string textOf(const fs::path &path)
   return text.str();
 }
 
-/// The C++ block of the README's section on programs.
-std::string readmeProgram()
+/// The block in \p language of the README's section on programs.
+std::string readmeBlock(const std::string &language)
 {
   const std::string readme = textOf(BOLE_SOURCE_DIR "/README.md");
-  const std::string fence = "```cpp\n";
+  const std::string fence = "```" + language + "\n";
   const std::size_t section = readme.find("## Use it from a ViSP program");
   const std::size_t begin = readme.find(fence, section);
   const std::size_t end = readme.find("```", begin + fence.size());
@@ -70,16 +70,20 @@ protected:
     std::string pattern = (fs::temp_directory_path() / "bole-install-XXXXXX").string();
     s_folder = mkdtemp(pattern.data());
     s_prefix = s_folder / "prefix";
-    s_installed = bole::test::runShell(BOLE_CMAKE " --install " BOLE_BINARY_DIR " --prefix " + s_prefix.string());
+    s_installed =
+        bole::test::runShell("umask 077; " BOLE_CMAKE " --install " BOLE_BINARY_DIR " --prefix " + s_prefix.string());
   }
   static void TearDownTestSuite() { fs::remove_all(s_folder); }
   void SetUp() override { ASSERT_EQ(s_installed.status, 0) << s_installed.text; }
 
   /// The build folder of a program of somebody else's with \p program as its source, configured with \p arguments.
-  fs::path configure(const std::string &name, const std::string &program, const std::string &arguments)
+  fs::path configure(const std::string &name, const std::string &program, const std::string &arguments,
+                     const std::string &lists = "")
   {
     const fs::path outside = s_folder / name, build = outside / "build";
     fs::copy(BOLE_SOURCE_DIR "/tests/install/outside", outside);
+    if (!lists.empty())
+      std::ofstream(outside / "CMakeLists.txt") << lists;
     std::ofstream(outside / "main.cpp") << program;
     std::string command = BOLE_CMAKE " -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=" BOLE_COMPILER " " +
                           arguments + " -S " + outside.string() + " -B " + build.string();
@@ -99,10 +103,10 @@ protected:
 
 TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
 {
-  const std::string program = readmeProgram();
+  const std::string program = readmeBlock("cpp"), lists = readmeBlock("cmake");
   ASSERT_THAT(program, HasSubstr("int main("));
-  const fs::path build = configure("readme", program, "-DCMAKE_PREFIX_PATH=" + s_prefix.string());
-  EXPECT_THAT(m_configured, HasSubstr("data in " + (s_prefix / "share/bole").string()));
+  ASSERT_THAT(lists, HasSubstr("find_package(bole"));
+  const fs::path build = configure("readme", program, "-DCMAKE_PREFIX_PATH=" + s_prefix.string(), lists);
   const Outcome built = bole::test::runShell(BOLE_CMAKE " --build " + build.string());
   ASSERT_EQ(built.status, 0) << built.text;
 
@@ -113,7 +117,7 @@ TEST_F(Install, TheProgramOfTheReadmeBuildsAndMapsTrunks)
   const fs::path flight = s_folder / "flight";
   numberTheDemonstrationFlight(flight);
   const Outcome ran = bole::test::runShell("cd " + flight.string() + " && " + (has_display ? "" : "xvfb-run -a ") +
-                                           (build / "outside").string());
+                                           (build / "trunks").string());
   EXPECT_EQ(ran.status, 0) << ran.text;
   EXPECT_THAT(ran.text, HasSubstr(" m, radius "));
   EXPECT_TRUE(fs::exists(flight / "map.cao"));
@@ -143,6 +147,32 @@ TEST_F(Install, NothingOfTheSourceOrBuildTreeIsNeeded)
     if (entry.path().extension() == ".cmake") {
       EXPECT_THAT(textOf(entry.path()), testing::Not(HasSubstr(BOLE_SOURCE_DIR))) << entry.path();
     }
+}
+
+TEST_F(Install, EverybodyMayReadItWhateverTheUmaskOfWhoInstalled)
+{
+  for (const auto &entry : fs::recursive_directory_iterator(s_prefix)) {
+    const auto others = entry.is_directory() ? fs::perms::others_read | fs::perms::others_exec : fs::perms::others_read;
+    EXPECT_EQ(entry.status().permissions() & others, others) << entry.path();
+  }
+}
+
+TEST_F(Install, EveryPackageHasItsCopyright)
+{
+  for (const char *package : {"bole", "libbole0.1", "libbole-dev"})
+    EXPECT_THAT(textOf(s_prefix / "share/doc" / package / "copyright"), HasSubstr("License: GPL-2.0-or-later"))
+        << package;
+}
+
+TEST_F(Install, DebiansPythonFindsTheModuleBelowUsrLocal)
+{
+  if (!fs::exists(BOLE_BINARY_DIR "/python") || *BOLE_SANITIZERS != '\0')
+    GTEST_SKIP() << "no Python module was built (pybind11-dev), or one with sanitizers";
+  const Outcome ran = bole::test::runShell(
+      "/usr/bin/python3 -c 'import site, sys; sys.path[:0] = [p.replace(\"/usr/local\", \"" + s_prefix.string() +
+      "\") for p in site.getsitepackages() if p.startswith(\"/usr/local\")]; import bole; print(bole.__file__)'");
+  EXPECT_EQ(ran.status, 0) << ran.text;
+  EXPECT_THAT(ran.text, HasSubstr(s_prefix.string()));
 }
 
 TEST_F(Install, TheCommandFindsItsPresetsAndItsFlightByName)
