@@ -32,4 +32,21 @@ Eigen::Vector2d directionMinus(const Eigen::Vector3d &e, const Eigen::Vector3d &
     return in_plane;
   return in_plane * (std::atan2(sine, d.dot(e)) / sine);
 }
+
+Eigen::Matrix3d rotationBetween(const Eigen::Vector3d &from, const Eigen::Vector3d &to)
+{
+  const Eigen::Vector3d a = from.normalized(), b = to.normalized();
+  const double cosine = b.dot(a);
+  Eigen::Quaterniond rotation;
+  if (cosine < -1 + 1e-12) { // by half a turn about any axis across
+    rotation.w() = 0;
+    rotation.vec() = directionBasis(a).col(0);
+  }
+  else {
+    const double s = std::sqrt(2 * (1 + cosine));
+    rotation.vec() = a.cross(b) * (1 / s);
+    rotation.w() = 0.5 * s;
+  }
+  return rotation.toRotationMatrix();
+}
 } // namespace bole

@@ -24,4 +24,8 @@ Eigen::Vector3d directionPlus(const Eigen::Vector3d &d, const Eigen::Vector2d &t
 
 /// Tangent tau [rad] at \p d with directionPlus(d, tau) == \p e.
 Eigen::Vector2d directionMinus(const Eigen::Vector3d &e, const Eigen::Vector3d &d);
+
+/// The least rotation that takes the direction of \p from to that of \p to. (Eigen's FromTwoVectors() does it, too, and
+/// makes each file that calls it compile a singular value decomposition.)
+Eigen::Matrix3d rotationBetween(const Eigen::Vector3d &from, const Eigen::Vector3d &to);
 } // namespace bole

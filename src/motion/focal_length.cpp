@@ -79,10 +79,14 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &cost
   if (best == 0 || best + 1 == kSteps)
     return std::nullopt;
   const int first = std::max(0, best - kNear), last = std::min(kSteps - 1, best + kNear);
-  Eigen::MatrixXd A(last - first + 1, 3);
-  for (int k = first; k <= last; ++k)
-    A.row(k - first) << 1, k - best, (k - best) * (k - best);
-  const Eigen::Vector3d c = A.colPivHouseholderQr().solve(sum.segment(first, last - first + 1));
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (int k = first; k <= last; ++k) {
+    const Eigen::Vector3d powers(1, k - best, (k - best) * (k - best));
+    A += powers * powers.transpose();
+    b += sum[k] * powers;
+  }
+  const Eigen::Vector3d c = A.ldlt().solve(b);
   const double vertex = -0.5 * c[1] / c[2];
   if (c[2] <= 0 || vertex < first - best || vertex > last - best)
     return std::nullopt;

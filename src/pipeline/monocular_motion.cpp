@@ -2,10 +2,10 @@
 #include "pipeline/monocular_motion.h"
 
 #include "geometry/constants.h"
+#include "geometry/direction.h"
 #include "geometry/median.h"
 #include "geometry/so3.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -31,7 +31,7 @@ constexpr int kMostIterations = 2;         ///< of the smoother a frame: no pose
 /// \p wRb turned, as little as needed, to have \p bup pointing up.
 Matrix3d levelled(const Matrix3d &wRb, const Vector3d &bup)
 {
-  return Eigen::Quaterniond::FromTwoVectors(wRb * bup, Vector3d::UnitZ()).toRotationMatrix() * wRb;
+  return rotationBetween(wRb * bup, Vector3d::UnitZ()) * wRb;
 }
 
 /// Roll and pitch alone, at the body \p wMb with up in the direction \p bup of the \p covariance across it.

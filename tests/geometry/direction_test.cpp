@@ -49,6 +49,20 @@ TEST(Direction, PlusUndoesMinus)
   }
 }
 
+TEST(Direction, IsTurnedToAnotherByTheLeastRotation)
+{
+  for (const auto &d : directions()) {
+    std::vector<Eigen::Vector3d> others = directions();
+    others.push_back(-d);
+    for (const auto &e : others) {
+      const Eigen::Matrix3d R = bole::rotationBetween(2 * d, e);
+      EXPECT_LT((R * d - e).norm(), 1e-12);
+      EXPECT_TRUE((R.transpose() * R).isIdentity(1e-12));
+      EXPECT_NEAR(R.trace(), 1 + 2 * d.dot(e), 1e-12);
+    }
+  }
+}
+
 TEST(Direction, MinusIsTheAngle)
 {
   const Eigen::Vector3d d(0, 0, 1), e(std::sin(0.3), 0, std::cos(0.3));
