@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Draws the pictures of README and documentation from runs (Debian: python3-opencv python3-matplotlib python3-pil).
 
-  bole track data/park-forward -o run && src/doc/figures.py system run data/park-forward data/figures/system.png
-  src/doc/figures.py gif run/overlay.mp4 data/figures/park-forward.gif
+  cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
   src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse

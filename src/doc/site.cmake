@@ -1,4 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
+# The README's pictures of the demonstration flight by this build: cmake --build --preset release --target figures
+# (Debian: python3-opencv python3-matplotlib python3-pil).
+set(figures_run ${PROJECT_BINARY_DIR}/figures)
+set(draw ${CMAKE_CURRENT_LIST_DIR}/figures.py)
+add_custom_target(figures WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} VERBATIM
+  COMMAND bole track data/park-forward -o ${figures_run}
+  COMMAND ${CMAKE_COMMAND} -E copy ${figures_run}/map.svg data/figures/park-forward-map.svg
+  COMMAND /usr/bin/python3 ${draw} gif ${figures_run}/overlay.mp4 data/figures/park-forward.gif
+  COMMAND /usr/bin/python3 ${draw} system ${figures_run} data/park-forward data/figures/system.png)
+
 # The site of the documentation in build/PRESET/site: cmake --build --preset release --target doc
 # Needs Debian's doxygen and libjs-mathjax: formulas are typeset in the browser.
 find_package(Doxygen 1.9 QUIET)
