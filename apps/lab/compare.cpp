@@ -11,7 +11,7 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <iterator>
 #include <memory>
 
@@ -163,10 +163,7 @@ void run(const CompareArguments &arguments)
 
   ComparisonReport report;
   report.sequence = flight.name;
-  report.command = fmt::format("bole compare {} -o {}{}{}", arguments.sequence, arguments.out,
-                               arguments.has_basin ? " --basin" : "", arguments.has_faults ? " --faults" : "");
-  if (!arguments.settings.empty())
-    report.command += " --settings " + arguments.settings;
+  report.command = fmt::format("bole {}", fmt::join(g_command_line.begin() + 1, g_command_line.end(), " "));
   report.frames = int(flight.frames.size());
   report.trunks = int(model.size());
   report.limits = flight.limits;
