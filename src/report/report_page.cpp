@@ -2,204 +2,220 @@
 #include "report/report_page.h"
 
 #include "output/atomic_file.h"
-#include "output/figure.h"
 #include "output/page.h"
-#include "output/palette.h"
-#include "output/svg.h"
-#include "report/report_drawings.h"
-#include "report/report_script.h"
+#include "report_template.h" // made of page.html
 
+#include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 namespace bole
 {
 namespace
 {
-std::string list(const std::vector<std::string> &lines)
+using Json = nlohmann::json;
+
+constexpr std::size_t kMostPoints = 400; // of a curve: more are not seen
+constexpr std::size_t kMostSteps = 4000; // of a line on the map
+constexpr std::size_t kEllipses = 30;    // of the trajectory
+
+double secondsSince(const RunRecord &run, std::int64_t stamp_ns)
 {
-  std::string html = "<ul>";
-  for (const std::string &line : lines)
-    html += "<li>" + escaped(line) + "</li>";
-  return html + "</ul>";
+  return run.trace.frames.empty() ? 0 : 1e-9 * static_cast<double>(stamp_ns - run.trace.frames.front().stamp_ns);
 }
 
-std::string banner(const RunRecord &run)
+/// \p jsonOf each of \p values, or of every so many where they are more than \p most.
+template <class Values, class JsonOf> Json thinned(const Values &values, std::size_t most, const JsonOf &jsonOf)
 {
-  const bool is_good = run.is_trusted && run.doubts.empty();
-  const char *colour = is_good ? palette::kGreen : run.is_trusted ? palette::kOrange : palette::kVermilion;
-  const char *title = is_good ? "Done" : run.is_trusted ? "Done, with doubts" : "Not to be trusted";
-  return fmt::format("<div class=\"banner\" style=\"border-color:{}\"><b>{}</b>{}{}</div>\n", colour, title,
-                     run.doubts.empty() ? "" : list(run.doubts), list(run.facts));
+  Json list = Json::array();
+  for (std::size_t i = 0; i < values.size(); i += values.size() / most + 1)
+    list.push_back(jsonOf(values[i]));
+  return list;
 }
 
-const TrunkMatch *matchOf(const RunRecord &run, int id)
+Json lineOf(const Trajectory &path)
 {
-  if (!run.evaluation || !run.evaluation->trunks)
-    return nullptr;
-  for (const TrunkMatch &match : run.evaluation->trunks->matches)
-    if (match.estimate.id == id)
-      return &match;
-  return nullptr;
+  return thinned(path, kMostSteps, [](const StampedPose &pose) { return Json{pose.wMb.t.x(), pose.wMb.t.y()}; });
 }
 
-const TruthTrunk *truthOf(const RunRecord &run, int id)
+/// Runs of frames of which \p kindOf is the same: [from s, to s, kind].
+template <class KindOf> Json runsOf(const RunRecord &run, const KindOf &kindOf)
 {
-  const TrunkMatch *match = matchOf(run, id);
-  for (const TruthTrunk &truth : run.truth_trunks)
-    if (match != nullptr && truth.id == match->truth_id)
-      return &truth;
-  return nullptr;
-}
-
-std::string errorText(const RunRecord &run, int id)
-{
-  const TrunkMatch *match = matchOf(run, id);
-  return match == nullptr ? "-" : withUnit(100 * match->error[indexOf(run.evaluation->trunks->matching)], 1, "cm");
-}
-
-std::string panel(const RunRecord &run, const TrunkRecord &trunk)
-{
-  std::string html = fmt::format("<div class=\"panel\" data-id=\"{}\"><h3>Trunk {}</h3>\n", trunk.id, trunk.id);
-  const auto view = run.views_jpeg.find(trunk.id);
-  if (view != run.views_jpeg.end())
-    html += "<div class=\"view\">" +
-            htmlImage(view->second, "jpeg", fmt::format("trunk {} where it is seen best", trunk.id)) + "</div>";
-  html += fmt::format(
-      "<p>at ({:.2f}, {:.2f}) m, &sigma; {:.1f} cm<br>radius {:.1f} cm, &sigma; {:.1f} cm<br>leans {:.1f}&deg;<br>"
-      "{} views from {:.1f} to {:.1f} s<br>probability {}</p>\n",
-      trunk.xy.x(), trunk.xy.y(), 100 * trunk.positionSigma(), 100 * trunk.radius, 100 * trunk.radiusSigma(),
-      std::atan(trunk.lean.norm()) * 180 / M_PI, trunk.observations, trunk.first_seen_s, trunk.last_seen_s,
-      percent(trunk.probability));
-  if (const TrunkMatch *match = matchOf(run, trunk.id))
-    html += fmt::format("<p>truth: trunk {}, {} away; radius {:+.1f} cm</p>\n", match->truth_id,
-                        errorText(run, trunk.id), 100 * match->radius_error);
-  return html + chartBox(trunkCharts(run, trunk, truthOf(run, trunk.id))) + "</div>\n";
-}
-
-std::vector<TrunkRecord> confirmedOf(const RunRecord &run)
-{
-  std::vector<TrunkRecord> trunks;
-  for (const TrunkRecord &trunk : run.trunks)
-    if (trunk.status == TrunkStatus::confirmed)
-      trunks.push_back(trunk);
-  return trunks;
-}
-
-std::string trunkTable(const RunRecord &run)
-{
-  std::string html = "<div class=\"wide\"><table>\n<tr><th>trunk</th><th>x [m]</th><th>y [m]</th><th>&sigma; [cm]</th>"
-                     "<th>radius [cm]</th><th>&sigma; [cm]</th><th>views</th><th>probability</th>";
-  html += run.evaluation ? "<th>from the truth</th></tr>\n" : "</tr>\n";
-  for (const TrunkRecord &trunk : confirmedOf(run)) {
-    html +=
-        fmt::format("<tr data-id=\"{0}\" tabindex=\"0\"><td>{0}</td><td>{1:.2f}</td><td>{2:.2f}</td><td>{3:.1f}</td>"
-                    "<td>{4:.1f}</td><td>{5:.1f}</td><td>{6}</td><td>{7}</td>",
-                    trunk.id, trunk.xy.x(), trunk.xy.y(), 100 * trunk.positionSigma(), 100 * trunk.radius,
-                    100 * trunk.radiusSigma(), trunk.observations, percent(trunk.probability));
-    html += run.evaluation ? "<td>" + errorText(run, trunk.id) + "</td></tr>\n" : "</tr>\n";
+  const std::vector<FrameTrace> &frames = run.trace.frames;
+  Json runs = Json::array();
+  for (std::size_t i = 0, end = 0; i < frames.size(); i = end) {
+    for (end = i + 1; end < frames.size() && kindOf(frames[end]) == kindOf(frames[i]);)
+      ++end;
+    runs.push_back({secondsSince(run, frames[i].stamp_ns),
+                    secondsSince(run, frames[std::min(end, frames.size() - 1)].stamp_ns), kindOf(frames[i])});
   }
-  return html + "</table></div>\n";
+  return runs;
 }
 
-std::string truthHtml(const Evaluation &evaluation)
+Json trunkJson(const RunRecord &run, const TrunkRecord &trunk)
 {
-  std::vector<std::vector<std::string>> rows;
-  const auto ate = [](const TrajectoryReport &report) {
-    return withUnit(100 * report.absolute[indexOf(Alignment::xy_yaw)].ate, 1, "cm");
-  };
-  rows.push_back({"trajectory, smoothed: ATE after x, y, yaw", ate(evaluation.smoothed)});
+  const Eigen::Matrix2d xy = trunk.covarianceXy();
+  Json json = {{"id", trunk.id},
+               {"status", toString(trunk.status)},
+               {"x", trunk.xy.x()},
+               {"y", trunk.xy.y()},
+               {"radius", trunk.radius}};
+  if (trunk.status != TrunkStatus::confirmed)
+    return json;
+  json.update({{"sigma", trunk.positionSigma()},
+               {"radius_sigma", trunk.radiusSigma()},
+               {"covariance", {xy(0, 0), xy(0, 1), xy(1, 1)}},
+               {"lean_deg", std::atan(trunk.lean.norm()) * 180 / M_PI},
+               {"views", trunk.observations},
+               {"first", trunk.first_seen_s},
+               {"last", trunk.last_seen_s},
+               {"probability", trunk.probability}});
+  if (const auto view = run.views_jpeg.find(trunk.id); view != run.views_jpeg.end())
+    json["picture"] = "data:image/jpeg;base64," + base64(view->second);
+  std::vector<TrunkTrace> views;
+  std::vector<std::size_t> measured;
+  for (const TrunkTrace &view : run.trace.views)
+    if (view.id == trunk.id) {
+      views.push_back(view);
+      measured.push_back(view.frame);
+    }
+  json["curve"] = thinned(views, kMostPoints, [&](const TrunkTrace &view) {
+    return Json{secondsSince(run, view.stamp_ns),
+                view.range,
+                view.range_sigma,
+                view.radius,
+                view.radius_sigma,
+                view.xy.x(),
+                view.xy.y(),
+                view.xy_sigma.x(),
+                view.xy_sigma.y()};
+  });
+  json["seen"] = runsOf(
+      run, [&](const FrameTrace &frame) { return std::binary_search(measured.begin(), measured.end(), frame.index); });
+  return json;
+}
+
+Json evaluationJson(const Evaluation &evaluation)
+{
+  const auto ate = [](const TrajectoryReport &report) { return report.absolute[indexOf(Alignment::xy_yaw)].ate; };
+  Json json = {{"smoothed", ate(evaluation.smoothed)}};
   if (evaluation.online)
-    rows.push_back({"trajectory, online", ate(*evaluation.online)});
+    json["online"] = ate(*evaluation.online);
   if (evaluation.odometry)
-    rows.push_back({"pose filter", ate(*evaluation.odometry)});
-  if (const auto &trunks = evaluation.trunks) {
-    rows.push_back(
-        {"recall", fmt::format("{} ({} of {})", percent(trunks->recall), trunks->all.found, trunks->all.expected)});
-    rows.push_back({"precision", fmt::format("{} ({} of {})", percent(trunks->precision), trunks->matches.size(),
-                                             trunks->confirmed)});
-    rows.push_back(
-        {"error of the place, median", withUnit(100 * trunks->all.median[indexOf(trunks->matching)], 1, "cm")});
-    rows.push_back({"error of the radius, RMSE", withUnit(100 * trunks->all.radius_rmse, 1, "cm")});
-    rows.push_back({"NEES / 2 of the places (1: honest)", figure(trunks->all.nees_half, 0, 2)});
-  }
-  return "<h2>Against the truth</h2>\n" + htmlTable({"", ""}, rows);
+    json["odometry"] = ate(*evaluation.odometry);
+  if (!evaluation.trunks)
+    return json;
+  const TrunkMetrics &trunks = *evaluation.trunks;
+  const std::size_t matching = indexOf(trunks.matching);
+  json["trunks"] = {{"recall", trunks.recall},
+                    {"precision", trunks.precision},
+                    {"found", trunks.all.found},
+                    {"expected", trunks.all.expected},
+                    {"confirmed", trunks.confirmed},
+                    {"median_m", trunks.all.median[matching]},
+                    {"radius_rmse_m", trunks.all.radius_rmse},
+                    {"nees_half", trunks.all.nees_half},
+                    {"matches", Json::array()}};
+  for (const TrunkMatch &match : trunks.matches)
+    json["trunks"]["matches"].push_back({{"id", match.estimate.id},
+                                         {"truth_id", match.truth_id},
+                                         {"error_m", match.error[matching]},
+                                         {"radius_error_m", match.radius_error},
+                                         {"truth_radius_m", match.truth_radius}});
+  return json;
 }
 
-std::string timingHtml(const RunRecord &run)
+/// Distance in the plane between the smoothed path and the truth: [s, m].
+Json errorsOf(const RunRecord &run)
+{
+  if (run.smoothed.empty())
+    return Json::array();
+  std::size_t k = 0;
+  return thinned(run.truth, kMostPoints, [&](const StampedPose &truth) {
+    while (k + 1 < run.smoothed.size() && run.smoothed[k].stamp_ns < truth.stamp_ns)
+      ++k;
+    return Json{secondsSince(run, truth.stamp_ns), (run.smoothed[k].wMb.t - truth.wMb.t).head<2>().norm()};
+  });
+}
+
+/// What was known frame by frame.
+void addFrames(Json &json, const RunRecord &run)
+{
+  const std::vector<FrameTrace> &frames = run.trace.frames;
+  json["seconds"] = frames.empty() ? 0 : secondsSince(run, frames.back().stamp_ns);
+  json["statuses"] = runsOf(run, [](const FrameTrace &frame) { return toString(frame.status); });
+  json["places"] = thinned(frames, kMostPoints, [&](const FrameTrace &frame) {
+    return Json{secondsSince(run, frame.stamp_ns), std::sqrt(std::max(0.0, frame.covariance_xy(0, 0))),
+                std::sqrt(std::max(0.0, frame.covariance_xy(1, 1))), frame.place.z()};
+  });
+  json["ellipses"] = thinned(frames, kEllipses, [](const FrameTrace &frame) {
+    return Json{frame.place.x(), frame.place.y(), frame.covariance_xy(0, 0), frame.covariance_xy(0, 1),
+                frame.covariance_xy(1, 1)};
+  });
+  json["evidence"] = {{"side", GroundEvidence::kSide}, {"squares", Json::array()}};
+  for (const auto &[middle, count] : run.trace.evidence.squares())
+    json["evidence"]["squares"].push_back({middle.x(), middle.y(), count});
+}
+
+void addCost(Json &json, const RunRecord &run)
 {
   const TimingTable &timing = run.timing;
-  std::vector<std::vector<std::string>> rows;
+  std::size_t frame = 0;
+  json["costs"] = thinned(timing.frames, kMostPoints, [&](const FrameTiming &cost) {
+    while (frame + 1 < run.trace.frames.size() && run.trace.frames[frame].index < cost.index)
+      ++frame;
+    return Json{run.trace.frames.empty() ? 0 : secondsSince(run, run.trace.frames[frame].stamp_ns), cost.total_ms};
+  });
+  json["stages"] = Json::array();
   for (std::size_t i = 0; i < timing.stages.size(); ++i)
-    rows.push_back({escaped(timing.stages[i]), fmt::format("{:.2f}", timing.medianStage_ms(i))});
-  rows.push_back({"<b>total</b>", fmt::format("<b>{:.2f}</b>", timing.medianTotal_ms())});
-  rows.push_back({"total, 95 % of the frames below", fmt::format("{:.2f}", timing.percentile95_ms())});
-  return "<h2>Cost</h2>\n" + chartBox(timingChart(run)) + htmlTable({"stage", "median of a frame [ms]"}, rows);
-}
-
-std::string nextHtml(const RunRecord &run)
-{
-  std::vector<std::string> next;
-  for (const std::string &doubt : run.doubts)
-    if (doubt.find("--") != std::string::npos)
-      next.push_back(escaped(doubt));
-  const std::string folder = escaped(run.folder);
-  if (!run.evaluation)
-    next.push_back("With a ground truth: <code>bole report " + folder + " SEQUENCE</code>, <code>bole evaluate " +
-                   folder + " SEQUENCE</code>.");
-  if (run.has_ranges) {
-    next.push_back("Localise in this map: <code>bole export " + folder +
-                   " cao</code>, then "
-                   "<code>vpMbTrunkTracker::loadModel()</code>.");
-    next.push_back("To a geographic information system: <code>bole export " + folder +
-                   " geojson --origin LATITUDE,LONGITUDE,HEADING</code>; to CAD: <code>dxf</code>; to a point cloud: "
-                   "<code>ply</code>.");
-  }
-  next.push_back("Repeat it and compare the bytes: <code>bole track --again " + folder + "</code>.");
-  std::string html = "<h2>What to do next</h2>\n<ul>";
-  for (const std::string &step : next)
-    html += "<li>" + step + "</li>";
-  return html + "</ul>\n";
-}
-
-std::string originHtml(const RunRecord &run)
-{
-  std::vector<std::vector<std::string>> rows = {{"input", escaped(run.input)}};
-  if (!run.note.empty())
-    rows.push_back({"note", escaped(run.note)});
-  if (!run.sha256.empty())
-    rows.push_back({"SHA-256 of the input", "<code>" + run.sha256 + "</code>"});
-  rows.push_back({"command", "<code>" + escaped(fmt::format("{}", fmt::join(run.command, " "))) + "</code>"});
-  rows.push_back({"in", escaped(run.working_folder)});
-  for (const auto &[name, version] : run.versions)
-    rows.push_back({escaped(name), escaped(version)});
-  return "<h2>How it was made</h2>\n" + htmlTable({"", ""}, rows);
+    json["stages"].push_back({timing.stages[i], timing.medianStage_ms(i)});
+  json["total_ms"] = timing.medianTotal_ms();
+  json["total_95_ms"] = timing.percentile95_ms();
 }
 } // namespace
 
+std::string reportJson(const RunRecord &run)
+{
+  Json json = {{"folder", run.folder},
+               {"input", run.input},
+               {"working_folder", run.working_folder},
+               {"note", run.note},
+               {"sha256", run.sha256},
+               {"command", run.command},
+               {"facts", run.facts},
+               {"doubts", run.doubts},
+               {"versions", run.versions},
+               {"trusted", run.is_trusted},
+               {"ranges", run.has_ranges},
+               {"videos", run.videos},
+               {"sensors", Json::array()},
+               {"trunks", Json::array()},
+               {"truth_trunks", Json::array()},
+               {"smoothed", lineOf(run.smoothed)},
+               {"online", lineOf(run.online)},
+               {"truth", lineOf(run.truth)},
+               {"errors", errorsOf(run)}};
+  for (const SensorVerdict &verdict : run.sensors)
+    json["sensors"].push_back(
+        {{"sensor", verdict.sensor}, {"since_s", secondsSince(run, std::llround(1e9 * verdict.since_s))}});
+  for (const TrunkRecord &trunk : run.trunks)
+    json["trunks"].push_back(trunkJson(run, trunk));
+  for (const TruthTrunk &trunk : run.truth_trunks)
+    json["truth_trunks"].push_back({{"x", trunk.xy.x()}, {"y", trunk.xy.y()}, {"radius", trunk.radius}});
+  json["camera"] = run.online.empty() ? Json{0, 0} : lineOf({run.online.back()})[0];
+  json["evaluation"] = run.evaluation ? evaluationJson(*run.evaluation) : Json();
+  addFrames(json, run);
+  addCost(json, run);
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string reportHtml(const RunRecord &run)
 {
-  std::string body = kReportStyle + banner(run);
-  const std::vector<TrunkRecord> trunks = run.has_ranges ? confirmedOf(run) : std::vector<TrunkRecord>();
-  if (run.has_ranges) {
-    body += "<div id=\"board\"><div>" + mapHtml(run) + "</div>\n<div id=\"panels\">";
-    for (const TrunkRecord &trunk : trunks)
-      body += panel(run, trunk);
-    body += "</div></div>\n<h2>Trunks</h2>\n" + trunkTable(run);
-  }
-  else
-    body += "<h2>Bearings</h2>\n" + chartBox(run.map_svg);
-  if (run.evaluation)
-    body += truthHtml(*run.evaluation);
-  body += "<h2>Time line</h2>\n" + chartBox(timeLine(run));
-  if (run.has_ranges)
-    body += "<h2>Trajectory</h2>\n" + chartBox(trajectoryCharts(run));
-  if (run.has_video)
-    body += "<h2>Video</h2>\n<video controls preload=\"none\" src=\"overlay.mp4\"></video><p>Beside this page: <a "
-            "href=\"overlay.mp4\">overlay.mp4</a>, <a href=\"saliency.mp4\">saliency.mp4</a></p>\n";
-  body += timingHtml(run) + nextHtml(run) + originHtml(run);
-  return htmlPage("bole: " + run.input, body, kReportScript);
+  std::string json = reportJson(run), page = kReportTemplate;
+  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) // nothing in it ends the script
+    json.replace(at, 1, "\\u003c");
+  const std::string place = "/*RUN*/";
+  return page.replace(page.find(place), place.size(), json);
 }
 
 void writeReport(const std::string &run, const std::string &sequence)

@@ -9,7 +9,11 @@
 
 namespace bole
 {
-/// What the run is worth, map, trunks, time line, trajectory, cost, how to repeat it, what to do next.
+/// What the page shows, as JSON: the script in page.html draws it.
+std::string reportJson(const RunRecord &run);
+
+/// page.html with reportJson() in it: what the run is worth, map, trunks, time line, trajectory, cost, how to repeat
+/// it, what to do next.
 std::string reportHtml(const RunRecord &run);
 
 /// Writes RUN/report.html from what the folder \p run holds; \p sequence: ASL folder with the truth, or empty.

@@ -114,7 +114,9 @@ RunRecord readRun(const std::string &folder, const std::string &sequence)
   RunRecord run;
   run.folder = folder;
   readSummaryInto(run, folder + "/summary.json");
-  run.has_video = fs::exists(folder + "/overlay.mp4");
+  for (const char *video : {"overlay.mp4", "saliency.mp4"})
+    if (fs::exists(folder + "/" + video))
+      run.videos.push_back(video);
   run.trunks = readTrunks(folder + "/trunks.csv");
   for (const TrunkRecord &hypothesis : readTrunks(folder + "/hypotheses.csv"))
     run.trunks.push_back(hypothesis);
@@ -125,9 +127,7 @@ RunRecord readRun(const std::string &folder, const std::string &sequence)
   run.online = readTumTrajectory(folder + "/trajectory_online.tum");
   run.trace = readTrace(folder);
   run.timing = readTiming(folder + "/timing.csv");
-  if (!run.has_ranges)
-    run.map_svg = bytesOf(folder + "/map.svg");
-  else if (!sequence.empty())
+  if (run.has_ranges && !sequence.empty())
     readTruthInto(run, sequence);
   return run;
 }

@@ -23,8 +23,8 @@ struct RunRecord
   std::vector<std::string> command, facts, doubts;
   std::map<std::string, std::string> versions;
   std::vector<SensorVerdict> sensors;
-  bool is_trusted = true, has_ranges = true, has_video = false;
-  std::string map_svg;             ///< the picture of a run without ranges
+  bool is_trusted = true, has_ranges = true;
+  std::vector<std::string> videos; ///< names of those beside the page
   std::vector<TrunkRecord> trunks; ///< and hypotheses
   std::map<int, std::string> views_jpeg;
   Trajectory smoothed, online;
