@@ -129,8 +129,6 @@ public:
     return static_cast<std::size_t>(
         std::count_if(m_lines.begin(), m_lines.end(), [](const auto &file) { return isPublic(file.first); }));
   }
-  std::size_t files() const { return m_lines.size(); }
-  const std::vector<Stage> &stages() const { return m_stages; }
 
 private:
   static bool isPublic(const std::string &file) { return file.rfind("include/bole/", 0) == 0; }
