@@ -32,8 +32,6 @@ Eigen::Matrix4d matrixOf(const Pose &pose)
 
 std::string text(const py::handle &object) { return py::str(object).cast<std::string>(); }
 
-double seconds(std::int64_t stamp_ns) { return static_cast<double>(stamp_ns) / 1e9; }
-
 /// \p given: numbers in rows of \p columns.
 Eigen::MatrixXd rowsFrom(const py::object &given, const char *name, py::ssize_t columns)
 {
@@ -283,7 +281,7 @@ PYBIND11_MODULE(_bole, module)
            "gyro: rows of stamp [s] and angular rate [rad/s], since the frame before")
       .def_property_readonly("image", &imageOf, "grey, uint8, [height x width], rectified")
       .def_property_readonly(
-          "stamp", [](const Frame &f) { return seconds(f.stamp_ns); }, "[s]")
+          "stamp", [](const Frame &f) { return secondsOfStamp(f.stamp_ns); }, "[s]")
       .def_property_readonly("status", [](const Frame &f) { return toString(f.status); })
       .def_readonly("message", &Frame::message, "why the status is not ok")
       .def_property_readonly(
@@ -294,12 +292,12 @@ PYBIND11_MODULE(_bole, module)
           [](const Frame &f) {
             Eigen::MatrixXd rows(f.gyro.size(), 4);
             for (std::size_t i = 0; i < f.gyro.size(); ++i)
-              rows.row(i) << seconds(f.gyro[i].stamp_ns), f.gyro[i].rate.transpose();
+              rows.row(i) << secondsOfStamp(f.gyro[i].stamp_ns), f.gyro[i].rate.transpose();
             return rows;
           },
           "rows of stamp [s] and angular rate [rad/s]")
       .def("__repr__", [](const Frame &f) {
-        return fmt::format("<bole.Frame at {} s: {}x{} px, {}>", seconds(f.stamp_ns), f.image.getWidth(),
+        return fmt::format("<bole.Frame at {} s: {}x{} px, {}>", secondsOfStamp(f.stamp_ns), f.image.getWidth(),
                            f.image.getHeight(), toString(f.status));
       });
 
@@ -352,7 +350,7 @@ PYBIND11_MODULE(_bole, module)
   py::class_<FrameReport>(module, "Report", "All that is known right after a frame.")
       .def_readonly("index", &FrameReport::index)
       .def_property_readonly(
-          "stamp", [](const FrameReport &r) { return seconds(r.stamp_ns); }, "[s]")
+          "stamp", [](const FrameReport &r) { return secondsOfStamp(r.stamp_ns); }, "[s]")
       .def_property_readonly("status", [](const FrameReport &r) { return toString(r.frame_status); })
       .def_readonly("reason", &FrameReport::reason)
       .def_property_readonly(
@@ -364,8 +362,8 @@ PYBIND11_MODULE(_bole, module)
       .def_property_readonly("verdicts", &verdictsOf,
                              "sensors that contradicted the others so far, a dict each: sensor, kind, since [s], text")
       .def("__repr__", [](const FrameReport &r) {
-        return fmt::format("<bole.Report of frame {} at {} s: {}, {} trunks in view>", r.index, seconds(r.stamp_ns),
-                           toString(r.frame_status), r.trunks.size());
+        return fmt::format("<bole.Report of frame {} at {} s: {}, {} trunks in view>", r.index,
+                           secondsOfStamp(r.stamp_ns), toString(r.frame_status), r.trunks.size());
       });
 
   py::class_<Pipeline>(module, "Pipeline", "From frames to a map of trunks and a trajectory.")

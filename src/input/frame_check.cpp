@@ -13,8 +13,7 @@ namespace
 constexpr double kFarthest_m = 1e7; // of a body from the origin: grids of a country begin far away
 constexpr double kFarthest_s = 1e-9 * static_cast<double>(kFarthestStamp_ns);
 
-/// The shortest number that is the stamp.
-std::string inSeconds(std::int64_t stamp_ns) { return fmt::format("{} s", static_cast<double>(stamp_ns) / 1e9); }
+std::string inSeconds(std::int64_t stamp_ns) { return fmt::format("{} s", secondsOfStamp(stamp_ns)); }
 
 std::string shown(const Eigen::Vector3d &v) { return fmt::format("({:g}, {:g}, {:g})", v.x(), v.y(), v.z()); }
 
@@ -79,6 +78,11 @@ std::int64_t stampOf(double seconds, const std::string &name)
     throw badValue("{} = {:g} s, must be at most {:g} s from zero", name, seconds, kFarthest_s);
   const double whole = std::floor(seconds); // apart: all nine digits of the rest count
   return std::llround(whole) * 1'000'000'000 + std::llround((seconds - whole) * 1e9);
+}
+
+double secondsOfStamp(std::int64_t stamp_ns)
+{
+  return static_cast<double>(stamp_ns / 1'000'000'000) + static_cast<double>(stamp_ns % 1'000'000'000) / 1e9;
 }
 
 void judgePicture(Frame &frame, int width, int height)

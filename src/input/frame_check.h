@@ -26,6 +26,9 @@ void requireSound(const Frame &frame, std::optional<std::size_t> index = {},
 /// A time in seconds as a stamp [ns]. Throws "NAME = ... s, must be ..." where it is not finite or out of range.
 std::int64_t stampOf(double seconds, const std::string &name);
 
+/// The number that stampOf() makes the same stamp of: seconds of the usual epoch keep all nine digits that fit.
+double secondsOfStamp(std::int64_t stamp_ns);
+
 /// A frame without a picture that was `ok` becomes `missing`, one with a picture of another size `resized`, and loses
 /// it.
 void judgePicture(Frame &frame, int width, int height);

@@ -93,8 +93,9 @@ TEST(FrameCheck, NamesFrameStampAndValueOfWhatCannotBe)
 TEST(FrameCheck, SecondsBecomeAStampOnlyWhereTheyAreOne)
 {
   EXPECT_EQ(stampOf(0.1, "stamp"), 100'000'000);
-  EXPECT_EQ(stampOf(-2.5, "stamp"), -2'500'000'000);
   EXPECT_EQ(stampOf(1.7e9 + 0.25, "stamp"), 1'700'000'000'250'000'000);
+  for (const double stamp_s : {0.0, 0.1, 5.9, -2.5, 1.7e9 + 0.25, -3.9e9})
+    EXPECT_EQ(secondsOfStamp(stampOf(stamp_s, "stamp")), stamp_s);
   for (const double wrong : {kNaN, kInfinity, -kInfinity, 1e12, -1e300})
     EXPECT_THROW(stampOf(wrong, "stamp"), vpException) << wrong;
 }
