@@ -3,7 +3,7 @@
 #include "commands.h"
 #include "data_files.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include <bole/evaluation.h>
 
 #include <cstdio>

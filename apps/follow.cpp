@@ -10,10 +10,12 @@
 #include "geometry/cylinder.h"
 #include "geometry/so3.h"
 #include "geometry/visp_matrix.h"
+#include "input/atomic_file.h"
 #include "input/live_video.h"
+#include "input/secrets.h"
 #include "mbt/cao_reader.h"
-#include "output/atomic_file.h"
 #include "output/figure.h"
+#include "output/output_folder.h"
 #include "output/progress.h"
 #include "output/trajectory_writer.h"
 #include "output/versions.h"
@@ -206,7 +208,7 @@ std::vector<OverlayTrunk> modelInView(const std::vector<Cylinder> &model, const 
   return trunks;
 }
 
-/// status.csv, trajectory.tum, overlay.mp4 and follow.json as they grow.
+/// status.csv and trajectory.tum, which grow with each frame; overlay.mp4 and follow.json at the end.
 class FollowOutput
 {
 public:
@@ -215,11 +217,15 @@ public:
         m_camera(camera),
         m_cMb(bMc.inverse()),
         m_model(readCao(arguments.model)),
-        m_window(arguments.is_shown, "bole follow")
+        m_window(arguments.is_shown, "bole follow"),
+        m_folder(arguments.folder, {"follow.json", "status.csv", "trajectory.tum", "overlay.mp4"}),
+        m_status(m_folder.file("status.csv"),
+                 "frame,timestamp,status,x,y,z,sigma,sigma_rotation,message\n# units,s,,m,m,m,m,deg,\n"),
+        m_trajectory(m_folder.file("trajectory.tum"), kTrajectoryHead)
   {
-    fs::create_directories(arguments.folder);
+    writeRecord(false);
     if (arguments.has_video)
-      m_video = std::make_unique<VideoWriter>(arguments.folder + "/overlay.mp4");
+      m_video = std::make_unique<VideoWriter>(m_folder.file("overlay.mp4"));
   }
 
   void add(const Frame &frame, const Follower &follower, bool is_followed)
@@ -243,48 +249,50 @@ public:
     if (is_held) {
       const Matrix6d P = toEigen(follower.tracker().getPoseCovariance());
       const Pose wMb = follower.wMc() * m_cMb;
-      m_trajectory.push_back({frame.stamp_ns, wMb});
+      m_trajectory.add(trajectoryLine({frame.stamp_ns, wMb}));
+      ++m_followed;
       place = fmt::format("{:.4f},{:.4f},{:.4f},{:.4f},{:.3f}", wMb.t.x(), wMb.t.y(), wMb.t.z(),
                           std::sqrt(P.topLeftCorner<3, 3>().trace()),
                           std::sqrt(P.bottomRightCorner<3, 3>().trace()) * 180 / M_PI);
     }
     ++m_counts[status];
     std::replace(message.begin(), message.end(), '"', '\'');
-    m_rows += fmt::format("{},{:.6f},{},{},\"{}\"\n", frame.index, time_s, status, place, message);
+    m_status.add(fmt::format("{},{:.6f},{},{},\"{}\"\n", frame.index, time_s, status, place, message));
     draw(frame, follower, is_held, status);
   }
 
-  /// The last lines and the files; whether the result is to be trusted.
-  bool finish()
+  /// Ends the files; whether the result is to be trusted.
+  bool finish(bool is_complete)
   {
-    writeAtomically(m_arguments.folder + "/status.csv",
-                    "frame,timestamp,status,x,y,z,sigma,sigma_rotation,message\n# units,s,,m,m,m,m,deg,\n" + m_rows);
-    writeTrajectory(m_arguments.folder + "/trajectory.tum", m_trajectory);
     if (m_video)
       m_video->finish();
-    nlohmann::ordered_json json{{"command", g_command_line},  {"input", m_arguments.input},
+    writeRecord(is_complete);
+    return isTrusted();
+  }
+  void writeRecord(bool is_complete) const
+  {
+    nlohmann::ordered_json json{{"command", g_command_line},  {"input", withoutSecrets(m_arguments.input)},
                                 {"model", m_arguments.model}, {"trunks", m_model.size()},
-                                {"frames", m_frames},         {"followed", m_trajectory.size()}};
+                                {"frames", m_frames},         {"followed", m_followed},
+                                {"complete", is_complete}};
     json["first_pose_s"] = m_started_s ? nlohmann::ordered_json(*m_started_s) : nullptr;
     json["frames_by_status"] = m_counts;
-    const bool is_trusted = isTrusted();
-    json["trusted"] = is_trusted;
+    json["trusted"] = isTrusted();
     json["versions"] = versions();
-    writeAtomically(m_arguments.folder + "/follow.json", json.dump(1) + "\n");
-    return is_trusted;
+    writeAtomically(m_folder.file("follow.json"), json.dump(1) + "\n");
   }
 
   std::string text() const
   {
     if (!m_started_s)
       return "not placed on the map: too few of its trunks were seen, or they look the same in several places";
-    return fmt::format("first pose after {:.1f} s, followed in {} of the {} frames since{}", *m_started_s,
-                       m_trajectory.size(), m_started_frames, isTrusted() ? "" : ": not to be trusted");
+    return fmt::format("first pose after {:.1f} s, followed in {} of the {} frames since{}", *m_started_s, m_followed,
+                       m_started_frames, isTrusted() ? "" : ": not to be trusted");
   }
   std::size_t frames() const { return m_frames; }
 
 private:
-  bool isTrusted() const { return m_started_s && 2 * m_trajectory.size() >= m_started_frames; }
+  bool isTrusted() const { return m_started_s && 2 * m_followed >= m_started_frames; }
 
   void draw(const Frame &frame, const Follower &follower, bool is_held, const std::string &status)
   {
@@ -306,12 +314,12 @@ private:
   Pose m_cMb;
   std::vector<Cylinder> m_model;
   OverlayWindow m_window;
+  OutputFolder m_folder;
+  GrowingFile m_status, m_trajectory;
   std::unique_ptr<VideoWriter> m_video;
-  std::size_t m_frames = 0, m_started_frames = 0;
+  std::size_t m_frames = 0, m_started_frames = 0, m_followed = 0;
   std::optional<double> m_first_s, m_started_s;
   std::map<std::string, std::size_t> m_counts;
-  Trajectory m_trajectory;
-  std::string m_rows;
 };
 
 /// Where the camera is by the pose filter, else by the points of the map that the flight makes itself.
@@ -379,7 +387,7 @@ void follow(const FollowArguments &arguments)
   progress.finish();
   if (output.frames() == 0)
     throw ioError("{}: no frames", arguments.input);
-  const bool is_trusted = output.finish();
+  const bool is_trusted = output.finish(!interrupted());
   if (!arguments.is_quiet)
     fmt::print("{}{}: {}\n", arguments.folder, interrupted() ? " (interrupted)" : "", output.text());
   if (interrupted())

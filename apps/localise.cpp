@@ -5,12 +5,12 @@
 #include "interrupt.h"
 #include "localiser.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
+#include "output/output_folder.h"
 #include "output/progress.h"
 #include "output/trajectory_writer.h"
 #include <bole/open_source.h>
 
-#include <filesystem>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -30,6 +30,7 @@ void localise(const LocaliseArguments &arguments)
 {
   std::vector<TrunkRecord> map = readKnownMap(arguments.map);
   const std::unique_ptr<FrameSource> source = openSource(arguments.input, arguments.source);
+  const OutputFolder folder(arguments.folder, {"localise.json", "trajectory.tum"});
   Localiser localiser(std::move(map), *source, arguments.camera_height);
   std::size_t frames = 0, placed_frames = 0;
   endAtInterrupt();
@@ -46,9 +47,8 @@ void localise(const LocaliseArguments &arguments)
   localiser.finish();
   const std::optional<Placement> &placement = localiser.placement();
   const std::optional<double> placed_s = localiser.placedAfter_s();
-  nlohmann::ordered_json json{{"frames", frames}, {"localised", placed_frames}};
+  nlohmann::ordered_json json{{"complete", !interrupted()}, {"frames", frames}, {"localised", placed_frames}};
   json["first_pose_s"] = placed_s ? nlohmann::ordered_json(*placed_s) : nullptr;
-  std::filesystem::create_directories(arguments.folder);
   if (placement) {
     const Eigen::Vector3d sigma = placement->covariance.diagonal().cwiseSqrt();
     json["yaw_deg"] = placement->yaw * 180 / M_PI;
@@ -60,9 +60,9 @@ void localise(const LocaliseArguments &arguments)
     json["trunks"] = nlohmann::ordered_json::array();
     for (const auto &[seen, known] : placement->matches)
       json["trunks"].push_back({{"seen", seen}, {"map", known}});
-    writeTrajectory(arguments.folder + "/trajectory.tum", localiser.smoothedOnMap());
+    writeTrajectory(folder.file("trajectory.tum"), localiser.smoothedOnMap());
   }
-  writeAtomically(arguments.folder + "/localise.json", json.dump(1) + "\n");
+  writeAtomically(folder.file("localise.json"), json.dump(1) + "\n");
   if (!placement) {
     fmt::print("{}: not placed on {}: another wood, too few trunks, or a map that looks the same in several places\n",
                arguments.folder, arguments.map);

@@ -3,6 +3,7 @@
 #include "command_module.h"
 #include "commands.h"
 
+#include "input/secrets.h"
 #include "input/suggestion.h"
 #include "output/versions.h"
 
@@ -69,9 +70,19 @@ std::vector<std::string> optionsOf(const CLI::App &command)
   return names;
 }
 
+/// \p text on one line, without passwords and without what a terminal would obey: it may come from a file.
+std::string shown(const std::string &text)
+{
+  std::string line = bole::withoutSecrets(text);
+  for (char &c : line)
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7F')
+      c = c == '\n' || c == '\t' ? ' ' : '?';
+  return line;
+}
+
 void sayUnknown(const std::string &word, const char *kind, const std::vector<std::string> &known)
 {
-  const std::string name = word.substr(0, word.find('=')), meant = bole::nearestWord(name, known);
+  const std::string name = shown(word).substr(0, word.find('=')), meant = bole::nearestWord(name, known);
   std::fprintf(stderr, "bole: %s: no such %s%s\n", name.c_str(), kind,
                meant.empty() ? "" : (", did you mean " + meant + "?").c_str());
 }
@@ -88,7 +99,7 @@ int refuse(const CLI::App &app, const CLI::ParseError &error)
   else if (option != unknown.end())
     sayUnknown(*option, "option", optionsOf(command));
   else
-    std::fprintf(stderr, "bole: %s\n", error.what());
+    std::fprintf(stderr, "bole: %s\n", shown(error.what()).c_str());
   std::fprintf(stderr, "Try `%s --help`.\n", &command == &app ? "bole" : ("bole " + command.get_name()).c_str());
   return static_cast<int>(ExitCode::usage);
 }
@@ -120,7 +131,7 @@ int run(CLI::App &app, int argc, char **argv)
     return error.get_exit_code() == 0 ? app.exit(error) : refuse(app, error);
   }
   catch (const std::exception &error) { // vpException too
-    std::fprintf(stderr, "bole: %s\n", error.what());
+    std::fprintf(stderr, "bole: %s\n", shown(error.what()).c_str());
     return static_cast<int>(ExitCode::error);
   }
   return static_cast<int>(ExitCode::good);
@@ -156,6 +167,7 @@ int start(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-  g_command_line.assign(argv, argv + argc);
+  for (int i = 0; i < argc; ++i)
+    g_command_line.push_back(bole::withoutSecrets(argv[i]));
   return withRoom([&] { return start(argc, argv); });
 }

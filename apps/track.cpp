@@ -9,6 +9,7 @@
 #include "track_output.h"
 
 #include "input/live_video.h"
+#include "input/secrets.h"
 #include "motion/sensor_calibration.h"
 #include "output/progress.h"
 #include "pipeline/measured_camera.h"
@@ -162,7 +163,7 @@ RunSummary describeRun(const TrackArguments &arguments)
   std::error_code error;
   made.command = g_command_line;
   made.working_folder = std::filesystem::current_path(error).string();
-  made.input = arguments.input;
+  made.input = withoutSecrets(arguments.input);
   made.camera_file = arguments.source.camera_path;
   made.odometry_file = arguments.source.odometry_path;
   return made;
@@ -182,9 +183,9 @@ std::future<std::optional<Frame>> nextOf(FrameSource &source, bool is_live)
 std::size_t fly(const TrackArguments &arguments, FrameSource &source, bool is_live, Pipeline &pipeline,
                 TrackOutput &output, Flight &flight)
 {
-  constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written
+  constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written, at least
   Progress progress(arguments.is_quiet ? 0 : source.size(), stderr);
-  std::size_t count = 0;
+  std::size_t count = 0, keep_at = 1;
   auto next = nextOf(source, is_live);
   while (!interrupted() && next.valid()) {
     std::optional<Frame> frame = next.get();
@@ -201,8 +202,10 @@ std::size_t fly(const TrackArguments &arguments, FrameSource &source, bool is_li
     flight.take(std::move(*frame));
     if (!arguments.is_quiet)
       progress.update(count, fmt::format("{} trunks in view  {}", output.trunksInView(), toString(status)));
-    if (count % kKeepEvery == 0)
+    if (count >= keep_at) {
       output.keep(pipeline);
+      keep_at = count - count % kKeepEvery + std::max(kKeepEvery, count / 10); // a long flight has much to write
+    }
   }
   return count;
 }
@@ -245,7 +248,8 @@ void track(const TrackArguments &asked_for)
     throw ioError("{}: no frames", arguments.input);
   }
   const bool is_interrupted = interrupted(); // from here on the run is completed, whoever goes away
-  flight.finish();
+  if (!arguments.is_cut)
+    flight.finish();
   if (live != nullptr)
     output.setLink(live->counters());
   output.write(pipeline, !is_interrupted);

@@ -4,6 +4,7 @@
 #include "track_arguments.h"
 
 #include "input/regular_file.h"
+#include "output/run_folder.h"
 #include "output/versions.h"
 
 #include <filesystem>
@@ -28,14 +29,16 @@ Json summaryOf(const fs::path &run)
   const fs::path path = run / "summary.json";
   Json json = Json::parse(bytesOf(path), nullptr, false);
   try {
-    if (json.at("command").size() < 2 || json["command"][1] != "track")
+    if (const auto words = json.at("command").get<std::vector<std::string>>(); words.size() < 2 || words[1] != "track")
       throw badValue("{}: command: must be one of `bole track`", path.string());
     json.at("input").at("source").get<std::string>();
     json.at("frames").at("all").get<std::size_t>();
     json.at("working_folder");
+    json.value("complete", true);
+    json.value("ended", true);
   }
   catch (const Json::exception &error) {
-    throw badValue("{}: {}", path.string(), error.what());
+    throw badValue("{}", faultOf(path.string(), error));
   }
   return json;
 }
@@ -57,9 +60,11 @@ TrackArguments argumentsOf(const Json &summary, const fs::path &run)
   }
   if (ArDroneSource::accepts(arguments->input))
     throw badValue("{}: a live flight cannot be repeated; `bole record` keeps one", arguments->input);
-  arguments->config = (run / "options.yaml").string();
-  arguments->settings.clear();
-  arguments->camera_height = 0; // among the options
+  if (const fs::path options = run / "options.yaml"; fs::exists(options)) { // not in a run of no frame
+    arguments->config = options.string();
+    arguments->settings.clear();
+    arguments->camera_height = 0; // among the options
+  }
   arguments->is_shown = false;
   return *arguments;
 }
@@ -101,6 +106,7 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
 {
   requireAlone(command, "again");
   const fs::path run = fs::absolute(given.again);
+  readSummary((run / "summary.json").string()); // has a frame to repeat
   const Json summary = summaryOf(run);
   const fs::path repeated = given.run.empty() ? run / "again" : fs::absolute(given.run);
   enterFolderOf(summary);
@@ -110,6 +116,7 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
   arguments.is_quiet = true;
   if (!summary.value("complete", true))
     arguments.frames_most = summary["frames"]["all"];
+  arguments.is_cut = !summary.value("ended", true);
   g_command_line = summary["command"].get<std::vector<std::string>>();
   try {
     track(arguments);
@@ -133,7 +140,7 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
     endWith(ExitCode::doubtful);
   }
   if (given.run.empty())
-    fs::remove_all(repeated);
+    removeFiles(repeated.string(), RunFolder::kFiles);
 }
 
 void resume(const CLI::App &command, const TrackArguments &given)

@@ -22,6 +22,7 @@ struct TrackArguments
   bool is_shown = false, has_video = true, is_quiet = false, is_profiled = false, is_online = false,
        is_without_odometry = false, is_without_gyro = false;
   std::size_t frames_most = 0;
+  bool is_cut = false; ///< without a last look: as a run was that was killed after frames_most frames
   double give_up_s = ArDroneSource::Options().give_up_s;
   double camera_height = 0;
   bool is_field_of_view_given = false;

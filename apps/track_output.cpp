@@ -4,8 +4,8 @@
 
 #include "geometry/so3.h"
 #include "input/asl_source.h"
+#include "input/atomic_file.h"
 #include "input/truth.h"
-#include "output/atomic_file.h"
 #include <bole/graph.h>
 #include <bole/overlay.h>
 
@@ -13,6 +13,8 @@
 #include <chrono>
 #include <filesystem>
 #include <fmt/format.h>
+#include <iterator>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <visp3/core/vpException.h>
 
@@ -26,6 +28,17 @@ vpImage<float> foregroundOf(const SaliencyField &saliency)
   for (unsigned int i = 0; i < foreground.getSize(); ++i)
     foreground.bitmap[i] = 1 - saliency.p_background.bitmap[i];
   return foreground;
+}
+
+/// Of the run whose summary is \p path.
+std::size_t framesOf(const std::string &path)
+{
+  try {
+    return readSummary(path).at("frames").at("all");
+  }
+  catch (const std::exception &) { // none yet
+    return 0;
+  }
 }
 
 /// Path, extent and rotation of \p trajectory.
@@ -46,6 +59,8 @@ TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSou
     : m_folder(run), m_summary(std::move(made)), m_bMc(source.bMc()), m_has_pictures(has_pictures)
 {
   m_sensors_before = m_summary.sensors;
+  if (!m_folder.isNew())
+    m_frames_before = framesOf(m_folder.file("summary.json"));
   m_summary.camera = source.camera();
   m_summary.has_odometry = source.hasOdometry();
   m_summary.has_gyro = source.hasGyro();
@@ -53,6 +68,10 @@ TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSou
   const std::string &input = m_summary.input;
   if (AslSource::accepts(input) && std::filesystem::exists(input + "/trees.csv"))
     m_picture.truth_trunks = readTruthTrunks(input);
+  if (m_folder.isNew()) { // by which the folder is known as that of a run, and the run can be made again
+    m_summary.is_complete = m_summary.has_ended = false;
+    writeSummary(m_folder.file("summary.json"), m_summary);
+  }
   m_digest = std::async(std::launch::async, [this] { return digestOf(m_summary.input, m_is_cancelled); });
   if (has_video)
     film([this] {
@@ -141,7 +160,7 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
 void TrackOutput::writeBestViews() const
 {
   const std::string folder = m_folder.file("views");
-  std::filesystem::remove_all(folder);
+  removeFiles(m_folder.path(), {"views/*.jpg"}); // of an earlier run
   std::filesystem::create_directories(folder);
   for (const TrunkRecord &trunk : m_summary.trunks)
     if (trunk.status == TrunkStatus::confirmed)
@@ -250,15 +269,38 @@ void TrackOutput::waitForKeeping()
     loseVideos(error); // the disk may be full of them
 }
 
+/// With the views of confirmed trunks alone, and without lengths where none is known.
+FlightTrace TrackOutput::confirmedTrace() const
+{
+  FlightTrace trace;
+  trace.frames = m_trace.frames;
+  if (!m_summary.reference.has_ranges)
+    return trace;
+  trace.evidence = m_trace.evidence;
+  std::set<int> confirmed;
+  for (const TrunkRecord &trunk : m_summary.trunks)
+    if (trunk.status == TrunkStatus::confirmed)
+      confirmed.insert(trunk.id);
+  std::copy_if(m_trace.views.begin(), m_trace.views.end(), std::back_inserter(trace.views),
+               [&confirmed](const TrunkTrace &view) { return confirmed.count(view.id) > 0; });
+  return trace;
+}
+
 void TrackOutput::keep(const Pipeline &pipeline)
 {
+  if (m_trace.frames.size() < m_frames_before)
+    return;
   if (m_keeping.valid() && m_keeping.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return;
   waitForKeeping();
   take(pipeline, false);
+  m_summary.has_ended = false;
   m_keeping = std::async(std::launch::async,
-                         [this, picture = m_picture, summary = m_summary, camera = m_camera_place]() -> std::string {
+                         [this, picture = m_picture, summary = m_summary, camera = m_camera_place,
+                          trace = confirmedTrace(), graph = pipeline.graph()]() -> std::string {
                            try {
+                             writeTrace(m_folder.path(), trace);
+                             writeG2o(m_folder.file("graph.g2o"), graph);
                              m_folder.write(picture, summary, camera);
                            }
                            catch (const std::exception &error) {
@@ -276,6 +318,7 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
   if (m_digest.valid())
     m_summary.digest = m_digest.get();
   take(pipeline, is_complete);
+  m_summary.has_ended = true;
   try {
     m_folder.write(m_picture, m_summary, m_camera_place);
   }
@@ -284,17 +327,7 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
     m_folder.write(m_picture, m_summary, m_camera_place);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
-  std::set<int> confirmed;
-  for (const TrunkRecord &trunk : m_summary.trunks)
-    if (trunk.status == TrunkStatus::confirmed)
-      confirmed.insert(trunk.id);
-  const auto isOther = [&confirmed](const TrunkTrace &view) { return confirmed.count(view.id) == 0; };
-  m_trace.views.erase(std::remove_if(m_trace.views.begin(), m_trace.views.end(), isOther), m_trace.views.end());
-  if (!m_summary.reference.has_ranges) { // no lengths
-    m_trace.views.clear();
-    m_trace.evidence = {};
-  }
-  writeTrace(m_folder.path(), m_trace);
+  writeTrace(m_folder.path(), confirmedTrace());
   writeBestViews();
 }
 

@@ -34,8 +34,8 @@ public:
   void addSilence(std::size_t frames);
   /// What came of the drone's packets.
   void setLink(const LinkCounters &link);
-  /// Begins to write what is known now, in the background: all but the videos and the graph, which
-  /// takes longer than a frame. Nothing while the last one is still being written.
+  /// Begins to write what is known now, in the background: all but the videos and the best views. Nothing while the
+  /// last one is still being written, nor before this run knows as many frames as the one that was in the folder.
   void keep(const Pipeline &pipeline);
   /// Writes all but the videos.
   void write(const Pipeline &pipeline, bool is_complete);
@@ -50,6 +50,7 @@ public:
 private:
   void trace(const Frame &frame, const FrameReport &report);
   void writeBestViews() const;
+  FlightTrace confirmedTrace() const;
   vpImage<vpRGBa> draw(const Frame &frame, const FrameReport &report);
   template <typename Action> void film(const Action &action);
   void loseVideos(const std::string &why);
@@ -58,6 +59,7 @@ private:
   void waitForKeeping();
 
   RunFolder m_folder;
+  std::size_t m_frames_before = 0; ///< of the run that was in the folder
   RunSummary m_summary;
   std::vector<SensorVerdict> m_sensors_before; ///< that were left out from the start
   MapPicture m_picture;

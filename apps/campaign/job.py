@@ -7,7 +7,6 @@ interrupted; what a command printed stands in the log, its exit status in the re
 import argparse
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -79,7 +78,6 @@ def main():
     open(arguments.log, "w", encoding="utf-8").close()
     began = time.time()
     if arguments.folder:
-        shutil.rmtree(arguments.folder, ignore_errors=True)  # of a job that was killed
         status = run(arguments.command, arguments.log)
         if status != 0:
             os.makedirs(arguments.folder, exist_ok=True)  # an empty flight: what reads it says that it failed

@@ -4,9 +4,10 @@
 #include "geometry/failure.h"
 #include "interrupt.h"
 
+#include "input/atomic_file.h"
 #include "lab/baseline/comparison_report.h"
 #include "mbt/cao_reader.h"
-#include "output/atomic_file.h"
+#include "output/output_folder.h"
 #include "output/progress.h"
 
 #include <cstdio>
@@ -154,7 +155,7 @@ void measureFaults(const CompareArguments &arguments, const TestFlight &flight, 
 void run(const CompareArguments &arguments)
 {
   const TestFlight flight = readFlight(arguments.sequence);
-  fs::create_directories(arguments.out);
+  const OutputFolder folder(arguments.out, {"compare.json", "truth.cao", "compare.html", "compare.svg", "compare.mp4"});
   const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
   if (model.empty())
     throw badValue("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m);

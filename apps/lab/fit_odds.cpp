@@ -4,8 +4,8 @@
 #include "geometry/failure.h"
 
 #include "evaluation/trajectory_metrics.h"
+#include "input/atomic_file.h"
 #include "input/truth.h"
-#include "output/atomic_file.h"
 #include "output/progress.h"
 #include "pipeline/engine.h"
 #include <bole/open_source.h>

@@ -8,8 +8,8 @@
 
 #include "geometry/median.h"
 #include "input/asl_source.h"
+#include "input/atomic_file.h"
 #include "lab/simulation/simulated_flight.h"
-#include "output/atomic_file.h"
 #include "output/figure.h"
 #include "output/page.h"
 #include "output/progress.h"
@@ -216,7 +216,8 @@ void reproduce(const ReproduceArguments &arguments)
   Progress progress(arguments.is_quiet ? 0 : 3 * flights.size(), stderr);
   std::size_t done = 0;
   for (const std::string &sequence : flights) {
-    const std::string name = fs::path(sequence).filename().string(), folder = arguments.output + "/" + name;
+    const fs::path place = (fs::absolute(sequence) / "").lexically_normal().parent_path();
+    const std::string name = place.filename().string(), folder = arguments.output + "/" + name;
     fs::create_directories(folder);
     const LineQuartiles quartiles = detectorStatistics(sequence).quartiles();
     for (const Method &method : methods(calibrated_alpha)) {

@@ -6,12 +6,13 @@
 #include "interrupt.h"
 #include "overlay_window.h"
 
+#include "input/atomic_file.h"
 #include "lab/trials/error_curves.h"
 #include "lab/trials/failure_sheet.h"
 #include "lab/trials/median_interval.h"
 #include "lab/trials/servo_trial.h"
-#include "output/atomic_file.h"
 #include "output/figure.h"
+#include "output/output_folder.h"
 #include "output/progress.h"
 #include "output/video_writer.h"
 #include <bole/config.h>
@@ -150,7 +151,8 @@ void writeTables(const ServoArguments &arguments, const std::vector<ServoTrialRe
 {
   if (arguments.folder.empty())
     return;
-  nlohmann::json json{{"task", toString(arguments.trial.scenario.kind)},
+  nlohmann::json json{{"complete", static_cast<int>(results.size()) == arguments.runs},
+                      {"task", toString(arguments.trial.scenario.kind)},
                       {"runs", results.size()},
                       {"runs asked for", arguments.runs},
                       {"successes", successes(results)},
@@ -280,6 +282,9 @@ void run(ServoArguments &arguments)
   if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
     throw badValue("fault = {} with perception = truth, must be none: no image is looked at", arguments.fault);
   arguments.trial.loop.validate();
+  std::optional<OutputFolder> folder;
+  if (!arguments.folder.empty())
+    folder.emplace(arguments.folder, FileNames{"summary.json", "runs.csv"});
   OverlayWindow window(arguments.is_shown, "bole servo");
   endAtInterrupt();
   std::vector<ServoTrialResult> results;

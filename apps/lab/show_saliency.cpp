@@ -3,7 +3,7 @@
 #include "commands.h"
 #include "paper_figures.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 

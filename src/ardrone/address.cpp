@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/address.h"
 #include "geometry/failure.h"
+#include "input/secrets.h"
 
 #include <charconv>
 #include <fmt/format.h>
@@ -27,6 +28,8 @@ ArDroneAddress ArDroneAddress::parse(const std::string &address)
 {
   if (!accepts(address))
     throw badValue("address = {}, must be ardrone://HOST[?key=value&...]", address);
+  if (const std::string shown = withoutSecrets(address); shown != address)
+    throw badValue("{}: must be without name, password or key", shown);
   ArDroneAddress out;
   const std::size_t question = address.find('?');
   std::string host =

@@ -9,7 +9,6 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <unistd.h>
 
 namespace bole
@@ -75,10 +74,7 @@ void FlightFolder::write(const LiveFrame &frame)
   if (frame.status == FrameStatus::ok || frame.status == FrameStatus::stale) {
     vpImage<unsigned char> image;
     frame.picture.toGrey(image);
-    const std::string part = m_cam0 + "/part.png";
-    if (!(std::ofstream(part, std::ios::binary) << encodePng(image)).flush())
-      throw ioError("{}: cannot be written", part);
-    fs::rename(part, fs::path(m_cam0) / "data" / name);
+    ::close(create(fs::path(m_cam0) / "data" / name, encodePng(image))); // whole before the table names it
   }
   append(m_images_csv, fmt::format("{},{}\n", stamp_ns, name));
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/receivers.h"
 
+#include "input/retry_pause.h"
+
 #include <array>
 
 namespace bole
@@ -12,10 +14,30 @@ constexpr std::size_t kLargestRead = 1 << 16;
 constexpr Milliseconds kPoll{50};
 // With the pause and half a second to a key frame: within a second.
 constexpr Milliseconds kConnect{250};
+constexpr double kLongestPause_s = 1;               // between two connections that the drone closes at once
 constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
 constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
-constexpr int kMostDatagrams = 1000; // a second: the drone sends 15, an emulator at its fastest 600
+constexpr int kMostDatagrams = 1000;          // a second: the drone sends 15, an emulator at its fastest 600
+constexpr std::size_t kLargestNavdata = 8192; // bytes
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
+
+/// Whether the drone can have sent so many datagrams: what is more is a flood.
+class DatagramCount
+{
+public:
+  bool isUsual(std::int64_t now_ns)
+  {
+    if (now_ns - m_second_ns > kOneSecond_ns) {
+      m_second_ns = now_ns;
+      m_count = 0;
+    }
+    return ++m_count <= kMostDatagrams;
+  }
+
+private:
+  std::int64_t m_second_ns = 0;
+  int m_count = 0;
+};
 } // namespace
 
 VideoReceiver::VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks)
@@ -36,20 +58,30 @@ VideoReceiver::~VideoReceiver()
 void VideoReceiver::run()
 {
   std::vector<std::uint8_t> buffer(kLargestRead);
+  RetryPause pause(m_options.retry_s, std::max(m_options.retry_s, kLongestPause_s));
   while (m_running) {
     const int wanted = m_generation;
     if (wanted != 1) {
       if (const Socket socket = Socket::connectTcp(m_address.host, m_address.video_port, kConnect); socket.valid()) {
         m_generation = 2;
+        const std::int64_t connected_ns = steadyNowNs();
         receiveStream(socket, buffer);
+        if (steadyNowNs() - connected_ns > kOneSecond_ns)
+          pause.reset();
+        wait(pause.next());
         continue;
       }
     }
     if (wanted != 2)
       receiveDatagrams(buffer);
-    if (m_running)
-      std::this_thread::sleep_for(std::chrono::duration<double>(m_options.retry_s));
+    wait(std::chrono::duration<double>(m_options.retry_s));
   }
+}
+
+void VideoReceiver::wait(std::chrono::duration<double> pause) const
+{
+  for (std::chrono::duration<double> left = pause; m_running && left.count() > 0; left -= kPoll)
+    std::this_thread::sleep_for(std::min<std::chrono::duration<double>>(left, kPoll));
 }
 
 void VideoReceiver::begin(DroneVideoDecoder &video)
@@ -95,8 +127,8 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
 {
   const Socket socket = Socket::connectUdp(m_address.host, m_address.video_port);
   bool has_begun = false;
-  std::int64_t last_data_ns = steadyNowNs(), last_wake_ns = 0, second_ns = 0;
-  int count = 0;
+  std::int64_t last_data_ns = steadyNowNs(), last_wake_ns = 0;
+  DatagramCount count;
   while (m_running && socket.valid() && !isSilent(last_data_ns)) {
     const std::int64_t now_ns = steadyNowNs();
     if (now_ns - last_wake_ns > kWakeAgain_ns) {
@@ -110,13 +142,9 @@ void VideoReceiver::receiveDatagrams(std::vector<std::uint8_t> &buffer)
     if (read != Socket::Read::data)
       continue;
     last_data_ns = steadyNowNs();
-    if (last_data_ns - second_ns > kOneSecond_ns) {
-      second_ns = last_data_ns;
-      count = 0;
-    }
     m_generation = 1;
     DroneVideoDecoder &video = decoderFor(1);
-    if (++count > kMostDatagrams) { // a flood: the socket's buffer drops the rest
+    if (!count.isUsual(last_data_ns)) { // a flood: the socket's buffer drops the rest
       video.refuse();
       continue;
     }
@@ -158,6 +186,7 @@ void NavdataReceiver::run()
   std::vector<std::uint8_t> buffer(kLargestRead);
   const Socket socket = Socket::connectUdp(m_address.host, m_address.navdata_port);
   std::int64_t last_wake_ns = 0, last_alive_ns = 0, last_config_ns = 0, last_data_ns = 0;
+  DatagramCount count;
   while (m_running) {
     const std::int64_t now_ns = steadyNowNs();
     if (now_ns - last_data_ns > kWakeAgain_ns && now_ns - last_wake_ns > kWakeAgain_ns) {
@@ -175,6 +204,8 @@ void NavdataReceiver::run()
     if (read != Socket::Read::data)
       continue;
     last_data_ns = steadyNowNs();
+    if (!count.isUsual(last_data_ns) || size > kLargestNavdata)
+      continue;
     if (m_callbacks.tap)
       m_callbacks.tap(LinkChannel::navdata, last_data_ns, buffer.data(), size);
     const auto state = m_callbacks.packet(buffer.data(), size, last_data_ns);

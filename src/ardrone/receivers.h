@@ -37,6 +37,7 @@ private:
   void begin(DroneVideoDecoder &video);
   DroneVideoDecoder &decoderFor(int generation);
   bool isSilent(std::int64_t since_ns) const;
+  void wait(std::chrono::duration<double> pause) const;
 
   const ArDroneAddress m_address;
   const DroneLink::Options m_options;

@@ -3,6 +3,7 @@
 
 #include "ardrone/bytes.h"
 #include "geometry/failure.h"
+#include "input/regular_file.h"
 
 #include <algorithm>
 #include <array>
@@ -11,8 +12,6 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 #include <unistd.h>
 #include <utility>
 
@@ -93,10 +92,14 @@ std::string RecordingWriter::error() const
 RecordingReader::RecordingReader(const std::string &folder)
 {
   const auto path = rawPath(folder);
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw ioError("{}: {}, must be a recording", path.string(), std::strerror(errno));
-  m_bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  constexpr std::uintmax_t kLargestFile = std::uintmax_t{4} << 30; // bytes: hours of flight
+  std::ifstream file = openRegularFile(path.string());
+  const std::uintmax_t size = std::filesystem::file_size(path);
+  if (size > kLargestFile)
+    throw ioError("{}: {} bytes, must be at most {}", path.string(), size, kLargestFile);
+  m_bytes.resize(static_cast<std::size_t>(size));
+  file.read(reinterpret_cast<char *>(m_bytes.data()), static_cast<std::streamsize>(size));
+  m_bytes.resize(static_cast<std::size_t>(file.gcount()));
   if (m_bytes.size() < kTitle.size() || !std::equal(kTitle.begin(), kTitle.end(), m_bytes.begin()))
     throw ioError("{}:1: the first line must be \"{}\"", path.string(), kTitle.substr(0, kTitle.size() - 1));
   m_at = kTitle.size();
@@ -106,15 +109,19 @@ RecordingReader::RecordingReader(std::vector<std::uint8_t> bytes) : m_bytes(std:
 
 bool RecordingReader::next(RecordedPiece &piece)
 {
-  for (; m_at + kHead + kTail <= m_bytes.size(); ++m_at, ++m_skipped) {
+  const std::size_t most_in_vain = 4 * m_bytes.size() + kLargestPiece; // of bytes whose sum is wrong
+  for (; m_at + kHead + kTail <= m_bytes.size() && m_in_vain < most_in_vain; ++m_at, ++m_skipped) {
     const std::uint8_t *p = m_bytes.data() + m_at;
     if (readLittleEndian<std::uint32_t>(p) != kMagic)
       continue;
     const std::size_t size = readLittleEndian<std::uint32_t>(p + 16);
     const std::size_t left = m_bytes.size() - m_at;
-    if (p[4] < 1 || p[4] > 3 || size > kLargestPiece || kHead + size + kTail > left ||
-        readLittleEndian<std::uint32_t>(p + kHead + size) != crc32(p, kHead + size))
+    if (p[4] < 1 || p[4] > 3 || size > kLargestPiece || kHead + size + kTail > left)
       continue;
+    if (readLittleEndian<std::uint32_t>(p + kHead + size) != crc32(p, kHead + size)) {
+      m_in_vain += size;
+      continue;
+    }
     piece.channel = static_cast<LinkChannel>(p[4]);
     piece.arrival_ns = readLittleEndian<std::int64_t>(p + 8);
     piece.bytes.assign(p + kHead, p + kHead + size);

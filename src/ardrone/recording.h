@@ -44,7 +44,8 @@ private:
   std::size_t m_bytes = 0;
 };
 
-/// Reads raw.bin. A damaged or cut piece is skipped, and the next whole one searched for.
+/// Reads raw.bin. A damaged or cut piece is skipped, and the next whole one searched for, until four times the file was
+/// summed in vain: a file made so that each of its bytes could be the beginning of a long piece.
 /// Law (a test): of a file cut at any byte, every piece that ends before the cut is read.
 class RecordingReader
 {
@@ -58,7 +59,7 @@ public:
 
 private:
   std::vector<std::uint8_t> m_bytes;
-  std::size_t m_at = 0, m_skipped = 0;
+  std::size_t m_at = 0, m_skipped = 0, m_in_vain = 0;
 };
 
 /// Generation of the drone that made the recording: what its video looks like.

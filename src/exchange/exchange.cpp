@@ -3,8 +3,8 @@
 
 #include "geometry/cylinder.h"
 #include "geometry/failure.h"
+#include "input/atomic_file.h"
 #include "mbt/cao_reader.h"
-#include "output/atomic_file.h"
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"

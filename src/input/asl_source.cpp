@@ -6,6 +6,7 @@
 #include "input/csv_reader.h"
 #include "input/sensor_yaml.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -27,9 +28,10 @@ std::vector<ImageRow> readImageRows(const fs::path &cam0)
   CsvReader csv(path, {2});
   while (csv.next()) {
     const std::int64_t stamp_ns = csv.risingStampNs(0);
-    if (csv.text(1).empty())
-      csv.fail("filename is empty");
-    rows.push_back({stamp_ns, (cam0 / "data" / csv.text(1)).string()});
+    const fs::path name = csv.text(1);
+    if (name.empty() || name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end())
+      csv.fail(fmt::format("filename = \"{}\", must be that of an image in the folder data", name.string()));
+    rows.push_back({stamp_ns, (cam0 / "data" / name).string()});
   }
   if (rows.empty())
     throw ioError("{}: no image in it", path);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace bole
 {
@@ -143,6 +144,22 @@ double CsvReader::number(std::size_t column, std::string_view name) const
   if (begin == end || result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
     fail(fmt::format("{} = \"{}\", must be a finite number", name, shownField(field)));
   return value;
+}
+
+double CsvReader::number(std::size_t column, std::string_view name, double most) const
+{
+  const double value = number(column, name);
+  if (std::abs(value) > most)
+    fail(fmt::format("{} = {:g}, must be at most {:g} from zero", name, value, most));
+  return value;
+}
+
+int CsvReader::count(std::size_t column, std::string_view name) const
+{
+  const std::int64_t value = integer(column, name);
+  if (value < 0 || value > std::numeric_limits<int>::max())
+    fail(fmt::format("{} = {}, must be 0 .. {}", name, value, std::numeric_limits<int>::max()));
+  return static_cast<int>(value);
 }
 
 std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const

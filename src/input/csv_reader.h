@@ -45,7 +45,11 @@ public:
   const std::string &text(std::size_t column) const { return m_fields.at(column); }
   /// A finite number; \p name is used in the error only.
   double number(std::size_t column, std::string_view name) const;
+  /// At most \p most from zero.
+  double number(std::size_t column, std::string_view name, double most) const;
   std::int64_t integer(std::size_t column, std::string_view name) const;
+  /// From 0 on: an id, or how many there are.
+  int count(std::size_t column, std::string_view name) const;
   /// A value of an enumeration by its name, \p last being the last one.
   template <typename Value>
   Value named(std::size_t column, const char *name, Value last, const char *otherwise = "is not known") const

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/live_video.h"
 #include "geometry/failure.h"
+#include "input/retry_pause.h"
+#include "input/secrets.h"
 #include "input/video_source.h"
 
 #include <bole/visp.h>
@@ -21,7 +23,8 @@ namespace
 constexpr char kDevice[] = "/dev/video";
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kFrameTimeout_ns = kSecond_ns / 2; ///< without a picture there is a missing frame
-constexpr std::int64_t kRetry_ns = kSecond_ns / 2;        ///< between two attempts to connect
+constexpr std::int64_t kShortest_ns = kSecond_ns / 1000;  ///< between the last picture of a connection and the next
+constexpr double kRetry_s = 0.5, kLongestRetry_s = 2;     ///< between two attempts to connect
 
 std::int64_t now_ns() { return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -57,6 +60,7 @@ PictureReader openCamera(const std::string &device)
     if (first_ns < 0)
       first_ns = stamp_ns;
     picture.stamp_ns = stamp_ns - first_ns;
+    picture.clock = stamp_ns;
     return true;
   };
 #else
@@ -72,11 +76,12 @@ PictureReader openReader(const std::string &address, const std::shared_ptr<ReadL
 
 struct LiveVideoSource::State
 {
-  std::string address;
+  std::string address, name; ///< to be opened; to be shown
   std::int64_t give_up_ns = 0;
   std::shared_ptr<ReadLimit> limit = std::make_shared<ReadLimit>();
   PictureReader reader;
   std::int64_t begun_ns = 0; ///< when the first picture came: where stamps count from
+  Picture beginning;         ///< the first picture of the first connection
 
   std::mutex mutex;
   std::condition_variable changed;
@@ -85,6 +90,7 @@ struct LiveVideoSource::State
   std::string trouble; ///< why nothing comes
   Counters counters;
   bool is_stopped = false;
+  bool is_over = false; ///< nothing comes after `newest`
   std::thread thread;
 
   std::int64_t last_stamp_ns = -1;           ///< given out
@@ -113,35 +119,44 @@ struct LiveVideoSource::State
     for (int i = 0; i < kMostDamaged && reader(picture); ++i)
       if (!picture.is_damaged)
         return picture;
-    throw ioError("{}: no picture that can be decoded", address);
+    throw ioError("{}: no picture that can be decoded", name);
   }
 
-  /// Takes every picture, and connects again when none comes any more.
+  /// Takes every picture, and connects again when none comes any more. What begins again with the very same picture at
+  /// the same time was no camera but a file without a length: it is over.
   void read(std::int64_t offset_ns)
   {
-    bool is_first = false; // of a connection
+    bool is_first = false, is_again = false; // of a connection
+    RetryPause pause(kRetry_s, kLongestRetry_s);
+    std::int64_t connected_ns = now_ns(), last_ns = 0;
     while (!limit->is_stopped) {
       try {
         if (!reader) {
           reader = openReader(address, limit);
-          is_first = true;
+          is_first = is_again = true;
+          connected_ns = now_ns();
           const std::lock_guard<std::mutex> lock(mutex);
           ++counters.connections;
         }
         Picture picture;
         if (!reader(picture))
-          throw ioError("{}: the stream ended", address);
+          throw ioError("{}: the stream ended", name);
         const std::int64_t arrived_ns = now_ns();
+        if (is_again && picture.clock == beginning.clock && picture.image == beginning.image)
+          return end();
         if (std::exchange(is_first, false))
-          offset_ns = arrived_ns - begun_ns - picture.stamp_ns;
+          offset_ns = std::max(arrived_ns - begun_ns, last_ns + kShortest_ns) - picture.stamp_ns;
         picture.stamp_ns += offset_ns;
+        last_ns = picture.stamp_ns;
         take(std::move(picture), arrived_ns);
       }
       catch (const vpException &error) {
         reader = nullptr;
+        if (now_ns() - connected_ns > kSecond_ns)
+          pause.reset();
         std::unique_lock<std::mutex> lock(mutex);
         trouble = error.getStringMessage();
-        changed.wait_for(lock, std::chrono::nanoseconds(kRetry_ns), [this] { return is_stopped; });
+        changed.wait_for(lock, pause.next(), [this] { return is_stopped; });
       }
     }
   }
@@ -158,6 +173,13 @@ struct LiveVideoSource::State
     ++counters.dropped;
     newest.reset();
     return false;
+  }
+
+  void end()
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    is_over = true;
+    changed.notify_all();
   }
 
   void take(Picture picture, std::int64_t arrived_ns)
@@ -191,17 +213,19 @@ LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions
   if (!(give_up_s > 0 && give_up_s <= 86400))
     throw badValue("give_up_s = {:g}, must be in (0, 86400]", give_up_s);
   if (!options.odometry_path.empty())
-    throw badValue("{}: a live stream has no odometry file ({})", address, options.odometry_path);
-  m_name = address;
+    throw badValue("{}: a live stream has no odometry file ({})", withoutSecrets(address), options.odometry_path);
+  m_name = withoutSecrets(address);
   m_state = std::make_unique<State>();
   State &state = *m_state;
   state.address = address;
+  state.name = m_name;
   state.give_up_ns = static_cast<std::int64_t>(give_up_s * 1e9);
   if (file)
     state.limit = file->limit();
   state.reader = file ? readerOf(std::move(file)) : openReader(address, state.limit);
   state.counters.connections = 1;
   Picture first = state.first();
+  state.beginning = first;
   const std::int64_t first_ns = first.stamp_ns;
   first.stamp_ns = 0;
   const MountedCamera camera =
@@ -222,8 +246,8 @@ bool LiveVideoSource::next(Frame &frame)
   {
     std::unique_lock<std::mutex> lock(state.mutex);
     const auto end = std::chrono::steady_clock::now() + std::chrono::nanoseconds(kFrameTimeout_ns);
-    state.changed.wait_until(lock, end, [&state] { return state.hasNewer() || state.is_stopped; });
-    if (state.is_stopped)
+    state.changed.wait_until(lock, end, [&state] { return state.hasNewer() || state.is_stopped || state.is_over; });
+    if (state.is_stopped || (state.is_over && !state.newest))
       return false;
     if (state.newest) {
       stamp_ns = state.picture_ns;

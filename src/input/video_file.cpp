@@ -3,12 +3,13 @@
 #include "geometry/failure.h"
 #include "input/codec.h"
 #include "input/libav.h"
+#include "input/regular_file.h"
+#include "input/secrets.h"
 
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -133,6 +134,9 @@ std::int64_t steady_ns()
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+/// Pictures one after the other as cameras push them: without stamps, and whatever length is said, without an end.
+bool isMultipart(const AVFormatContext &format) { return std::strcmp(format.iformat->name, "mpjpeg") == 0; }
+
 /// Asked by libav again and again while it waits.
 int isOver(void *limit)
 {
@@ -141,15 +145,14 @@ int isOver(void *limit)
 }
 } // namespace
 
-VideoFile::VideoFile(const std::string &path) : m_path(path), m_libav(std::make_unique<Libav>())
+VideoFile::VideoFile(const std::string &path) : m_path(path), m_name(path), m_libav(std::make_unique<Libav>())
 {
-  if (!std::filesystem::is_regular_file(path))
-    throw ioError("{}: no such file", path);
+  openRegularFile(path);
   open();
 }
 
 VideoFile::VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limit)
-    : m_path(address), m_limit(std::move(limit)), m_libav(std::make_unique<Libav>())
+    : m_path(address), m_name(withoutSecrets(address)), m_limit(std::move(limit)), m_libav(std::make_unique<Libav>())
 {
   open();
 }
@@ -163,31 +166,29 @@ void VideoFile::allowReading(double seconds) const
 void VideoFile::open()
 {
   const QuietLibav quiet;
-  const std::string &path = m_path;
   AVFormatContext *format = avformat_alloc_context();
   AVDictionary *options = nullptr;
   if (m_limit && format != nullptr) {
     format->interrupt_callback = {isOver, m_limit.get()};
-    if (path.rfind("rtsp", 0) == 0)
+    if (m_path.rfind("rtsp", 0) == 0)
       av_dict_set(&options, "rtsp_flags", "prefer_tcp", 0); // over UDP a lost packet is a broken picture
   }
   allowReading(kOpening_s);
-  const int opened = avformat_open_input(&format, path.c_str(), nullptr, &options);
+  const int opened = avformat_open_input(&format, m_path.c_str(), nullptr, &options);
   av_dict_free(&options);
-  checkLibav(opened, path + ": no video");
+  checkLibav(opened, m_name + ": no video");
   m_libav->format.reset(format);
-  const bool has_no_stamps = std::strcmp(format->iformat->name, "mpjpeg") == 0;
-  format->use_wallclock_as_timestamps = m_limit && has_no_stamps ? 1 : 0;
-  checkLibav(avformat_find_stream_info(format, nullptr), path + ": no video");
+  format->use_wallclock_as_timestamps = m_limit && isMultipart(*format) ? 1 : 0;
+  checkLibav(avformat_find_stream_info(format, nullptr), m_name + ": no video");
   m_libav->stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
-  checkLibav(m_libav->stream, path + ": no video stream that can be decoded");
+  checkLibav(m_libav->stream, m_name + ": no video stream that can be decoded");
 
   AVStream &stream = *format->streams[m_libav->stream];
   try {
     m_libav->decoder.emplace(*stream.codecpar);
   }
   catch (const vpException &error) {
-    throw ioError("{}: {}", path, error.getStringMessage());
+    throw ioError("{}: {}", m_name, error.getStringMessage());
   }
   m_libav->quarter_turns = quarterTurns(stream);
 }
@@ -210,6 +211,13 @@ std::int64_t VideoFile::duration_ns() const
   return format.duration > 0 ? av_rescale_q(format.duration, {1, AV_TIME_BASE}, nanoseconds) : 0;
 }
 
+bool VideoFile::isLive() const
+{
+  const AVFormatContext &format = *m_libav->format;
+  const bool has_length = !isMultipart(format) && format.pb != nullptr && avio_size(format.pb) > 0;
+  return m_limit != nullptr && duration_ns() == 0 && !has_length;
+}
+
 bool VideoFile::next(Picture &picture)
 {
   while (m_ready.empty() && !m_is_at_end)
@@ -227,7 +235,7 @@ const Picture &VideoFile::firstWhole()
     while (i == m_ready.size() && !m_is_at_end)
       decodeMore();
     if (i == m_ready.size())
-      throw ioError("{}: none of its {} pictures can be decoded", m_path, i);
+      throw ioError("{}: none of its {} pictures can be decoded", m_name, i);
     if (!m_ready[i].is_damaged)
       return m_ready[i];
   }
@@ -324,6 +332,7 @@ void VideoFile::take(const AVFrame &frame)
     m_pending.erase(pts);
   }
   Picture picture;
+  picture.clock = pts;
   picture.stamp_ns = stampOf(pts);
   picture.is_damaged = PictureDecoder::isDamaged(frame);
   if (picture.is_damaged)

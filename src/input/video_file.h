@@ -24,6 +24,7 @@ struct Picture
   bool is_missing = false; ///< the container counts it and the file ends before it
   std::string message;
   vpImage<unsigned char> image;
+  std::int64_t clock = 0; ///< the time that the stream itself has for it, in a unit of its own
 };
 
 /// What ends a read from an address that would wait for ever: stop it from any thread.
@@ -59,8 +60,8 @@ public:
   std::size_t frames() const;
   /// By the file's own word [ns], 0 when it does not say.
   std::int64_t duration_ns() const;
-  /// Whether it comes from an address and does not say how long it is.
-  bool isLive() const { return m_limit != nullptr && duration_ns() == 0; }
+  /// Whether it comes from an address and does not say how long it is, in time nor in bytes.
+  bool isLive() const;
   const std::shared_ptr<ReadLimit> &limit() const { return m_limit; }
 
 private:
@@ -75,7 +76,7 @@ private:
   void emit(Picture picture);
   std::int64_t stampOf(std::int64_t pts);
 
-  std::string m_path;
+  std::string m_path, m_name;         ///< to be opened; to be shown
   std::shared_ptr<ReadLimit> m_limit; ///< of an address
   std::unique_ptr<Libav> m_libav;
   std::deque<Picture> m_ready;

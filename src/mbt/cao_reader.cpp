@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "mbt/cao_reader.h"
+#include "input/atomic_file.h"
 #include "input/regular_file.h"
 
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
+#include <iterator>
 #include <sstream>
 #include <visp3/core/vpException.h>
 
@@ -159,27 +158,19 @@ std::vector<Cylinder> readCao(const std::string &path)
 
 void writeCao(const std::string &path, const std::vector<Cylinder> &cylinders, const std::string &comment)
 {
-  const std::string beside = path + ".part";
-  {
-    std::ofstream file(beside);
-    file << "V1\n";
-    if (!comment.empty())
-      file << "# " << comment << "\n";
-    file << 2 * cylinders.size() << " # points\n";
-    for (const Cylinder &c : cylinders)
-      for (const Eigen::Vector3d &p : {c.foot, c.top})
-        file << fmt::format("{:.6f} {:.6f} {:.6f}\n", p.x(), p.y(), p.z());
-    file << "0 # lines\n0 # faces from lines\n0 # faces from points\n" << cylinders.size() << " # cylinders\n";
-    for (std::size_t k = 0; k < cylinders.size(); ++k)
-      file << fmt::format("{} {} {:.6f}", 2 * k, 2 * k + 1, cylinders[k].radius)
-           << (cylinders[k].name.empty() ? "" : fmt::format(" name=\"{}\"", cylinders[k].name)) << "\n";
-    file << "0 # circles\n";
-    if (!file.flush())
-      throw vpException(vpException::ioError, fmt::format("{}: cannot be written", path));
-  }
-  std::error_code error;
-  std::filesystem::rename(beside, path, error);
-  if (error)
-    throw vpException(vpException::ioError, fmt::format("{}: cannot be written ({})", path, error.message()));
+  std::string text = "V1\n";
+  const auto out = std::back_inserter(text);
+  if (!comment.empty())
+    fmt::format_to(out, "# {}\n", comment);
+  fmt::format_to(out, "{} # points\n", 2 * cylinders.size());
+  for (const Cylinder &c : cylinders)
+    for (const Eigen::Vector3d &p : {c.foot, c.top})
+      fmt::format_to(out, "{:.6f} {:.6f} {:.6f}\n", p.x(), p.y(), p.z());
+  fmt::format_to(out, "0 # lines\n0 # faces from lines\n0 # faces from points\n{} # cylinders\n", cylinders.size());
+  for (std::size_t k = 0; k < cylinders.size(); ++k)
+    fmt::format_to(out, "{} {} {:.6f}{}\n", 2 * k, 2 * k + 1, cylinders[k].radius,
+                   cylinders[k].name.empty() ? "" : fmt::format(" name=\"{}\"", cylinders[k].name));
+  text += "0 # circles\n";
+  writeAtomically(path, text);
 }
 } // namespace bole

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/flight_trace.h"
 
+#include "input/atomic_file.h"
 #include "input/csv_reader.h"
-#include "output/atomic_file.h"
 #include "output/trajectory_writer.h"
 
 #include <cmath>
@@ -75,14 +75,15 @@ std::vector<FrameTrace> readFrames(const std::string &folder)
 
 FlightTrace readTrace(const std::string &folder)
 {
+  constexpr double kFarthest_m = 1e6, kFarthest_s = 4e9;
   FlightTrace trace;
   trace.frames = readFrames(folder);
   CsvReader views(folder + "/views.csv", {11, ',', kViewsHeader});
   while (views.next()) {
     TrunkTrace view;
     view.frame = static_cast<std::size_t>(views.integer(0, "frame"));
-    view.stamp_ns = static_cast<std::int64_t>(std::llround(1e9 * views.number(1, "stamp")));
-    view.id = static_cast<int>(views.integer(2, "id"));
+    view.stamp_ns = static_cast<std::int64_t>(std::llround(1e9 * views.number(1, "stamp", kFarthest_s)));
+    view.id = views.count(2, "id");
     view.range = views.number(3, "range");
     view.range_sigma = views.number(4, "sigma_range");
     view.radius = views.number(5, "radius");
@@ -93,8 +94,8 @@ FlightTrace readTrace(const std::string &folder)
   }
   CsvReader evidence(folder + "/evidence.csv", {3, ',', kEvidenceHeader});
   while (evidence.next())
-    trace.evidence.add({evidence.number(0, "x"), evidence.number(1, "y"), 0},
-                       static_cast<int>(evidence.integer(2, "points")));
+    trace.evidence.add({evidence.number(0, "x", kFarthest_m), evidence.number(1, "y", kFarthest_m), 0},
+                       evidence.count(2, "points"));
   return trace;
 }
 } // namespace bole

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/map_svg.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include "output/palette.h"
 #include "output/svg.h"
 

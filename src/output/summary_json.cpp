@@ -3,8 +3,8 @@
 #include "geometry/failure.h"
 #include "geometry/median.h"
 #include "geometry/names.h"
+#include "input/atomic_file.h"
 #include "input/regular_file.h"
-#include "output/atomic_file.h"
 #include "output/verdict.h"
 #include "output/versions.h"
 
@@ -102,6 +102,7 @@ std::string toJson(const RunSummary &summary)
   const Verdict verdict = judge(summary);
   Json json;
   json["complete"] = summary.is_complete;
+  json["ended"] = summary.has_ended;
   json["trusted"] = verdict.is_trusted;
   json["facts"] = verdict.facts;
   json["doubts"] = verdict.doubts;
@@ -163,38 +164,53 @@ double numberOrZero(const Json &json, const char *key)
   return json.contains(key) && json[key].is_number() ? json[key].get<double>() : 0;
 }
 
-Json readObject(const std::string &path)
+} // namespace
+
+nlohmann::ordered_json readSummary(const std::string &path)
 {
   constexpr std::size_t kMostBytes = 16'000'000;
   Json json = Json::parse(readWholeFile(path, kMostBytes), nullptr, false);
   if (!json.is_object())
     throw badValue("{}: is no summary of a run", path);
+  if (const Json *frames = json.contains("frames") ? &json["frames"] : nullptr;
+      frames && frames->is_object() && frames->contains("all") && (*frames)["all"] == 0)
+    throw badValue("{}: the run ended before its first frame; `bole track --resume` makes it", path);
   return json;
 }
-} // namespace
+
+std::string faultOf(const std::string &path, const std::exception &error)
+{
+  const std::string text = error.what(); // "[json.exception.type_error.302] type must be ..."
+  return fmt::format("{}: {}", path, text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2));
+}
 
 WorldReference readReference(const std::string &path)
 {
-  const Json json = readObject(path);
-  WorldReference reference;
-  reference.scale = sourceOf(path, json, "scale", ScaleSource::prior);
-  reference.scale_sigma = numberOrZero(json, "scale_sigma");
-  reference.gravity = sourceOf(path, json, "gravity", GravitySource::assumed);
-  reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
-  reference.has_ranges = json.value("ranges", true);
-  return reference;
+  const Json json = readSummary(path);
+  try {
+    WorldReference reference;
+    reference.scale = sourceOf(path, json, "scale", ScaleSource::prior);
+    reference.scale_sigma = numberOrZero(json, "scale_sigma");
+    reference.gravity = sourceOf(path, json, "gravity", GravitySource::assumed);
+    reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
+    reference.has_ranges = json.value("ranges", true);
+    return reference;
+  }
+  catch (const Json::exception &error) {
+    throw badValue("{}", faultOf(path, error));
+  }
 }
 
 PinholeCamera readCameraOfRun(const std::string &path)
 {
-  const Json json = readObject(path);
+  const Json json = readSummary(path);
   try {
     const Json &camera = json.at("camera");
     return {camera.at("fx_px"), camera.at("fy_px"),    camera.at("cx_px"),
             camera.at("cy_px"), camera.at("width_px"), camera.at("height_px")};
   }
   catch (const Json::exception &error) {
-    throw badValue("{}: camera: {}", path, error.what());
+    throw badValue("{}", faultOf(path + ": camera", error));
   }
 }
 

@@ -11,6 +11,7 @@
 #include <bole/world_reference.h>
 
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,7 @@ struct RunSummary
   // what came of it
   std::vector<CalibratedConstant> calibration; ///< what was measured of the sensors before the run
   bool is_complete = true;                     ///< false: the run was stopped, this is what was known by then
+  bool has_ended = true;                       ///< false: it goes on, or was killed: no last look was taken
   WorldReference reference;                    ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
   std::map<FrameStatus, std::string> reasons; ///< the first message of each status
@@ -59,6 +61,10 @@ struct RunSummary
 /// their radius, standard deviation and observations, sources of scale and gravity, what is doubtful (judge()), median
 /// cost by stage. null: there was nothing to measure.
 std::string toJson(const RunSummary &summary);
+/// A summary.json. \throw vpException naming the file when it is none, or of a run that ended before its first frame.
+nlohmann::ordered_json readSummary(const std::string &path);
+/// \p error of the file \p path in one line.
+std::string faultOf(const std::string &path, const std::exception &error);
 /// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
 WorldReference readReference(const std::string &path);
 /// The camera of a summary.json, likewise.

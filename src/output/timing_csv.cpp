@@ -2,7 +2,7 @@
 #include "output/timing_csv.h"
 
 #include "geometry/median.h"
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 
 #include <fmt/format.h>
 #include <iterator>

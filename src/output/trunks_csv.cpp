@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/trunks_csv.h"
+#include "input/atomic_file.h"
 #include "input/csv_reader.h"
-#include "output/atomic_file.h"
 
 #include <Eigen/LU>
 
@@ -55,10 +55,11 @@ void addRow(std::string &text, const TrunkRecord &trunk)
 TrunkRecord readRow(const CsvReader &csv)
 {
   TrunkRecord trunk;
-  trunk.id = static_cast<int>(csv.integer(0, "id"));
+  trunk.id = csv.count(0, "id");
   trunk.status = csv.named(1, "status", TrunkStatus::merged, "must be candidate, confirmed, lost or merged");
-  trunk.xy = {csv.number(2, "x"), csv.number(3, "y")};
-  trunk.radius = csv.number(4, "radius");
+  constexpr double kFarthest_m = 1e6, kThickest_m = 100;
+  trunk.xy = {csv.number(2, "x", kFarthest_m), csv.number(3, "y", kFarthest_m)};
+  trunk.radius = csv.number(4, "radius", kThickest_m);
   if (!(trunk.radius > 0))
     csv.fail(fmt::format("radius = {}, must be above 0 m", trunk.radius));
   trunk.lean = {csv.number(5, "lean_x"), csv.number(6, "lean_y")};
@@ -66,7 +67,7 @@ TrunkRecord readRow(const CsvReader &csv)
   trunk.probability = csv.number(8, "probability");
   trunk.first_seen_s = csv.number(9, "first_seen");
   trunk.last_seen_s = csv.number(10, "last_seen");
-  trunk.observations = static_cast<int>(csv.integer(11, "views"));
+  trunk.observations = csv.count(11, "views");
   for (std::size_t i = 0; i < kCovariance.size(); ++i) {
     const auto [row, column] = kCovariance[i];
     trunk.covariance(row, column) = trunk.covariance(column, row) = csv.number(kFirstCovariance + i, "covariance");

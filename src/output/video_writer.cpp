@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/video_writer.h"
 #include "geometry/failure.h"
+#include "input/atomic_file.h"
 #include "input/codec.h"
-#include "output/atomic_file.h"
 
 #include <fmt/format.h>
 #include <optional>
@@ -103,7 +103,8 @@ void VideoWriter::write(const vpImage<vpRGBa> &picture, std::int64_t stamp_ns)
     libav.width = picture.getWidth();
     libav.height = picture.getHeight();
     libav.first_ns = stamp_ns;
-    libav.open(static_cast<int>(libav.width) & ~1, static_cast<int>(libav.height) & ~1, libav.file.temporaryPath());
+    libav.open(static_cast<int>(libav.width) & ~1, static_cast<int>(libav.height) & ~1,
+               "file:" + libav.file.temporaryPath()); // a colon in a name is no protocol
   }
   if (picture.getWidth() != libav.width || picture.getHeight() != libav.height)
     throw dimensionError("{}: picture of {}x{} px, must be {}x{}", libav.file.path(), picture.getWidth(),

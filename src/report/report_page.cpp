@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "report/report_page.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include "output/page.h"
 #include "report_template.h" // made of page.html
 

@@ -9,8 +9,7 @@
 #include "output/trunks_csv.h"
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace bole
@@ -18,12 +17,17 @@ namespace bole
 namespace
 {
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
-std::string bytesOf(const std::string &path)
+/// The picture views/ID.jpg of \p run; empty where there is none, or something else: a link may lead out of the folder.
+std::string viewOf(const fs::path &run, int id)
 {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  constexpr std::size_t kMostBytes = 16'000'000;
+  const fs::path folder = run / "views", path = folder / fmt::format("{}.jpg", id);
+  if (!fs::is_directory(fs::symlink_status(folder)) || !fs::is_regular_file(fs::symlink_status(path)))
+    return {};
+  const std::string bytes = readWholeFile(path.string(), kMostBytes);
+  return bytes.rfind("\xFF\xD8\xFF", 0) == 0 ? bytes : "";
 }
 
 std::string textOf(const Json &json, const char *key)
@@ -33,8 +37,8 @@ std::string textOf(const Json &json, const char *key)
 
 void readSummaryInto(RunRecord &run, const std::string &path)
 {
-  const Json json = Json::parse(bytesOf(path), nullptr, false);
-  if (!json.is_object() || !json.contains("input") || !json.contains("facts"))
+  const Json json = readSummary(path);
+  if (!json.contains("input") || !json.contains("facts"))
     throw badValue("{}: is no summary of a run", path);
   try {
     run.input = textOf(json["input"], "source");
@@ -52,7 +56,7 @@ void readSummaryInto(RunRecord &run, const std::string &path)
           {textOf(sensor, "sensor"), textOf(sensor, "kind"), sensor.value("since_s", 0.0), textOf(sensor, "text")});
   }
   catch (const Json::exception &error) {
-    throw badValue("{}: {}", path, error.what());
+    throw badValue("{}", faultOf(path, error));
   }
 }
 
@@ -60,10 +64,11 @@ void readSummaryInto(RunRecord &run, const std::string &path)
 TimingTable readTiming(const std::string &path)
 {
   TimingTable timing;
-  std::ifstream file(path);
-  std::string header, name;
-  std::getline(file, header);
+  TextLines first(path);
+  first.next();
+  const std::string &header = first.line();
   std::istringstream names(header);
+  std::string name;
   std::size_t columns = 0, total = 0;
   for (; std::getline(names, name, ','); ++columns) {
     name = name.substr(0, name.find(" ["));
@@ -121,8 +126,8 @@ RunRecord readRun(const std::string &folder, const std::string &sequence)
   for (const TrunkRecord &hypothesis : readTrunks(folder + "/hypotheses.csv"))
     run.trunks.push_back(hypothesis);
   for (const TrunkRecord &trunk : run.trunks)
-    if (const std::string path = folder + "/views/" + std::to_string(trunk.id) + ".jpg"; fs::exists(path))
-      run.views_jpeg[trunk.id] = bytesOf(path);
+    if (std::string jpeg = viewOf(folder, trunk.id); !jpeg.empty())
+      run.views_jpeg[trunk.id] = std::move(jpeg);
   run.smoothed = readTumTrajectory(folder + "/trajectory.tum");
   run.online = readTumTrajectory(folder + "/trajectory_online.tum");
   run.trace = readTrace(folder);

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "input/atomic_file.h"
 #include <bole/graph.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include <cerrno>
-#include <cstring>
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <fstream>
 #include <ostream>
-#include <unistd.h>
+#include <sstream>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -108,24 +105,8 @@ void writeG2o(std::ostream &out, const Graph &graph)
 
 void writeG2o(const std::string &path, const Graph &graph)
 {
-  const std::string temporary = path + ".part";
-  const auto fail = [&](const char *what) {
-    const int error = errno;
-    ::unlink(temporary.c_str());
-    throw vpException(vpException::ioError, "%s: %s: %s", path.c_str(), what, std::strerror(error));
-  };
-  {
-    std::ofstream out(temporary);
-    writeG2o(out, graph);
-    out.flush();
-    if (!out)
-      fail("cannot be written");
-  }
-  const int file = ::open(temporary.c_str(), O_RDONLY);
-  const bool synced = file >= 0 && ::fsync(file) == 0;
-  if (file >= 0)
-    ::close(file);
-  if (!synced || std::rename(temporary.c_str(), path.c_str()) != 0)
-    fail("cannot be written");
+  std::ostringstream text;
+  writeG2o(text, graph);
+  writeAtomically(path, text.str());
 }
 } // namespace bole

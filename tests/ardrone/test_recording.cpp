@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/recording.h"
 
+#include "ardrone/bytes.h"
+
 #include "flight.h"
 
 #include <csignal>
@@ -82,6 +84,25 @@ TEST(Recording, ADamagedPieceIsSkippedAndTheOthersRead)
   EXPECT_EQ(pieces[10].arrival_ns, 1011);
   EXPECT_EQ(pieces[10].bytes, std::vector<std::uint8_t>(77, 11));
   EXPECT_EQ(reader.skippedBytes(), ends[10] - ends[9] + 18); // and the title
+}
+
+TEST(Recording, OneOfNothingButBeginningsIsGivenUpAtTheCostOfAFewReadings)
+{
+  const TemporaryFolder folder;
+  writeTwenty(folder.path);
+  const auto good = bytesOf(folder.path + "/raw.bin");
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < 100'000; ++i) {
+    appendLittleEndian(bytes, std::uint32_t{0x45434542});
+    bytes.push_back(1);
+    bytes.resize(bytes.size() + 11);
+    appendLittleEndian(bytes, std::uint32_t{1'000'000}); // bytes that are there, and of another sum
+  }
+  bytes.insert(bytes.end(), good.begin(), good.end());
+  RecordingReader reader(bytes);
+  RecordedPiece piece;
+  EXPECT_FALSE(reader.next(piece)) << "the good ones at the end would be found by summing 50 GB";
+  EXPECT_EQ(reader.skippedBytes(), bytes.size());
 }
 
 TEST(Recording, AKilledWriterLeavesAReadableRecording)

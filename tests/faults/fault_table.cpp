@@ -7,7 +7,7 @@
 // writes the table for the documentation. Exit status 1 where a fault falls short that is not known to.
 #include "fault_list.h"
 
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include "support/shell.h"
 #include <bole/evaluation.h>
 

@@ -2,6 +2,7 @@
 // Streams by their address, from a camera behind HTTP on this machine.
 #include "input/live_video.h"
 
+#include "input/retry_pause.h"
 #include "output/video_writer.h"
 
 #include <arpa/inet.h>
@@ -14,6 +15,10 @@
 #include <sys/socket.h>
 #include <thread>
 #include <unistd.h>
+
+extern "C" {
+#include <libavformat/avformat.h>
+}
 
 namespace bole
 {
@@ -158,34 +163,96 @@ TEST(LiveVideo, ConnectsAgainAndEndsWhereNothingComesAnyMore)
   EXPECT_THAT(why, HasSubstr("127.0.0.1"));
 }
 
+/// The bytes of an MP4 of 25 pictures in a second.
+std::string recording()
+{
+  const std::string path = fmt::format("{}bole_live_recording_{}.mp4", testing::TempDir(), getpid());
+  VideoWriter video(path);
+  for (int k = 0; k < 25; ++k) {
+    vpImage<vpRGBa> colour(kHeight, kWidth);
+    const cv::Mat grey = picture(k);
+    for (unsigned i = 0; i < colour.getSize(); ++i)
+      colour.bitmap[i] = vpRGBa(grey.data[i], grey.data[i], grey.data[i]);
+    video.write(colour, k * 40'000'000LL);
+  }
+  video.finish();
+  std::ifstream file(path, std::ios::binary);
+  std::remove(path.c_str());
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// The same as an MPEG transport stream, which does not tell how long it is.
+std::string transportStream()
+{
+  const std::string path = fmt::format("{}bole_live_stream_{}.mp4", testing::TempDir(), getpid());
+  std::ofstream(path, std::ios::binary) << recording();
+  AVFormatContext *in = nullptr, *out = nullptr;
+  EXPECT_GE(avformat_open_input(&in, path.c_str(), nullptr, nullptr), 0);
+  EXPECT_GE(avformat_alloc_output_context2(&out, nullptr, "mpegts", nullptr), 0);
+  EXPECT_GE(avcodec_parameters_copy(avformat_new_stream(out, nullptr)->codecpar, in->streams[0]->codecpar), 0);
+  EXPECT_GE(avio_open_dyn_buf(&out->pb), 0);
+  EXPECT_GE(avformat_write_header(out, nullptr), 0);
+  AVPacket *packet = av_packet_alloc();
+  while (av_read_frame(in, packet) >= 0) {
+    av_packet_rescale_ts(packet, in->streams[0]->time_base, out->streams[0]->time_base);
+    av_interleaved_write_frame(out, packet);
+  }
+  av_packet_free(&packet);
+  av_write_trailer(out);
+  std::uint8_t *bytes = nullptr;
+  const int size = avio_close_dyn_buf(out->pb, &bytes);
+  const std::string stream(bytes, bytes + size);
+  av_free(bytes);
+  avformat_free_context(out);
+  avformat_close_input(&in);
+  std::remove(path.c_str());
+  return stream;
+}
+
 TEST(LiveVideo, ARecordingBehindAnAddressIsReadWhole)
 {
-  const std::string path = testing::TempDir() + "bole_live_recording.mp4";
-  {
-    VideoWriter video(path);
-    for (int k = 0; k < 25; ++k) {
-      vpImage<vpRGBa> colour(kHeight, kWidth);
-      const cv::Mat grey = picture(k);
-      for (unsigned i = 0; i < colour.getSize(); ++i)
-        colour.bitmap[i] = vpRGBa(grey.data[i], grey.data[i], grey.data[i]);
-      video.write(colour, k * 40'000'000LL);
-    }
-    video.finish();
+  for (const std::string &bytes : {recording(), transportStream()}) {
+    HttpServer server([&](int socket, int) {
+      sendAll(socket, fmt::format("HTTP/1.0 200 OK\r\nContent-Length: {}\r\n\r\n", bytes.size()) + bytes);
+    });
+    const auto source = openStream(server.address(), {});
+    EXPECT_EQ(dynamic_cast<LiveVideoSource *>(source.get()), nullptr);
+    int frames = 0;
+    for (Frame frame; source->next(frame); ++frames)
+      EXPECT_EQ(frame.stamp_ns, frames * 40'000'000LL);
+    EXPECT_EQ(frames, 25);
   }
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  HttpServer server([&](int socket, int) {
-    sendAll(socket,
-            fmt::format("HTTP/1.0 200 OK\r\nContent-Type: video/mp4\r\nContent-Length: {}\r\n\r\n", bytes.size()) +
-                bytes);
-  });
-  const auto source = openStream(server.address(), {});
-  EXPECT_EQ(dynamic_cast<LiveVideoSource *>(source.get()), nullptr);
-  int frames = 0;
-  for (Frame frame; source->next(frame); ++frames)
-    EXPECT_EQ(frame.stamp_ns, frames * 40'000'000LL);
-  EXPECT_EQ(frames, 25);
-  std::remove(path.c_str());
+}
+
+TEST(LiveVideo, ARecordingOfUntoldLengthEnds)
+{
+  const std::string bytes = transportStream();
+  HttpServer server([&](int socket, int) { sendAll(socket, "HTTP/1.0 200 OK\r\n\r\n" + bytes); });
+  const auto source = openStream(server.address(), {}, 3600); // a silence is not what ends it
+  ASSERT_NE(dynamic_cast<LiveVideoSource *>(source.get()), nullptr);
+  std::int64_t last_ns = -1;
+  for (Frame frame; source->next(frame); last_ns = frame.stamp_ns)
+    EXPECT_GT(frame.stamp_ns, last_ns + 1000) << "1 us";
+  EXPECT_GE(last_ns, 960'000'000);
+}
+
+TEST(LiveVideo, APasswordIsNeitherInItsNameNorInWhatItSays)
+{
+  HttpServer server([](int socket, int) { sendPictures(socket, 3); });
+  const std::string address = "http://user:secret@" + server.address().substr(7);
+  LiveVideoSource live(address, {}, 1);
+  EXPECT_EQ(live.name(), server.address());
+  for (Frame frame; live.next(frame);)
+    EXPECT_THAT(frame.message, testing::Not(HasSubstr("secret")));
+}
+
+TEST(LiveVideo, WaitsLongerFromAttemptToAttempt)
+{
+  RetryPause pause(0.5, 3);
+  for (const double expected : {0.5, 1.0, 2.0, 3.0, 3.0})
+    EXPECT_EQ(pause.next().count(), expected);
+  pause.reset();
+  EXPECT_EQ(pause.next().count(), 0.5);
 }
 
 std::string errorOf(const std::string &address, const SourceOptions &options = {})
@@ -203,6 +270,7 @@ TEST(LiveVideo, WhatDoesNotAnswerIsNamed)
 {
   EXPECT_THAT(errorOf("http://127.0.0.1:1/none"), HasSubstr("http://127.0.0.1:1/none: no video"));
   EXPECT_THAT(errorOf("/dev/video987"), HasSubstr("/dev/video987: no camera"));
+  EXPECT_THAT(errorOf("http://user:secret@127.0.0.1:1/none"), HasSubstr("http://127.0.0.1:1/none: no video"));
   HttpServer server([](int socket, int) { sendAll(socket, "HTTP/1.0 200 OK\r\n\r\nhello"); });
   EXPECT_THAT(errorOf(server.address()), HasSubstr("no video"));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
-#include "output/atomic_file.h"
+#include "input/atomic_file.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 

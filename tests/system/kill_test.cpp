@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A run that is killed leaves either the old files or complete new ones.
 #include "input/video_source.h"
+#include "run_bole.h"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <sys/wait.h>
@@ -19,7 +21,8 @@
 namespace
 {
 namespace fs = std::filesystem;
-const std::string kFlight = BOLE_SOURCE_DIR "/data/park-forward";
+using namespace bole::test;
+using testing::HasSubstr;
 
 pid_t start(const std::vector<std::string> &arguments)
 {
@@ -73,6 +76,78 @@ std::size_t picturesIn(const std::string &path)
       return count;
     count += frame.status == bole::FrameStatus::ok || frame.status == bole::FrameStatus::stale;
   }
+}
+
+/// Kills `bole` with \p arguments as soon as \p is_enough.
+void killAsSoonAs(const std::vector<std::string> &arguments, const std::function<bool()> &is_enough)
+{
+  const pid_t child = start(arguments);
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while (!is_enough() && std::chrono::steady_clock::now() < give_up)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  kill(child, SIGKILL);
+  ASSERT_TRUE(WIFSIGNALED(statusOf(child))) << "it was over before it was killed";
+}
+
+/// Frames that the run in \p folder knows; -1 where there is none yet.
+int framesOf(const std::string &folder)
+{
+  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"), nullptr, false);
+  return summary.is_object() ? summary.at("frames").at("all").get<int>() : -1;
+}
+
+TEST(Kill, OfARunLeavesWhatIsShownExportedRepeatedAndCompleted)
+{
+  const std::string folder = freshFolder("killed");
+  killAsSoonAs({"track", kFlight, "-o", folder, "--no-video"}, [&] { return framesOf(folder) > 0; });
+  ASSERT_EQ(framesOf(folder), 1); // the next time is after 50
+  for (const std::string &command :
+       {"report " + folder + " " + kFlight, "export " + folder + " tum", "export " + folder + " colmap",
+        "export " + folder + " g2o", "graph " + folder, "evaluate " + folder + " " + kFlight}) {
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.status, 0) << command << ": " << outcome.text;
+  }
+  const Outcome again = run("track --again " + folder);
+  EXPECT_EQ(again.status, 0) << again.text;
+  const Outcome resumed = run("track --resume " + folder);
+  EXPECT_EQ(resumed.status, 0) << resumed.text;
+  EXPECT_EQ(framesOf(folder), 120);
+  EXPECT_EQ(jsonOf(folder + "/summary.json").at("complete"), true);
+}
+
+TEST(Kill, OfARunBeforeItsFirstFrameIsSaidInALineAndCompleted)
+{
+  const std::string folder = freshFolder("killed_early");
+  killAsSoonAs({"track", kFlight, "-o", folder, "--no-video", "--frames", "20"}, [&] { return framesOf(folder) >= 0; });
+  auto summary = jsonOf(folder + "/summary.json");
+  summary["frames"]["all"] = 0;
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  std::ofstream(folder + "/summary.json") << summary;
+  for (const std::string &command : {"report " + folder, "export " + folder + " tum",
+                                     "evaluate " + folder + " " + kFlight, "track --again " + folder}) {
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.status, 1) << command;
+    EXPECT_THAT(outcome.text, HasSubstr("ended before its first frame")) << command;
+    EXPECT_EQ(std::count(outcome.text.begin(), outcome.text.end(), '\n'), 1) << command;
+  }
+  EXPECT_THAT(run("track --resume " + folder).status, testing::AnyOf(0, 3));
+  EXPECT_EQ(framesOf(folder), 20);
+}
+
+TEST(Kill, OfAFollowerLeavesEachFrameUntilThen)
+{
+  const std::string folder = freshFolder("killed_follow"), model = folder + "_wood.cao";
+  std::ofstream(model) << "V1\n2\n4 1 0\n4 1 4\n0\n0\n0\n1\n0 1 0.2\n0\n";
+  const auto rows = [&] { return linesOf(folder + "/status.csv"); };
+  killAsSoonAs({"follow", kFlight, "--model", model, "--init", "0,1.19,1.12,-6.4", "-o", folder},
+               [&] { return rows().size() > 6; });
+  const auto lines = rows();
+  ASSERT_GT(lines.size(), 6u);
+  for (const std::string &line : lines)
+    EXPECT_GE(fieldsIn(line, ','), 8u) << line;
+  EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
+  EXPECT_EQ(jsonOf(folder + "/follow.json").at("complete"), false);
 }
 
 TEST(Kill, LeavesOldOrCompleteFiles)

@@ -105,7 +105,8 @@ std::string toTable(const ComparisonReport &report)
 
 std::string toJson(const ComparisonReport &report)
 {
-  Json json = {{"sequence", report.sequence},
+  Json json = {{"complete", true},
+               {"sequence", report.sequence},
                {"command", report.command},
                {"frames", report.frames},
                {"trunks", report.trunks},

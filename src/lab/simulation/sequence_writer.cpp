@@ -2,6 +2,7 @@
 #include "lab/simulation/sequence_writer.h"
 #include "geometry/failure.h"
 #include "input/asl_text.h"
+#include "output/output_folder.h"
 
 #include <bole/trunk_record.h>
 
@@ -32,6 +33,31 @@ std::uint16_t rounded(std::uint16_t depth_mm)
 }
 } // namespace
 
+namespace
+{
+const FileNames kFiles = {"mav0/cam0/sensor.yaml",
+                          "mav0/cam0/data.csv",
+                          "mav0/cam0/data/*.png",
+                          "mav0/imu0/data.csv",
+                          "mav0/odom0/data.csv",
+                          "mav0/state_groundtruth_estimate0/data.csv",
+                          "trees.csv",
+                          "trees_far.csv",
+                          "scene.yaml",
+                          "depth/*.png",
+                          "trunk_id/*.png"};
+
+/// Throws where \p folder is there and holds what a simulation does not write.
+void requireOwn(const std::string &folder)
+{
+  const fs::file_status status = fs::symlink_status(folder);
+  if (fs::exists(status) && !fs::is_directory(status))
+    throw ioError("{}: is no folder, must not be lost", folder);
+  if (const std::string foreign = fs::exists(status) ? firstForeign(folder, kFiles) : ""; !foreign.empty())
+    throw ioError("{}/{}: was not written by a simulation, must not be lost: choose another folder", folder, foreign);
+}
+} // namespace
+
 SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc, double rate_hz,
                                bool overwrite)
     : m_folder(folder), m_partial(folder + ".partial"), m_overwrite(overwrite)
@@ -44,8 +70,10 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
   }
   if (fs::exists(m_folder) && !overwrite)
     throw ioError("{}: exists already; --overwrite replaces it", m_folder);
+  requireOwn(m_folder);
+  requireOwn(m_partial);
+  removeFiles(m_partial, kFiles);
   std::error_code error;
-  fs::remove_all(m_partial, error);
   for (const char *name : {"mav0/cam0/data", "mav0/imu0", "mav0/odom0", "mav0/state_groundtruth_estimate0"}) {
     fs::create_directories(path(name), error);
     if (error)
@@ -125,7 +153,7 @@ void SequenceWriter::finish()
       throw ioError("{}: cannot write", m_partial);
   }
   if (m_overwrite)
-    fs::remove_all(m_folder);
+    removeFiles(m_folder, kFiles);
   fs::rename(m_partial, m_folder);
 }
 } // namespace bole

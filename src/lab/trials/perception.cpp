@@ -5,6 +5,7 @@
 #include "geometry/yaw.h"
 #include "input/frame_health.h"
 #include "mbt/cao_reader.h"
+#include "output/output_folder.h"
 #include <bole/pipeline.h>
 #include <bole/vpMbTrunkTracker.h>
 
@@ -80,7 +81,7 @@ std::unique_ptr<vpMbTracker> trackerOf(TrackerKind kind, const PinholeCamera &ca
   writeCao(path, model);
   const Silence silence;
   std::unique_ptr<vpMbTracker> tracker = makeTracker(kind, {}, path, camera);
-  std::filesystem::remove_all(folder);
+  removeFiles(folder, {"forest.cao"});
   return tracker;
 }
 
