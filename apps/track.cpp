@@ -45,8 +45,8 @@ std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &ma
   return std::move(opened.source);
 }
 
-/// A recording, without the constant errors of its sensors.
-std::unique_ptr<FrameSource> openRecording(TrackArguments arguments, const Options &options, RunSummary &made,
+/// A recording, without the constant errors of its sensors. \p arguments open it once more.
+std::unique_ptr<FrameSource> openRecording(TrackArguments &arguments, const Options &options, RunSummary &made,
                                            SensorCalibration &calibration)
 {
   auto source = openVideo(arguments, made);
@@ -69,7 +69,7 @@ void widen(Options::Odometry &odometry, const SensorCalibration &calibration)
   odometry.scale = std::hypot(odometry.scale, calibration.odometry_scale_sigma);
 }
 
-std::unique_ptr<FrameSource> openInput(const TrackArguments &arguments, const Options &options, RunSummary &made,
+std::unique_ptr<FrameSource> openInput(TrackArguments &arguments, const Options &options, RunSummary &made,
                                        SensorCalibration &calibration)
 {
   if (!ArDroneSource::accepts(arguments.input))
@@ -141,6 +141,19 @@ private:
   OverlayWindow &m_window;
   std::deque<Frame> m_silent;
 };
+
+/// Goes through the frames of a recording once more, with the map that they have led to.
+void showAgain(const TrackArguments &arguments, const Pipeline &pipeline, TrackOutput &output)
+try {
+  const std::size_t frames = pipeline.smoothedTrajectory().size();
+  const auto source = openSource(arguments.input, arguments.source);
+  Frame frame;
+  for (std::size_t i = 0; i < frames && source->next(frame); ++i)
+    output.showAgain(frame, pipeline.review(i));
+}
+catch (const vpException &error) { // whoever took the recording away has not taken what came of it
+  std::fprintf(stderr, "bole: no pictures of the map: %s\n", error.what());
+}
 
 /// The last lines. They come when all is on the disk.
 void report(const TrackArguments &arguments, const TrackOutput &output, const Verdict &verdict, bool is_interrupted)
@@ -238,7 +251,8 @@ void track(const TrackArguments &asked_for)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
-  TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown);
+  const bool is_shown_again = !is_live && !arguments.is_online && options.map.lag == 0;
+  TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown, is_shown_again);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
   endAtInterrupt();
@@ -250,6 +264,8 @@ void track(const TrackArguments &asked_for)
   const bool is_interrupted = interrupted(); // from here on the run is completed, whoever goes away
   if (!arguments.is_cut)
     flight.finish();
+  if (is_shown_again)
+    showAgain(arguments, pipeline, output);
   if (live != nullptr)
     output.setLink(live->counters());
   output.write(pipeline, !is_interrupted);

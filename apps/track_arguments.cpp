@@ -29,8 +29,10 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
                      "Horizontal, where there is no camera file [degrees]; else a pan in the video "
                      "tells it, or 65 is assumed");
   command
-      .add_option("--camera-height", arguments->camera_height,
-                  "Height of the camera over the ground [m], which gives a video without odometry its scale")
+      .add_option(
+          "--camera-height", arguments->camera_height,
+          "Mean height of the camera over the ground in the flight [m], which gives a video without odometry its "
+          "scale")
       ->check(within(0.1, 100));
   command.add_option("--without", arguments->without, "Withhold one sensor: gyro or odometry (may be given twice)")
       ->check(CLI::IsMember({"gyro", "odometry"}));

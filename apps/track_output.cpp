@@ -52,11 +52,23 @@ void measureMotion(const Trajectory &trajectory, RunSummary &summary)
     summary.rotated_deg = std::max(summary.rotated_deg, logSo3(first.R.transpose() * now.R).norm() * 180 / M_PI);
   }
 }
+
+std::size_t confirmedIn(const FrameReport &report)
+{
+  return static_cast<std::size_t>(
+      std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
+        return trunk.is_tracked && trunk.status == TrunkStatus::confirmed;
+      }));
+}
 } // namespace
 
 TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video,
-                         bool has_pictures)
-    : m_folder(run), m_summary(std::move(made)), m_bMc(source.bMc()), m_has_pictures(has_pictures)
+                         bool has_pictures, bool is_shown_again)
+    : m_folder(run),
+      m_summary(std::move(made)),
+      m_bMc(source.bMc()),
+      m_has_pictures(has_pictures),
+      m_is_overlay_due(!is_shown_again)
 {
   m_sensors_before = m_summary.sensors;
   if (!m_folder.isNew())
@@ -109,15 +121,29 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
     m_picture.odometry.push_back({frame.stamp_ns, *frame.wMb_odometry});
   if (frame.wMb_truth)
     m_picture.truth.push_back({frame.stamp_ns, *frame.wMb_truth});
-  m_in_view =
-      static_cast<std::size_t>(std::count_if(report.trunks.begin(), report.trunks.end(), [](const TrunkInView &trunk) {
-        return trunk.is_tracked && trunk.status == TrunkStatus::confirmed;
-      }));
+  m_in_view = confirmedIn(report);
   trace(frame, report);
-  const bool has_image =
-      frame.image.getSize() > 0 && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width;
   waitForFilm();
-  return has_image && (m_overlay || m_has_pictures) ? draw(frame, report) : vpImage<vpRGBa>();
+  return hasImage(frame) && (m_overlay || m_has_pictures) ? draw(frame, report) : vpImage<vpRGBa>();
+}
+
+void TrackOutput::showAgain(const Frame &frame, FrameReport report)
+{
+  if (report.index == 0)
+    m_best_views = {}; // between the borders of the final map
+  report.frame_status = m_trace.frames[report.index].status;
+  m_is_overlay_due = true;
+  m_in_view = confirmedIn(report);
+  traceTrunks(frame, report);
+  waitForFilm();
+  if (hasImage(frame) && m_overlay)
+    draw(frame, report);
+}
+
+bool TrackOutput::hasImage(const Frame &frame) const
+{
+  return static_cast<int>(frame.image.getWidth()) == m_summary.camera.width &&
+         static_cast<int>(frame.image.getHeight()) == m_summary.camera.height;
 }
 
 void TrackOutput::trace(const Frame &frame, const FrameReport &report)
@@ -139,6 +165,11 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
     m_trace.views.erase(std::remove_if(m_trace.views.begin(), m_trace.views.end(), isGone), m_trace.views.end());
     m_given_up.clear();
   }
+  traceTrunks(frame, report);
+}
+
+void TrackOutput::traceTrunks(const Frame &frame, const FrameReport &report)
+{
   for (const TrunkInView &view : report.trunks) {
     const KnownTrunk *known = knownTrunk(report, view.id);
     if (!view.is_tracked || known == nullptr)
@@ -150,8 +181,7 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
                                     along.reverse().array().square() * across * across;
     m_trace.views.push_back({frame.index, frame.stamp_ns, view.id, view.distance, view.distance * relative_sigma,
                              radius, radius * relative_sigma, known->trunk.xy, variance.sqrt()});
-    if (view.relative.isFinite() && static_cast<int>(frame.image.getWidth()) == m_summary.camera.width &&
-        static_cast<int>(frame.image.getHeight()) == m_summary.camera.height)
+    if (view.relative.isFinite() && hasImage(frame))
       m_best_views.add(view.id, frame.image, m_summary.camera, view.relative, view.tan_low, view.tan_high);
   }
 }
@@ -188,7 +218,7 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
     picture = drawOverlay(frame.image, m_summary.camera, overlay);
   m_filming = std::async(std::launch::async, [this, image = frame.image, stamp_ns = frame.stamp_ns, picture, overlay] {
     film([&] {
-      if (m_overlay)
+      if (m_overlay && m_is_overlay_due)
         m_overlay->write(m_has_pictures ? picture : drawOverlay(image, m_summary.camera, overlay), stamp_ns);
       if (m_saliency && overlay.foreground.getSize() > 0)
         m_saliency->write(drawSaliency(image, m_summary.camera, overlay.foreground, overlay.text), stamp_ns);
@@ -254,8 +284,10 @@ void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
   m_summary.is_complete = is_complete;
   m_summary.duration_s = 1e-9 * static_cast<double>(m_last_ns - m_first_ns);
   measureMotion(m_picture.smoothed, m_summary);
-  if (!m_picture.smoothed.empty())
+  if (!m_picture.smoothed.empty()) {
+    m_summary.first_place = m_picture.smoothed.front().wMb.t.head<2>();
     m_camera_place = (m_picture.smoothed.front().wMb * m_bMc).t.head<2>();
+  }
   m_picture.camera = m_camera_place;
 }
 
@@ -327,8 +359,21 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
     m_folder.write(m_picture, m_summary, m_camera_place);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
+  keepViewsOfTrunks();
   writeTrace(m_folder.path(), confirmedTrace());
   writeBestViews();
+}
+
+/// One view of a trunk a frame: as it was known in flight, or else as the final map has it.
+void TrackOutput::keepViewsOfTrunks()
+{
+  std::vector<TrunkTrace> &views = m_trace.views;
+  const auto place = [](const TrunkTrace &view) { return std::pair(view.frame, view.id); };
+  std::stable_sort(views.begin(), views.end(),
+                   [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) < place(b); });
+  views.erase(std::unique(views.begin(), views.end(),
+                          [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) == place(b); }),
+              views.end());
 }
 
 void TrackOutput::finish()

@@ -24,12 +24,16 @@ class TrackOutput
 public:
   /// Makes the folder. \p made: how the run is made, as far as that is known before it begins. \p has_pictures: whether
   /// somebody looks at what add() returns. \throw vpException when the folder cannot be made.
-  TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video, bool has_pictures);
+  /// \p is_shown_again: whether all frames come once more, to showAgain(), which then draws the overlay.
+  TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video, bool has_pictures,
+              bool is_shown_again);
   ~TrackOutput();
 
   /// Takes in a frame and returns its overlay: empty for a frame without an image, and where nobody looks at it.
   /// \p age_ms: of a live frame when \p report was there.
   vpImage<vpRGBa> add(const Frame &frame, const FrameReport &report, std::optional<double> age_ms = {});
+  /// Takes in a frame of before as the final map has it: for the overlay, views/ and what the trunks were seen in.
+  void showAgain(const Frame &frame, FrameReport report);
   /// Counts \p frames missing ones at the end of the flight, of which nothing is known.
   void addSilence(std::size_t frames);
   /// What came of the drone's packets.
@@ -49,6 +53,9 @@ public:
 
 private:
   void trace(const Frame &frame, const FrameReport &report);
+  void traceTrunks(const Frame &frame, const FrameReport &report);
+  void keepViewsOfTrunks();
+  bool hasImage(const Frame &frame) const;
   void writeBestViews() const;
   FlightTrace confirmedTrace() const;
   vpImage<vpRGBa> draw(const Frame &frame, const FrameReport &report);
@@ -68,7 +75,7 @@ private:
   std::set<int> m_given_up;                                 ///< whose part of m_trace is still to go
   Eigen::Vector2d m_camera_place = Eigen::Vector2d::Zero(); ///< of the first frame [m]
   Pose m_bMc;
-  bool m_has_pictures;
+  bool m_has_pictures, m_is_overlay_due; ///< the overlay is drawn by the map at hand
   std::unique_ptr<VideoWriter> m_overlay, m_saliency;
   std::size_t m_in_view = 0;
   std::int64_t m_first_ns = 0, m_last_ns = 0;

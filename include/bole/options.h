@@ -24,7 +24,8 @@ struct Options
   /// What the camera does to the picture.
   struct Camera
   {
-    double height = 0;       ///< over the ground [m]; 0: not known. Gives a video without odometry its scale
+    double height = 0;       ///< over the ground in the mean of the flight [m], 0: not known; the scale of a video
+                             ///< without odometry
     double focal_sigma = 0;  ///< standard deviation of the log of the focal length; 0: calibrated
     double rate = 0;         ///< frames a second; 0: that of the first frames
     bool compressed = false; ///< the pictures went through a lossy codec
@@ -73,13 +74,14 @@ struct Options
   struct Map
   {
     MapPolicy policy = MapPolicy::earned; ///< who becomes a trunk
-    double confirm_probability = 0.6225;  ///< that a candidate is a trunk, at which it is confirmed
-    double confirm_sigma = 0.4;           ///< standard deviation of its place at which it may be confirmed [m]
-    double merge_distance = 0.3;          ///< trunks with less than this between their bark are one [m]
-    double candidate_memory = 5;          ///< a candidate not seen for longer is no longer looked for, a trunk only
-                                          ///< while its bearing is known to its width [s]
-    double lag = 0;                       ///< poses older than this are marginalised [s]; 0: all stay open
-  } map;                                  ///< how trunks are kept
+    double confirm_probability = 0.5;     ///< that a candidate is a trunk, at which it is confirmed
+    double confirm_sigma = 0;    ///< of the place from where it was seen: the map leaves out what has more [m];
+                                 ///< 0: nothing
+    double merge_distance = 0.3; ///< trunks with less than this between their bark are one [m]
+    double candidate_memory = 5; ///< a candidate not seen for longer is no longer looked for, a trunk only
+                                 ///< while its bearing is known to its width [s]
+    double lag = 0;              ///< poses older than this are marginalised [s]; 0: all stay open
+  } map;                         ///< how trunks are kept
 
   struct Odometry ///< noise of the pose filter, a step: between two frames
   {

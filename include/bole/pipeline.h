@@ -61,6 +61,11 @@ public:
   /// Smooths the whole flight once more, everything linearised anew, and judges every hypothesis by all frames
   /// (`stages.final_pass`): trunks may come that were never confirmed in flight, and others go.
   void finish();
+  /// A frame of before as it is known now: its pose and the trunks of the map in it, without candidates. A trunk is
+  /// tracked where the frame, and without one of its own the two round it, gave it a view.
+  /// \param index FrameReport::index
+  /// \throw vpException where no frame has it
+  FrameReport review(std::size_t index) const;
 
   /// All that was ever found, with what became of it; a trunk is what is `confirmed`. The covariances carry the common
   /// error of the scale: it moves every trunk along its line from the first pose and changes every radius in

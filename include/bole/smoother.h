@@ -207,6 +207,9 @@ public:
 
   /// Marginal covariance in the units of Trunk::minus [m, m, -, -, -].
   Matrix5d trunkCovariance(std::size_t trunk) const;
+  /// That of a trunk's place as the last pose that saw it has it [m^2]: along the axes of the world, without what both
+  /// have drifted by since the first pose.
+  Eigen::Matrix2d placeCovariance(std::size_t trunk) const;
   /// Marginal covariance of a pose, in its own frame, in the order of Pose::plus [m, rad].
   Matrix6d poseCovariance(std::size_t pose) const;
   /// The same of the last pose, cheaper.

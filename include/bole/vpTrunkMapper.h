@@ -63,7 +63,7 @@ public:
 
   /// Options as YAML, or a preset by its name. \throw vpException "file:line: key = value, must be ...".
   void loadConfigFile(const std::string &configFile);
-  /// Of the camera over the ground [m], where no odometry tells the scale.
+  /// Of the camera over the ground in the mean of the flight [m], where no odometry tells the scale.
   void setCameraHeight(double height);
   /// Of the images that come without a stamp [Hz]; default 25.
   void setFrameRate(double rate);

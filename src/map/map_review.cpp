@@ -14,8 +14,8 @@ namespace bole
 {
 namespace
 {
-constexpr double kMostLean = 5;     ///< standard deviations of the lean of trunks: two lines that are none bend to it
-constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
+constexpr double kMostLean = 5;   ///< standard deviations of the lean of trunks: two lines that are none bend to it
+constexpr double kHysteresis = 1; ///< log-odds between being good enough for the map and being given up
 } // namespace
 
 bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
@@ -26,7 +26,7 @@ bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
     return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
   if (trunk.trunk.lean.norm() > kMostLean * m_options.lean_sigma)
     return true;
-  if (trunk.column_views >= kColumnViews && trunk.column_odds < m_options.final_odds - kHysteresis)
+  if (trunk.column_views >= kColumnViews && trunk.column_odds < m_options.confirm_odds - kHysteresis)
     return true;
   if (trunk.status == TrunkStatus::confirmed)
     return evidence(trunk) < m_options.doubt_confirmed;
@@ -41,8 +41,7 @@ bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
   const double r = trunk.trunk.radius();
   return trunk.observations >= m_options.confirm_observations && trunk.hits >= m_options.confirm_predicted &&
          trunk.parallax() >= m_options.confirm_parallax && r >= m_options.radius_min && r <= m_options.radius_max &&
-         isPlaced(trunk.covariance) && evidence(trunk) >= m_options.confirm_evidence &&
-         (trunk.column_views == 0 || trunk.column_odds >= m_options.final_odds);
+         logOdds(trunk) >= m_options.confirm_odds;
 }
 
 double distanceBetween(const Trunk &a, const Trunk &b)
@@ -152,7 +151,7 @@ bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
     const MapTrunk &rival = m_trunks[i];
     return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
            rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
-           (margin > 0 || evidence(rival) >= m_options.confirm_evidence) && advantage(rival, trunk) > margin;
+           (margin > 0 || logOdds(rival) >= m_options.confirm_odds) && advantage(rival, trunk) > margin;
   });
 }
 
@@ -377,7 +376,7 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
     MapTrunk &trunk = at(decision.id);
     trunk.final_odds = decision.log_odds;
     if (!decision.is_trunk) {
-      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.final_odds)
+      if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.confirm_odds)
         trunk.fate = TrunkFate::outdone;
       continue;
     }
@@ -385,6 +384,7 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
       trunk.smoother_id = decision.found->smoother_id;
       trunk.trunk = decision.found->trunk;
       trunk.covariance = decision.found->covariance;
+      trunk.place_covariance = trunk.covariance.topLeftCorner<2, 2>();
       trunk.observations = 0;
       for (const TrunkView &view : decision.found->views)
         addView(trunk, view);
@@ -395,20 +395,6 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
   }
   keepActive();
   return forgotten;
-}
-
-bool TrunkMap::isPlaced(const Matrix5d &covariance) const
-{
-  return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= m_options.confirm_position_sigma;
-}
-
-void TrunkMap::doubtPlaces()
-{
-  for (MapTrunk &trunk : m_trunks)
-    if (trunk.status == TrunkStatus::confirmed && !isPlaced(trunk.covariance)) {
-      trunk.status = TrunkStatus::candidate;
-      trunk.fate = TrunkFate::undecided;
-    }
 }
 
 MapUpdate TrunkMap::forgetUnranged()

@@ -24,7 +24,7 @@ constexpr double kLookedThrough = -0.8; ///< log of 1 + MapTrunk::lookedThrough
 constexpr double kLogParallax = 0.69;
 constexpr double kLogContrast = 0.49;
 constexpr double kFoundAgain = 0.54; ///< log of 1 + times the detector came to the same hypothesis
-constexpr double kLogPositionSigma = -0.73;
+constexpr double kLogPlaceSigma = -0.73;
 } // namespace
 
 void TrunkMap::learnRadii()
@@ -51,6 +51,13 @@ double TrunkMap::evidence(const MapTrunk &trunk) const
          foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
          kLookedThrough * std::log1p(trunk.lookedThrough()) + kLogParallax * std::log(trunk.parallax() + 0.01) +
          kLogContrast * std::log(trunk.contrast + 0.005) + kFoundAgain * std::log1p(trunk.found_again) +
-         kLogPositionSigma * std::log(trunk.positionSigma() + 1e-3);
+         kLogPlaceSigma * std::log(trunk.placeSigma() + 1e-3);
+}
+
+double TrunkMap::logOdds(const MapTrunk &trunk) const
+{
+  if (trunk.final_odds)
+    return *trunk.final_odds;
+  return trunk.column_views == 0 ? evidence(trunk) : std::min(evidence(trunk), trunk.column_odds);
 }
 } // namespace bole

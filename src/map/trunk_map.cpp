@@ -57,6 +57,7 @@ int TrunkMap::add(const NewTrunk &found)
   trunk.smoother_id = found.smoother_id;
   trunk.trunk = found.trunk;
   trunk.covariance = found.covariance;
+  trunk.place_covariance = found.covariance.topLeftCorner<2, 2>();
   trunk.first_seen_s = trunk.last_seen_s = found.found_s;
   for (const TrunkView &view : found.views)
     addView(trunk, view);
@@ -77,6 +78,8 @@ void TrunkMap::refresh(const TrunkEstimate &estimate)
   trunk.trunk = estimate.trunk;
   if (estimate.covariance)
     trunk.covariance = *estimate.covariance;
+  if (estimate.place_covariance)
+    trunk.place_covariance = *estimate.place_covariance;
 }
 
 void TrunkMap::loseSight(int id)
@@ -133,6 +136,7 @@ std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
   trunk.smoother_id = reading.smoother_id;
   trunk.trunk = reading.trunk;
   trunk.covariance = reading.covariance;
+  trunk.place_covariance = reading.covariance.topLeftCorner<2, 2>();
   trunk.observations = trunk.column_views = 0;
   trunk.is_silhouette = false;
   trunk.left_contrast.reset();
@@ -192,6 +196,15 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
   blendContrast(trunk.right_contrast, view.right_contrast);
 }
 
+TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk) const
+{
+  const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
+  if (trunk.status != TrunkStatus::confirmed && !is_out_of_sight)
+    return trunk.status;
+  const bool is_placed = m_options.most_place_sigma == 0 || trunk.placeSigma() <= m_options.most_place_sigma;
+  return is_placed ? TrunkStatus::confirmed : TrunkStatus::candidate;
+}
+
 TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double breast_z) const
 {
   TrunkRecord record;
@@ -206,9 +219,8 @@ TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double br
   record.observations = trunk.observations;
   record.first_seen_s = trunk.first_seen_s;
   record.last_seen_s = trunk.last_seen_s;
-  const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
-  record.status = is_out_of_sight ? TrunkStatus::confirmed : trunk.status;
-  record.fate = trunk.fate;
+  record.status = statusOf(trunk);
+  record.fate = record.status == TrunkStatus::candidate ? TrunkFate::undecided : trunk.fate;
   return record;
 }
 
@@ -216,7 +228,7 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
 {
   std::vector<TrunkRecord> records;
   for (const MapTrunk &trunk : m_trunks)
-    records.push_back(recordOf(trunk, trunk.final_odds.value_or(evidence(trunk)), breast_z));
+    records.push_back(recordOf(trunk, logOdds(trunk), breast_z));
   for (const GivenUp &gone : m_given_up) {
     MapTrunk trunk;
     trunk.id = gone.id;
@@ -257,7 +269,7 @@ void TrunkMap::bury(MapUpdate &update, double now_s)
     gone.observations = trunk.observations;
     gone.status = trunk.status;
     gone.fate = trunk.fate;
-    gone.log_odds = static_cast<float>(evidence(trunk));
+    gone.log_odds = static_cast<float>(logOdds(trunk));
     gone.trunk = {static_cast<float>(trunk.trunk.xy.x()), static_cast<float>(trunk.trunk.xy.y()),
                   static_cast<float>(trunk.trunk.log_radius), static_cast<float>(trunk.trunk.lean.x()),
                   static_cast<float>(trunk.trunk.lean.y())};

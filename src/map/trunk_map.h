@@ -44,16 +44,16 @@ struct MapOptions
   double forget_s = 0;  ///< [s] since its last view
   bool at_once = false; ///< what is found is confirmed and stays, as in the paper: nothing is lost, merged or doubted
                         ///< until TrunkMap::end()
-  int confirm_observations = 10;        ///< views before a candidate may be confirmed, 2 to 1000
-  int confirm_predicted = 3;            ///< of them after it was found, where its place was predicted, 0 to 1000
-  double confirm_parallax = 0.05;       ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
-  double confirm_position_sigma = 0.40; ///< standard deviation of the place at which it may be [m], 0.01 to 10
-  double confirm_evidence = 0.5;        ///< log odds (TrunkMap::evidence) at which it may be, -20 to 20; higher: fewer
-                                        ///< trunks, and fewer that are none
+  int confirm_observations = 10;  ///< views before a candidate may be confirmed, 2 to 1000
+  int confirm_predicted = 3;      ///< of them after it was found, where its place was predicted, 0 to 1000
+  double confirm_parallax = 0.05; ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
+  double confirm_odds = 0;        ///< log odds (TrunkMap::logOdds) at which it is, in flight and at the end, -20 to 20;
+                                  ///< higher: fewer trunks, and fewer that are none
+  double most_place_sigma = 0; ///< standard deviation of the place beyond which records() has it as a candidate [m]; 0:
+                               ///< none is
   double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
                                    ///< does: how evenly its borders run along their length, 0 to 1,
   double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
-  double final_odds = -0.5;        ///< log odds by all frames at which it is one, -20 to 20
   int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
   double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
   double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
@@ -93,9 +93,10 @@ struct MapTrunk
   TrunkFate fate = TrunkFate::undecided;
   Trunk trunk; ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
-  int observations = 0;                     ///< summary factors
-  std::optional<Eigen::Vector3d> seen_from; ///< the camera's place at its last view [m]
-  int flipped_in_a_row = 0;                 ///< frames in which its borders had the other sign where they were expected
+  Eigen::Matrix2d place_covariance = Eigen::Matrix2d::Identity(); ///< as the pose that saw it last has it [m^2]
+  int observations = 0;                                           ///< summary factors
+  std::optional<Eigen::Vector3d> seen_from;                       ///< the camera's place at its last view [m]
+  int flipped_in_a_row = 0; ///< frames in which its borders had the other sign where they were expected
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
   int found_again = 0;                           ///< times the detector came to the same hypothesis later
   double contrast = 0;                           ///< running mean of the weaker border's
@@ -116,7 +117,7 @@ struct MapTrunk
 
   /// By how much the bearing of a border changed [rad]: sideways motion moves both, approach moves them apart.
   double parallax() const { return std::max(left.high - left.low, right.high - right.low); }
-  double positionSigma() const { return std::sqrt(covariance.topLeftCorner<2, 2>().trace()); } ///< [m]
+  double placeSigma() const { return std::sqrt(place_covariance.trace()); } ///< [m]
   /// Of the axis at the height \p z [m], the log radius and the lean.
   Matrix5d covarianceAt(double z) const;
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
@@ -194,7 +195,8 @@ struct TrunkEstimate
 {
   int id = 0;
   Trunk trunk;
-  std::optional<Matrix5d> covariance; ///< where it was asked for
+  std::optional<Matrix5d> covariance;                             ///< where it was asked for,
+  std::optional<Eigen::Matrix2d> place_covariance = std::nullopt; ///< and as the pose that saw it last has it
 };
 
 /// A hypothesis in the light of the whole flight.
@@ -290,10 +292,6 @@ public:
   /// The last word: those decided on are the trunks of the map, with their new views. Returns what the smoother is to
   /// forget: nothing else stays in it.
   std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
-  /// Whether a place with this covariance is known well enough for a trunk of the map.
-  bool isPlaced(const Matrix5d &covariance) const;
-  /// Trunks whose place is not known well enough are candidates again.
-  void doubtPlaces();
   /// Gives up all that is active: their ranges were guesses.
   MapUpdate forgetUnranged();
 
@@ -302,11 +300,15 @@ public:
   /// contrast, its radius and how well its place is known. A logistic regression on simulated flights: see
   /// trunk_evidence.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
+  /// Log-odds that decide: in flight by evidence() and by the columns, whichever says less, at the end by all frames.
+  double logOdds(const MapTrunk &trunk) const;
   /// [m] What radii to expect in this wood: its confirmed trunks tell, and before there are any
   /// MapOptions::usual_radius (a hierarchical prior).
   const LogNormal &radii() const { return m_radii; }
 
-  /// A trunk that was confirmed and is out of sight stays confirmed here.
+  /// As users get it: one that was confirmed and is out of sight is confirmed, one whose place is known less well than
+  /// is asked for a candidate.
+  TrunkStatus statusOf(const MapTrunk &trunk) const;
   /// \p breast_z: breast height in the world, where places are told [m].
   std::vector<TrunkRecord> records(double breast_z = kBreastHeight) const;
 

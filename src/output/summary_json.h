@@ -45,14 +45,15 @@ struct RunSummary
   bool has_ended = true;                       ///< false: it goes on, or was killed: no last look was taken
   WorldReference reference;                    ///< where scale and gravity come from
   std::map<FrameStatus, std::size_t> frames;
-  std::map<FrameStatus, std::string> reasons; ///< the first message of each status
-  std::vector<PictureGap> gaps;               ///< times without a picture that are far longer than usual
-  std::vector<SensorVerdict> sensors;         ///< sensors that contradict the others
-  double duration_s = 0;                      ///< from the first frame to the last
-  double path_m = 0;                          ///< length of the smoothed trajectory
-  double extent_m = 0;                        ///< farthest that the camera was from its first place
-  double rotated_deg = 0;                     ///< most that it was rotated from its first attitude
-  std::vector<TrunkRecord> trunks;            ///< and hypotheses
+  std::map<FrameStatus, std::string> reasons;            ///< the first message of each status
+  std::vector<PictureGap> gaps;                          ///< times without a picture that are far longer than usual
+  std::vector<SensorVerdict> sensors;                    ///< sensors that contradict the others
+  double duration_s = 0;                                 ///< from the first frame to the last
+  double path_m = 0;                                     ///< length of the smoothed trajectory
+  double extent_m = 0;                                   ///< farthest that the camera was from its first place
+  double rotated_deg = 0;                                ///< most that it was rotated from its first attitude
+  std::vector<TrunkRecord> trunks;                       ///< and hypotheses
+  Eigen::Vector2d first_place = Eigen::Vector2d::Zero(); ///< from which an error of the scale moves them away [m]
   TimingTable timing;
   std::map<std::string, double> figures; ///< anything else a stage counts, by name
 };

@@ -55,12 +55,22 @@ std::string framesText(const RunSummary &summary)
   return text + gapsText(summary.gaps);
 }
 
+/// Without the common error of the scale, which is told beside it.
+TrunkRecord amongThemselves(TrunkRecord trunk, const RunSummary &summary)
+{
+  Eigen::Matrix<double, 5, 1> by_scale;
+  by_scale << trunk.xy - summary.first_place, trunk.radius, 0, 0;
+  by_scale *= summary.reference.scale_sigma;
+  trunk.covariance -= by_scale * by_scale.transpose();
+  return trunk;
+}
+
 double medianOf(const RunSummary &summary, double (TrunkRecord::*sigma)() const)
 {
   std::vector<double> values;
   for (const TrunkRecord &trunk : summary.trunks)
     if (trunk.status == TrunkStatus::confirmed)
-      values.push_back((trunk.*sigma)());
+      values.push_back((amongThemselves(trunk, summary).*sigma)());
   return values.empty() ? NAN : bole::medianOf(std::move(values));
 }
 
@@ -100,9 +110,10 @@ void addFacts(Verdict &verdict, const RunSummary &summary)
       verdict.facts.push_back(fmt::format("{}: measured and taken out", constant.text));
   if (has_ranges)
     verdict.facts.push_back(
-        fmt::format("{} trunk{}, median sigma {} in place and {} in radius; {} other hypotheses", confirmed,
+        fmt::format("{} trunk{}, median sigma {} in place and {} in radius{}; {} other hypotheses", confirmed,
                     confirmed == 1 ? "" : "s", withUnit(medianOf(summary, &TrunkRecord::positionSigma), 3, "m"),
-                    withUnit(medianOf(summary, &TrunkRecord::radiusSigma), 3, "m"), summary.trunks.size() - confirmed));
+                    withUnit(medianOf(summary, &TrunkRecord::radiusSigma), 3, "m"),
+                    summary.reference.scale_sigma > 0 ? " at this scale" : "", summary.trunks.size() - confirmed));
   else
     verdict.facts.push_back(
         fmt::format("{} bearing{} of what looks like trunks", confirmed, confirmed == 1 ? "" : "s"));

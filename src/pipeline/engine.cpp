@@ -313,30 +313,33 @@ void Engine::keepNearby()
     m_smoother.keepTrunk(trunks[i]->smoother_id, i < kMost);
 }
 
+TrunkEstimate Engine::estimateOf(const MapTrunk &trunk, bool with_covariance) const
+{
+  TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
+  if (with_covariance) {
+    estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
+    estimate.place_covariance = m_smoother.placeCovariance(trunk.smoother_id);
+  }
+  return estimate;
+}
+
 /// Covariances are asked for where something was seen lately: that of a trunk farther back costs a walk to where it
 /// stood.
 void Engine::refreshMap(double seen_since_s)
 {
   for (const std::size_t i : m_map.active()) {
     const MapTrunk &trunk = m_map.trunks()[i];
-    TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
-    if (trunk.last_seen_s >= seen_since_s)
-      estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
-    m_map.refresh(estimate);
+    m_map.refresh(estimateOf(trunk, trunk.last_seen_s >= seen_since_s));
   }
 }
 
 /// Inactive candidates too; covariances where enough was seen for a decision.
 void Engine::refreshWholeMap()
 {
-  for (const MapTrunk &trunk : m_map.trunks()) {
-    if (trunk.removed)
-      continue;
-    TrunkEstimate estimate{trunk.id, m_smoother.trunk(trunk.smoother_id), std::nullopt};
-    if (!trunk.inactive || m_units.map.at_once || trunk.observations >= m_units.map.confirm_observations)
-      estimate.covariance = m_smoother.trunkCovariance(trunk.smoother_id);
-    m_map.refresh(estimate);
-  }
+  for (const MapTrunk &trunk : m_map.trunks())
+    if (!trunk.removed)
+      m_map.refresh(estimateOf(trunk, !trunk.inactive || m_units.map.at_once ||
+                                          trunk.observations >= m_units.map.confirm_observations));
 }
 
 void Engine::apply(const MapUpdate &update)
@@ -405,18 +408,18 @@ void Engine::finish()
     return;
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  if (m_units.flow.final_pass && m_motion->hasRanges()) {
+  if (m_units.flow.final_pass && m_motion->hasRanges())
     decideByAllFrames();
-    takeScale();
-    return;
-  }
-  const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
-  apply(update);
-  if (!update.merged.empty() || !update.removed.empty()) {
-    m_smoother.optimize(kSettled);
-    refreshWholeMap();
+  else {
+    const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
+    apply(update);
+    if (!update.merged.empty() || !update.removed.empty()) {
+      m_smoother.optimize(kSettled);
+      refreshWholeMap();
+    }
   }
   takeScale();
+  noteViews();
 }
 
 } // namespace bole

@@ -16,6 +16,7 @@
 #include <bole/pipeline.h>
 
 #include <deque>
+#include <map>
 
 namespace bole
 {
@@ -26,6 +27,7 @@ public:
 
   FrameReport process(const Frame &frame);
   void finish();
+  FrameReport review(std::size_t index) const;
 
   std::vector<TrunkRecord> map() const;
   WorldReference reference() const;
@@ -78,6 +80,7 @@ private:
   std::vector<TriangulatedRay> points() const;
   std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
   void keepNearby();
+  TrunkEstimate estimateOf(const MapTrunk &trunk, bool with_covariance) const;
   void refreshMap(double seen_since_s);
   void refreshWholeMap();
   void apply(const MapUpdate &update);
@@ -88,6 +91,8 @@ private:
                                  AlbumGradients &gradients) const;
   void detectLeaning(const TrunkMap &likely, AlbumGradients &gradients);
   void placeByColumns();
+  void noteViews();
+  bool isSeen(const MapTrunk &trunk, std::size_t pose) const;
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void followScale(double seconds_passed);
@@ -117,8 +122,9 @@ private:
   Album m_album; ///< frames for the last look at the flight
   TrunkMap m_map;
   std::vector<Judged> m_judged;
-  Trajectory m_online;                    ///< in units of the motion
-  Vector6d m_velocity = Vector6d::Zero(); ///< of the body, in its frame, units of the motion
+  std::map<std::size_t, std::vector<std::size_t>> m_views; ///< poses that saw each trunk of the smoother, at the end
+  Trajectory m_online;                                     ///< in units of the motion
+  Vector6d m_velocity = Vector6d::Zero();                  ///< of the body, in its frame, units of the motion
 };
 
 /// Frames that are kept, at the present poses.

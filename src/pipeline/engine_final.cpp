@@ -96,8 +96,8 @@ std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypothese
   return found;
 }
 
-/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds, and has well placed,
-/// keeps its views unless the new ones are better.
+/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds keeps its views unless
+/// the new ones are better.
 std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
                                                AlbumGradients &gradients) const
 {
@@ -129,7 +129,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
     const MapTrunk &known = m_map.trunk(likely[i].id);
-    const bool is_held = !known.removed && m_map.isPlaced(known.covariance) && reading.is_seen;
+    const bool is_held = !known.removed && reading.is_seen;
     if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
       reading.judged = likely[i];
       reading.views.reset();
@@ -180,6 +180,8 @@ void Engine::placeByColumns()
       continue;
     TrunkEstimate estimate = endedByDepth({trunk.id, trunk.trunk, trunk.covariance}, views, farthestJudged());
     estimate.trunk = placedByBark(estimate.trunk, views, farthestJudged());
+    estimate.place_covariance =
+        trunk.place_covariance + (*estimate.covariance - trunk.covariance).topLeftCorner<2, 2>();
     m_map.refresh(estimate);
   }
 }
@@ -189,9 +191,6 @@ void Engine::decideByAllFrames()
 {
   constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
   constexpr double kHides = 0.5;   // log-odds at which one hides what leans behind it
-  MapOptions unsure = m_units.map; // metres are as sure as the scale is: those of a plain video are a guess
-  unsure.confirm_position_sigma *= std::exp(m_motion->scale().sigma);
-  m_map.setOptions(unsure);
   const std::vector<LevelView> views = levelViews(m_album.frames());
   const std::vector<Judged> before = judgeAll(views);
   AlbumGradients gradients(m_album.frames(), m_units.gradient);
@@ -201,15 +200,10 @@ void Engine::decideByAllFrames()
   std::vector<Reading> readings =
       readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views, gradients);
   std::vector<Judged> again;
-  for (const Reading &reading : readings) {
-    if (!reading.judged)
-      continue;
-    const Matrix5d &covariance =
-        reading.views ? reading.views->trunk.covariance : m_map.trunk(reading.judged->id).covariance;
-    if (m_map.isPlaced(covariance)) // else it would keep another reading of the same lines away, and go in the end
+  for (const Reading &reading : readings)
+    if (reading.judged)
       again.push_back(*reading.judged);
-  }
-  const std::vector<Judged> chosen = chooseSet(again, m_units.map.final_odds, apart, views, farthestJudged());
+  const std::vector<Judged> chosen = chooseSet(again, m_units.map.confirm_odds, apart, views, farthestJudged());
   std::map<int, TrunkDecision> decisions;
   for (const Judged &one : m_judged)
     decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
@@ -228,6 +222,5 @@ void Engine::decideByAllFrames()
   m_smoother.optimize(kSettled);
   refreshWholeMap();
   placeByColumns();
-  m_map.doubtPlaces();
 }
 } // namespace bole

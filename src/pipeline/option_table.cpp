@@ -93,7 +93,7 @@ std::vector<OptionEntry> optionTable(Options &o)
 {
   return {
       {"camera.height", &o.camera.height, 0, 100, "m",
-       "camera over the ground, 0 unknown: the scale of a video without odometry"},
+       "camera over the ground in the mean of the flight, 0 unknown: the scale of a video without odometry"},
       {"camera.focal_sigma", &o.camera.focal_sigma, 0, 1, "",
        "standard deviation of the logarithm of the focal length; 0: calibrated"},
       {"camera.rate", &o.camera.rate, 0, 100, "1/s",
@@ -143,9 +143,11 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"map.policy", &o.map.policy, 0, 1, "",
        "earned: a trunk is confirmed once enough speaks for it; paper: the paper's method as printed, all of it"},
       {"map.confirm_probability", &o.map.confirm_probability, 1e-6, 1 - 1e-6, "",
-       "that a candidate is a trunk, at which it is confirmed; higher: fewer, and fewer false ones"},
-      {"map.confirm_sigma", &o.map.confirm_sigma, 0.01, 10, "m",
-       "standard deviation of its place at which it may be confirmed"},
+       "that a candidate is a trunk, at which it is confirmed, in flight and at the end; higher: fewer, and fewer "
+       "false "
+       "ones"},
+      {"map.confirm_sigma", &o.map.confirm_sigma, 0, 10, "m",
+       "leaves out trunks whose place from where they were seen has a larger standard deviation; 0: none"},
       {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
       {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
        "a candidate not seen for longer is no longer looked for, a trunk only while its bearing is known to its width"},

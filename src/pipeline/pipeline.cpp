@@ -97,6 +97,7 @@ FrameReport Pipeline::take(const Frame &frame)
   return m_engine->process(frame);
 }
 void Pipeline::finish() { m_engine->finish(); }
+FrameReport Pipeline::review(std::size_t index) const { return m_engine->review(index); }
 std::vector<TrunkRecord> Pipeline::map() const { return m_engine->map(); }
 WorldReference Pipeline::reference() const { return m_engine->reference(); }
 Trajectory Pipeline::smoothedTrajectory() const { return m_engine->smoothedTrajectory(); }

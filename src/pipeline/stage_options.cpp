@@ -98,8 +98,8 @@ void setRange(StageOptions &o, const Options::Range &range)
 void setMap(StageOptions &o, const Options &options)
 {
   const Options::Map &map = options.map;
-  o.map.confirm_evidence = std::log(map.confirm_probability / (1 - map.confirm_probability));
-  o.map.confirm_position_sigma = map.confirm_sigma;
+  o.map.confirm_odds = std::log(map.confirm_probability / (1 - map.confirm_probability));
+  o.map.most_place_sigma = map.confirm_sigma;
   o.map.merge_distance = map.merge_distance;
   o.map.candidate_memory_s = map.candidate_memory;
   const auto poses = static_cast<int>(std::lround(map.lag * rateOf(options)));

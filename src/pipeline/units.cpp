@@ -22,7 +22,7 @@ StageOptions inUnits(StageOptions options, double metres)
                          &detection.radius_min,
                          &detection.radius_max,
                          &detection.near_range,
-                         &map.confirm_position_sigma,
+                         &map.most_place_sigma,
                          &map.near_range,
                          &map.through_range,
                          &map.usual_radius,

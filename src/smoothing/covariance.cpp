@@ -70,6 +70,24 @@ Matrix5d Smoother::State::trunkCovariance(int trunk)
   return inverseForm<5>(&state.variable, &X, 1);
 }
 
+/// Of what is closed, the oldest pose that is open has to do for the one that saw it.
+Eigen::Matrix2d Smoother::State::placeCovariance(int trunk)
+{
+  const TrunkState &seen = trunks[trunk];
+  if (!isOpen(seen.variable))
+    return seen.closed_place_covariance;
+  const PoseState &from = poses[std::max(seen.last_pose, oldest_open_pose)];
+  if (!variables[seen.variable].eliminated || !variables[from.variable].eliminated)
+    return seen.prior.sigma.head<2>().cwiseAbs2().asDiagonal();
+  const Pose wMb = estimate(from);
+  const Eigen::Vector2d offset = estimate(seen).xy - wMb.t.head<2>();
+  const int ids[2] = {from.variable, seen.variable};
+  Eigen::Matrix<double, 2, 6> X[2];
+  X[0] << -wMb.R.topRows<2>(), Eigen::Vector2d(offset.y(), -offset.x()) * wMb.R.row(2);
+  X[1].setIdentity();
+  return inverseForm<2>(ids, X, 2);
+}
+
 Matrix6d Smoother::State::poseCovariance(int pose)
 {
   const PoseState &state = poses[pose];

@@ -18,6 +18,7 @@ void Smoother::State::closeVariable(int id)
   }
   else {
     trunks[v.number].closed_covariance = trunkCovariance(v.number);
+    trunks[v.number].closed_place_covariance = placeCovariance(v.number);
     trunks[v.number].point = estimate(trunks[v.number]);
     trunks[v.number].variable = -1;
   }

@@ -217,6 +217,13 @@ Matrix5d Smoother::trunkCovariance(std::size_t trunk) const
   return m_state->trunkCovariance(static_cast<int>(trunk));
 }
 
+Eigen::Matrix2d Smoother::placeCovariance(std::size_t trunk) const
+{
+  m_state->checkTrunk(trunk);
+  require(!m_state->poses.empty(), "placeCovariance, must follow addFirstPose");
+  return m_state->placeCovariance(static_cast<int>(trunk));
+}
+
 Matrix6d Smoother::poseCovariance(std::size_t pose) const
 {
   m_state->checkPose(pose);

@@ -114,6 +114,7 @@ struct TrunkState
   bool removed = false;
   bool is_kept = false; ///< open whenever it was seen last
   Matrix5d closed_covariance = Matrix5d::Zero();
+  Eigen::Matrix2d closed_place_covariance = Eigen::Matrix2d::Zero();
 };
 
 /// Poses between two whose covariance is taken on closing: it is a walk through the whole lag, and changes slowly.
@@ -228,6 +229,7 @@ public:
   Eigen::Matrix<double, Columns, Columns> inverseForm(const int *variable, const Eigen::Matrix<double, Columns, 6> *X,
                                                       int count);
   Matrix5d trunkCovariance(int trunk);
+  Eigen::Matrix2d placeCovariance(int trunk);
   Matrix6d poseCovariance(int pose);
   template <int Columns>
   Eigen::Matrix<double, Columns, Columns> relativeCovariance(int trunk, const Eigen::Matrix<double, Columns, 4> &which);

@@ -47,7 +47,7 @@ const std::vector<Step> kSteps = {
      }},
     {"log-odds not asked before confirmation",
      [](StageOptions &o) {
-       o.map.confirm_evidence = -20;
+       o.map.confirm_odds = -20;
        o.map.doubt_candidate = o.map.doubt_confirmed = -50;
      }},
     {"saliency inside a trunk not asked", [](StageOptions &o) { o.map.near_range = 0; }},

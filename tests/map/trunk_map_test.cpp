@@ -207,8 +207,8 @@ TEST_F(Life, AHypothesisThatCouldNotBeConfirmedItselfKeepsNoOtherBack)
     });
   };
   const int narrow = add(trunkAt(3, 1, 0.15)), wide = add(trunkAt(3, 1, 0.22));
-  seenWith(narrow, m_options.confirm_evidence + 0.2);
-  seenWith(wide, m_options.confirm_evidence - 0.2); // and holds the other, which speaks for it by 1
+  seenWith(narrow, m_options.confirm_odds + 0.2);
+  seenWith(wide, m_options.confirm_odds - 0.2); // and holds the other, which speaks for it by 1
   review();
   EXPECT_EQ(at(narrow).status, TrunkStatus::confirmed);
   EXPECT_NE(at(wide).status, TrunkStatus::confirmed);
@@ -261,7 +261,6 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
   };
   const std::vector<Case> cases = {
       {"parallax", [](MapTrunk &t) { t.left = t.right = {}; }},
-      {"place", [&](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e4; }},
       {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
       {"misses", [&](MapTrunk &t) { t.misses = 20 * t.hits; }},
@@ -278,6 +277,53 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
       review();
       EXPECT_EQ(at(trunk).status == TrunkStatus::confirmed, !is_spoilt) << c.what;
     }
+}
+
+TEST_F(Life, WhereItStandsInTheWorldDecidesNothing)
+{
+  const int trunk = add(trunkAt(3, 1)), unsure = add(trunkAt(3, -4));
+  see(trunk, 20);
+  see(unsure, 20);
+  const double before = m_map.logOdds(at(trunk));
+  change(trunk, [](MapTrunk &t) { t.covariance.topLeftCorner<2, 2>() *= 1e6; }); // the path has drifted by 14 m
+  change(unsure, [](MapTrunk &t) { t.place_covariance *= 1e4; });
+  EXPECT_EQ(m_map.logOdds(at(trunk)), before);
+  EXPECT_LT(m_map.logOdds(at(unsure)), before - 1);
+  review();
+  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+}
+
+TEST_F(Life, APlaceThatIsKnownLessWellThanAskedForLeavesATrunkOutOfTheRecordsAlone)
+{
+  for (const double most : {0.0, 0.5, 2.0}) {
+    m_options.most_place_sigma = most;
+    m_map = TrunkMap(m_options);
+    const int trunk = confirmed(trunkAt(3, 1));
+    change(trunk, [](MapTrunk &t) { t.place_covariance = 0.5 * Eigen::Matrix2d::Identity(); }); // 1 m
+    const bool is_left_out = most == 0.5;
+    EXPECT_EQ(m_map.records()[0].status, is_left_out ? TrunkStatus::candidate : TrunkStatus::confirmed) << most;
+    EXPECT_EQ(m_map.records()[0].fate, is_left_out ? TrunkFate::undecided : TrunkFate::none) << most;
+    EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+  }
+}
+
+TEST_F(Life, TheProbabilityThatIsToldIsTheOneThatDecides)
+{
+  const double least = 1 / (1 + std::exp(-m_options.confirm_odds));
+  for (const double columns : {-0.1, 0.1}) {
+    m_map = TrunkMap(m_options);
+    const int trunk = add(trunkAt(3, 1));
+    see(trunk, 20);
+    EXPECT_GT(m_map.logOdds(at(trunk)), m_options.confirm_odds + 0.2);
+    m_map.record(ColumnOdds{trunk, m_options.confirm_odds + columns, 6, 0});
+    review();
+    EXPECT_EQ(at(trunk).status == TrunkStatus::confirmed, columns > 0);
+    EXPECT_EQ(m_map.records()[0].probability >= least, columns > 0);
+  }
+  const int judged = confirmed(trunkAt(9, 1));
+  m_map.decide({{judged, m_options.confirm_odds + 0.3, true, std::nullopt}});
+  EXPECT_NEAR(m_map.records()[static_cast<std::size_t>(judged)].probability,
+              1 / (1 + std::exp(-m_options.confirm_odds - 0.3)), 1e-9);
 }
 
 TEST_F(Life, WhatDidNotMoveLikeSomethingNearLosesOdds)
@@ -335,7 +381,7 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
             after([](MapTrunk &t) { t.points_behind = 10; }) + 0.5);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius += 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius -= 1; }), odds);
-  EXPECT_LT(after([](MapTrunk &t) { t.covariance *= 9; }), odds);
+  EXPECT_LT(after([](MapTrunk &t) { t.place_covariance *= 9; }), odds);
 }
 
 TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)

@@ -52,7 +52,7 @@ protected:
 TEST_F(TrunkMapper, MapsTheDemonstrationFlightAndKnowsWhereItIs)
 {
   EXPECT_GE(s_mapper->getTrunks().size(), 6u);
-  const double least = 1 / (1 + std::exp(-MapOptions().final_odds)); // what the last decision asks for
+  const double least = Options().map.confirm_probability;
   for (const TrunkRecord &trunk : s_mapper->getTrunks()) {
     EXPECT_EQ(trunk.status, TrunkStatus::confirmed);
     EXPECT_GE(trunk.probability, least) << trunk.id;

@@ -41,6 +41,24 @@ TEST(Verdict, AGoodRunTellsItsFiguresAndDoubtsNothing)
   EXPECT_THAT(toText(verdict), HasSubstr("1 trunk, median sigma 0.050 m in place and 0.010 m in radius; 1 other"));
 }
 
+TEST(Verdict, TellsTheSigmasOfTrunksAmongThemselvesAndThatOfTheScaleApart)
+{
+  RunSummary summary = goodRun();
+  TrunkRecord &trunk = summary.trunks[0];
+  summary.reference.scale = ScaleSource::prior;
+  summary.reference.scale_sigma = 0.15;
+  summary.first_place = {1, 2};
+  trunk.xy = {9, -4};
+  trunk.radius = 0.2;
+  Eigen::Matrix<double, 5, 1> by_scale;
+  by_scale << 8, -6, 0.2, 0, 0; // from the first place
+  by_scale *= summary.reference.scale_sigma;
+  trunk.covariance += by_scale * by_scale.transpose();
+  ASSERT_GT(trunk.positionSigma(), 1.5);
+  EXPECT_THAT(textOf(summary), HasSubstr("(+- 15 %)"));
+  EXPECT_THAT(textOf(summary), HasSubstr("median sigma 0.050 m in place and 0.010 m in radius at this scale; 1 other"));
+}
+
 TEST(Verdict, TellsWhichFramesWereNotOkAndWhy)
 {
   RunSummary summary = goodRun();

@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -42,6 +44,39 @@ TEST(Pipeline, MapsFromFramesFilledByHandWithImageStampAndOdometry)
   EXPECT_GE(found, 3);
   EXPECT_FALSE(report.trunks.empty());
   EXPECT_FALSE(report.map.empty());
+}
+
+TEST(Pipeline, AFrameOfBeforeIsReviewedWithTheMapAndThePathThatTheFlightEndedWith)
+{
+  constexpr std::size_t kFrames = 30;
+  Pipeline pipeline(kCamera, kMount);
+  for (std::size_t k = 0; k < kFrames; ++k)
+    pipeline.process(byHand(static_cast<int>(k)));
+  pipeline.finish();
+  const Trajectory smoothed = pipeline.smoothedTrajectory();
+  std::map<int, TrunkRecord> map;
+  for (const TrunkRecord &trunk : pipeline.map())
+    if (trunk.status == TrunkStatus::confirmed)
+      map[trunk.id] = trunk;
+  ASSERT_GE(map.size(), 3u);
+  std::map<int, int> views;
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    const FrameReport report = pipeline.review(k);
+    EXPECT_EQ(report.index, k);
+    EXPECT_EQ(report.stamp_ns, smoothed[k].stamp_ns);
+    EXPECT_LT(report.wMb.minus(smoothed[k].wMb).norm(), 1e-12);
+    for (const TrunkInView &seen : report.trunks) {
+      ASSERT_EQ(map.count(seen.id), 1u);
+      EXPECT_EQ(seen.status, TrunkStatus::confirmed);
+      views[seen.id] += seen.is_tracked;
+      const Trunk trunk = knownTrunk(report, seen.id)->trunk;
+      EXPECT_LT((trunk.axisAt(kBreastHeight).head<2>() - map[seen.id].xy).norm(), 1e-9);
+      EXPECT_NEAR(seen.distance, (trunk.axisAt(report.wMc.t.z()) - report.wMc.t).head<2>().norm(), 1e-9);
+    }
+  }
+  for (const auto &[id, trunk] : map) // also in the first frames, when nothing was known of it
+    EXPECT_GE(views[id], trunk.observations) << id;
+  EXPECT_THROW(pipeline.review(kFrames), vpException);
 }
 
 TEST(Pipeline, MeasuresTheRateOfItsFrames)

@@ -48,7 +48,7 @@ TEST(StageOptions, OfTheDefaultsAreTheStagesDefaultsForACameraOf200Px)
   EXPECT_EQ(made.flow.view_spacing, defaults.flow.view_spacing);
   EXPECT_EQ(made.points.frames_back, defaults.points.frames_back);
   EXPECT_EQ(made.smoothing.fixed_lag, 0);
-  EXPECT_NEAR(made.map.confirm_evidence, defaults.map.confirm_evidence, 1e-3);
+  EXPECT_NEAR(made.map.confirm_odds, defaults.map.confirm_odds, 1e-3);
   EXPECT_EQ(valuesOf(made.saliency), valuesOf(defaults.saliency));
 }
 

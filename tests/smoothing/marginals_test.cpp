@@ -3,6 +3,7 @@
 #include "support/flight.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 #include <gmock/gmock.h>
 #include <limits>
@@ -45,6 +46,80 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
     EXPECT_TRUE(smoother.relativeCovariance(j).isApprox(expected, 1e-4)) << j;
     EXPECT_NEAR(smoother.bearingVariance(j), expected(2, 2), 1e-4 * expected(2, 2)) << j;
   }
+}
+
+namespace
+{
+/// Of x and y of a trunk as a pose has them, along the axes of the world there.
+Eigen::Vector2d placeSeenFrom(const Pose &wMb, const Trunk &trunk, double heading)
+{
+  const double turned = std::atan2(wMb.R(1, 0), wMb.R(0, 0)) - heading;
+  return Eigen::Rotation2Dd(-turned) * (trunk.xy - wMb.t.head<2>());
+}
+} // namespace
+
+TEST(Marginals, OfAPlaceAsTheLastPoseHasItThatSawItAgreeWithTheWholeSystem)
+{
+  FlightOptions o;
+  o.poses = 50;
+  const Flight flight = simulateFlight(o);
+  Replay replay(flight, smootherFor(o));
+  replay.run();
+  Smoother &smoother = replay.smoother;
+  smoother.optimize(1e-12);
+  DenseReference dense(smoother.graph());
+  const Eigen::MatrixXd C = dense.covariance();
+  for (std::size_t j = 0; j < dense.graph().trunks.size(); ++j) {
+    std::size_t last = 0;
+    for (const Graph::ObservationEdge &view : dense.graph().observations)
+      if (view.trunk == j)
+        last = std::max(last, view.pose);
+    const Pose wMb = smoother.pose(last);
+    const Trunk trunk = smoother.trunk(j);
+    const double heading = std::atan2(wMb.R(1, 0), wMb.R(0, 0));
+    Eigen::Matrix<double, 2, 11> J; // by central differences
+    constexpr double kStep = 1e-5;
+    for (int k = 0; k < 11; ++k) {
+      const auto at = [&](double by) {
+        const Vector6d of_pose = k < 6 ? Vector6d(by * Vector6d::Unit(k)) : Vector6d::Zero();
+        const Vector5d of_trunk = k < 6 ? Vector5d::Zero() : Vector5d(by * Vector5d::Unit(k - 6));
+        return placeSeenFrom(wMb.plus(of_pose), trunk.plus(of_trunk), heading);
+      };
+      J.col(k) = (at(kStep) - at(-kStep)) / (2 * kStep);
+    }
+    const int p = dense.poseRow(last), t = dense.trunkRow(j);
+    Eigen::Matrix<double, 11, 11> joint;
+    joint << C.block(p, p, 6, 6), C.block(p, t, 6, 5), C.block(t, p, 5, 6), C.block(t, t, 5, 5);
+    EXPECT_TRUE(smoother.placeCovariance(j).isApprox(J * joint * J.transpose(), 1e-3)) << j;
+  }
+}
+
+TEST(Marginals, APlaceAsSeenIsAsWellKnownHoweverFarThePathHasDrifted)
+{
+  FlightOptions o;
+  o.poses = 800;
+  const Flight flight = simulateFlight(o);
+  SmootherOptions options = smootherFor(o);
+  Replay whole(flight, options);
+  whole.run();
+  options.fixed_lag = 60;
+  Replay window(flight, options);
+  window.run();
+  const auto place = [](const Replay &replay, int trunk) {
+    return std::sqrt(replay.smoother.placeCovariance(static_cast<std::size_t>(replay.trunk_id[trunk])).trace());
+  };
+  const auto inWorld = [](const Replay &replay, int trunk) {
+    const auto id = static_cast<std::size_t>(replay.trunk_id[trunk]);
+    return std::sqrt(replay.smoother.trunkCovariance(id).topLeftCorner<2, 2>().trace());
+  };
+  double early = 0, late = 0, early_in_world = 0, late_in_world = 0;
+  for (int trunk = 0; trunk < 36; ++trunk) {                                  // passed by the end
+    EXPECT_NEAR(place(window, trunk) / place(whole, trunk), 1, 0.2) << trunk; // one that the lag closed, too
+    (trunk < 18 ? early : late) += place(whole, trunk);
+    (trunk < 18 ? early_in_world : late_in_world) += inWorld(whole, trunk);
+  }
+  EXPECT_GT(late_in_world, 2 * early_in_world);
+  EXPECT_NEAR(late / early, 1, 0.2);
 }
 
 /// Share of runs whose NEES, summed over trunks (or averaged over poses), lies in its 95 %

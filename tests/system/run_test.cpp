@@ -2,11 +2,17 @@
 // What is left of a run that does not go to its end, or is not worth much.
 #include "run_bole.h"
 
+#include "output/flight_trace.h"
+#include "output/trunks_csv.h"
+#include <bole/open_source.h>
+
 #include <gmock/gmock.h>
 
 #include <bole/visp.h>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <fmt/format.h>
 #include <random>
 #include <sys/wait.h>
 #include <thread>
@@ -70,6 +76,46 @@ TEST_P(Interrupted, KeepsWhatIsKnownAndReturns130)
   EXPECT_EQ(hiddenFiles(folder), 0u);
 }
 INSTANTIATE_TEST_SUITE_P(Signals, Interrupted, testing::Values(SIGINT, SIGTERM, SIGHUP, SIGPIPE));
+
+/// Pixels of the first picture of a video that are far from those of the flight's, without the bar of text.
+std::size_t drawnOnTheFirstPicture(const std::string &video)
+{
+  vpImage<unsigned char> picture;
+  vpImageIo::read(picture, kFlight + "/mav0/cam0/data/0000000000000.png");
+  bole::Frame frame;
+  EXPECT_TRUE(bole::openSource(video)->next(frame));
+  std::size_t drawn = 0;
+  const unsigned factor = frame.image.getWidth() / picture.getWidth();
+  for (unsigned v = 0; v < picture.getHeight(); ++v)
+    for (unsigned u = 0; u < picture.getWidth(); ++u)
+      drawn += std::abs(int(picture[v][u]) - frame.image[factor * v + factor / 2][factor * u + factor / 2]) > 80;
+  return drawn;
+}
+
+TEST(Run, TheOverlayOfAFileShowsTheFinalMapAndWithOnlineTheMapInFlight)
+{
+  const std::string final_map = freshFolder("overlay_final"), in_flight = freshFolder("overlay_online");
+  const std::string flight = "track " + kFlight + " --frames 30 -q --set stages.saliency=false -o ";
+  ASSERT_EQ(run(flight + final_map).status, 0);
+  ASSERT_EQ(run(flight + in_flight + " --online").status, 0);
+  EXPECT_LT(drawnOnTheFirstPicture(in_flight + "/overlay.mp4"), 30u); // nothing is known of it then
+  EXPECT_GT(drawnOnTheFirstPicture(final_map + "/overlay.mp4"), 100u);
+}
+
+TEST(Run, HasAPictureAndViewsOfEachTrunk)
+{
+  const std::string folder = freshFolder("pictures");
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " -q --no-video").status, 0);
+  const std::vector<bole::TrunkRecord> trunks = bole::readTrunks(folder + "/trunks.csv");
+  const bole::FlightTrace trace = bole::readTrace(folder);
+  EXPECT_GE(trunks.size(), 6u);
+  for (const bole::TrunkRecord &trunk : trunks) {
+    EXPECT_TRUE(fs::exists(fmt::format("{}/views/{}.jpg", folder, trunk.id))) << trunk.id;
+    const auto views = std::count_if(trace.views.begin(), trace.views.end(),
+                                     [&](const bole::TrunkTrace &view) { return view.id == trunk.id; });
+    EXPECT_GE(views, trunk.observations) << trunk.id;
+  }
+}
 
 TEST(Run, AVideoThatCannotBeWrittenCostsNothingElse)
 {
