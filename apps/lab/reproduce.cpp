@@ -9,6 +9,7 @@
 #include "geometry/median.h"
 #include "input/asl_source.h"
 #include "input/atomic_file.h"
+#include "input/csv_reader.h"
 #include "lab/simulation/simulated_flight.h"
 #include "output/figure.h"
 #include "output/page.h"
@@ -156,7 +157,7 @@ std::string csvOf(const std::vector<std::vector<std::string>> &rows)
   const auto add = [&](const std::vector<std::string> &cells) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::string cell = cells[i].substr(std::min(cells[i].find_first_not_of(' '), cells[i].size()));
-      text += (i > 0 ? "," : "") + (cell.find(',') == std::string::npos ? cell : '"' + cell + '"');
+      text += (i > 0 ? "," : "") + csvField(cell);
     }
     text += '\n';
   };

@@ -7,6 +7,7 @@
 #include "overlay_window.h"
 
 #include "input/atomic_file.h"
+#include "input/csv_reader.h"
 #include "lab/trials/error_curves.h"
 #include "lab/trials/failure_sheet.h"
 #include "lab/trials/median_interval.h"
@@ -105,7 +106,7 @@ std::string csvOf(const std::vector<ServoTrialResult> &results)
   for (const Column &column : kColumns)
     text += fmt::format(",{}", column.name);
   for (const ServoTrialResult &result : results) {
-    text += fmt::format("\n{},{:d},{}", result.seed, result.is_success, result.outcome);
+    text += fmt::format("\n{},{:d},{}", result.seed, result.is_success, csvField(result.outcome));
     for (const Column &column : kColumns)
       text += std::isnan(result.*column.value) ? "," : fmt::format(",{:.4f}", result.*column.value);
   }

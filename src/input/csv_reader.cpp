@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/csv_reader.h"
 #include "geometry/failure.h"
+#include "geometry/parse_number.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -18,8 +19,6 @@ std::string_view trimmed(std::string_view text)
     return {};
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
-
-constexpr std::string_view kUtf16Marks[] = {"\xFF\xFE", "\xFE\xFF"};
 
 /// "stamp,0,142302,-0,176885": no point anywhere, and every second field is a fraction of at least two digits.
 bool hasDecimalCommas(const std::vector<std::string> &fields)
@@ -37,12 +36,17 @@ bool hasDecimalCommas(const std::vector<std::string> &fields)
   return true;
 }
 
-/// A first line of names, written without the '#': it begins with a letter and is no number.
-bool isHeader(std::string_view line)
+bool isDigit(char c) { return c >= '0' && c <= '9'; }
+
+/// A row of names, written without the '#': the first holds no digit, none begins like a number.
+bool isHeader(const std::vector<std::string> &fields)
 {
-  const char first = line.front();
-  const bool is_word = (first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z') || first == '"' || first == '_';
-  return is_word && line.substr(0, 3) != "nan" && line.substr(0, 3) != "inf";
+  const auto is_value = [](const std::string &field) {
+    return field == "nan" || field == "inf" ||
+           (!field.empty() && (isDigit(field.front()) || field.find_first_of("+-.") == 0));
+  };
+  return std::none_of(fields.front().begin(), fields.front().end(), isDigit) &&
+         std::none_of(fields.begin(), fields.end(), is_value);
 }
 
 /// What a message may quote of a file: its beginning, on one line and without what a terminal would obey.
@@ -57,93 +61,120 @@ std::string shownField(std::string_view text)
 }
 
 constexpr std::int64_t kFarthest_s = 4'000'000'000; ///< of a stamp from the epoch: in ns differences fit as well
-constexpr std::int64_t kFarthest_ns = kFarthest_s * 1'000'000'000;
 
 /// Seconds in decimal notation as nanoseconds, without a detour through floating point.
-bool parseSeconds(std::string_view text, std::int64_t &stamp_ns)
+std::optional<std::int64_t> parseSeconds(std::string_view text)
 {
-  const auto point = text.find('.');
-  const std::string_view whole = text.substr(0, point);
-  std::string fraction(point == std::string_view::npos ? "" : text.substr(point + 1));
-  if (whole.empty() || fraction.find_first_not_of("0123456789") != std::string::npos)
-    return false;
-  fraction = (fraction + "000000000").substr(0, 9);
-  std::int64_t seconds = 0, nanoseconds = 0;
-  const auto end = whole.data() + whole.size();
-  if (std::from_chars(whole.data(), end, seconds).ptr != end || seconds < -kFarthest_s || seconds > kFarthest_s)
-    return false;
-  std::from_chars(fraction.data(), fraction.data() + fraction.size(), nanoseconds);
-  stamp_ns = seconds * 1'000'000'000 + (whole.front() == '-' ? -nanoseconds : nanoseconds);
-  return true;
+  const auto point = std::min(text.find('.'), text.size());
+  const std::string fraction(text.substr(std::min(point + 1, text.size())));
+  const auto seconds = parseNumber<std::int64_t>(text.substr(0, point));
+  const auto nanoseconds = parseNumber<std::int64_t>((fraction + "000000000").substr(0, 9));
+  if (!seconds || !nanoseconds || *seconds < -kFarthest_s || *seconds > kFarthest_s ||
+      !std::all_of(fraction.begin(), fraction.end(), isDigit))
+    return std::nullopt;
+  return *seconds * 1'000'000'000 + (text.front() == '-' ? -*nanoseconds : *nanoseconds);
 }
 } // namespace
 
 CsvReader::CsvReader(const std::string &path, CsvFormat format) : m_lines(path), m_format(std::move(format))
 {
+  const bool has_row = readRecord();
+  if (has_row && (!m_format.header.empty() || isHeader(m_fields)))
+    m_header = m_fields;
+  m_is_pending = has_row && m_header.empty();
   if (m_format.header.empty())
     return;
-  m_lines.next();
-  if (trimmed(m_lines.line()) != m_format.header)
-    fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(trimmed(m_lines.line())), m_format.header));
+  if ((m_record + ',').rfind(m_format.header + ',', 0) != 0)
+    fail(fmt::format("the header is \"{}\", must be \"{}\"", shownField(m_record), m_format.header));
+  m_columns = m_header.size();
 }
 
-void CsvReader::fail(const std::string &message) const
-{
-  throw ioError("{}:{}: {}", m_lines.name(), m_lines.number(), message);
-}
+void CsvReader::fail(const std::string &message) const { throw ioError("{}:{}: {}", m_lines.name(), m_line, message); }
 
-void CsvReader::split(const std::string &line)
+/// The next row, with the lines in which a quoted field of it goes on; false at the end.
+bool CsvReader::readRecord()
 {
-  m_fields.clear();
-  std::size_t begin = 0;
-  while (begin <= line.size()) {
-    if (m_format.separator == ' ') {
-      begin = line.find_first_not_of(" \t", begin);
-      if (begin == std::string::npos)
-        break;
-    }
-    const std::size_t end =
-        std::min(m_format.separator == ' ' ? line.find_first_of(" \t", begin) : line.find(m_format.separator, begin),
-                 line.size());
-    m_fields.emplace_back(trimmed(std::string_view(line).substr(begin, end - begin)));
-    begin = end + 1;
+  constexpr std::size_t kLongest = 1'000'000;
+  const auto quotes = [](const std::string &line) { return std::count(line.begin(), line.end(), '"'); };
+  do {
+    if (!m_lines.next())
+      return false;
+    m_line = m_lines.number();
+    m_record = trimmed(m_lines.line());
+    if (m_line == 1 && (m_record.rfind("\xFF\xFE", 0) == 0 || m_record.rfind("\xFE\xFF", 0) == 0))
+      fail("is text in UTF-16, must be in UTF-8");
+  } while (m_record.empty() || m_record.front() == '#');
+  for (auto count = quotes(m_record); count % 2 == 1; count += quotes(m_lines.line())) {
+    if (m_record.size() > kLongest || !m_lines.next())
+      fail("a quote is never closed");
+    m_record += '\n' + m_lines.line();
   }
+  split();
+  return true;
+}
+
+void CsvReader::split()
+{
+  const auto is_separator = [this](char c) {
+    return c == m_format.separator || (m_format.separator == ' ' && c == '\t');
+  };
+  m_fields.clear();
+  for (std::size_t begin = 0, end = 0; begin <= m_record.size(); begin = end + 1) {
+    bool is_quoted = false;
+    for (end = begin; end < m_record.size() && (is_quoted || !is_separator(m_record[end])); ++end)
+      is_quoted = is_quoted != (m_record[end] == '"');
+    std::string field(trimmed(std::string_view(m_record).substr(begin, end - begin)));
+    if (m_format.separator == ' ' && field.empty())
+      continue; // in a run of blanks
+    if (field.size() > 1 && field.front() == '"' && field.back() == '"') {
+      field = field.substr(1, field.size() - 2);
+      for (std::size_t at = 0; (at = field.find("\"\"", at)) != std::string::npos; ++at)
+        field.erase(at, 1);
+    }
+    m_fields.push_back(std::move(field));
+  }
+}
+
+void CsvReader::requireColumns() const
+{
+  const bool has_commas = m_format.separator == ',', is_one = m_fields.size() == 1;
+  const auto has = [this](char separator) { return m_record.find(separator) != std::string::npos; };
+  if (m_fields.size() < m_format.min_columns) {
+    const char *other = has(';')                            ? "semicolons"
+                        : !has_commas && has(',')           ? "commas"
+                        : has_commas && is_one && has('\t') ? "tabs"
+                        : has_commas && is_one && has(' ')  ? "blanks"
+                                                            : nullptr;
+    if (other != nullptr)
+      fail(fmt::format("the columns are separated by {}, must be by {} (and decimals written with a point)", other,
+                       has_commas ? "commas" : "blanks"));
+    fail(fmt::format("{} columns, must be {}", m_fields.size(), m_format.min_columns));
+  }
+  if (has_commas && hasDecimalCommas(m_fields))
+    fail("the decimals look as if written with a comma, must have a point");
+  if (m_columns > 0 && m_fields.size() != m_columns)
+    fail(fmt::format("{} columns, must be {} as in the rows before", m_fields.size(), m_columns));
 }
 
 bool CsvReader::next()
 {
-  while (m_lines.next()) {
-    const std::string_view content = trimmed(m_lines.line());
-    if (m_lines.number() == 1 && (content.substr(0, 2) == kUtf16Marks[0] || content.substr(0, 2) == kUtf16Marks[1]))
-      fail("is text in UTF-16, must be in UTF-8");
-    if (content.empty() || content.front() == '#' || (m_rows == 0 && isHeader(content)))
-      continue;
-    split(std::string(content));
-    if (m_format.separator == ',' && content.find(';') != std::string_view::npos)
-      fail("the columns are separated by semicolons, must be by commas (and decimals written with a point)");
-    if (m_fields.size() < m_format.min_columns)
-      fail(fmt::format("{} columns, must be {}", m_fields.size(), m_format.min_columns));
-    if (m_format.separator == ',' && hasDecimalCommas(m_fields))
-      fail("the decimals look as if written with a comma, must have a point");
-    if (m_rows > 0 && m_fields.size() != m_columns)
-      fail(fmt::format("{} columns, must be {} as in the rows before", m_fields.size(), m_columns));
-    m_columns = m_fields.size();
-    ++m_rows;
-    return true;
-  }
-  return false;
+  if (!m_is_pending && !readRecord())
+    return false;
+  m_is_pending = false;
+  requireColumns();
+  m_columns = m_fields.size();
+  ++m_rows;
+  return true;
 }
 
 double CsvReader::number(std::size_t column, std::string_view name) const
 {
   const std::string &field = m_fields.at(column);
-  const char *begin = field.data() + (!field.empty() && field.front() == '+' ? 1 : 0);
-  const char *end = field.data() + field.size();
-  double value = 0;
-  const auto result = std::from_chars(begin, end, value);
-  if (begin == end || result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
-    fail(fmt::format("{} = \"{}\", must be a finite number", name, shownField(field)));
-  return value;
+  if (const auto value = parseNumber<double>(field))
+    return *value;
+  fail(fmt::format(
+      "{} = \"{}\", must be a finite number{}", name, shownField(field),
+      field.find_first_of(",;") == std::string::npos ? "" : " with a point, columns parted by commas or blanks"));
 }
 
 double CsvReader::number(std::size_t column, std::string_view name, double most) const
@@ -164,41 +195,52 @@ int CsvReader::count(std::size_t column, std::string_view name) const
 
 std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
 {
-  const std::string &field = m_fields.at(column);
-  std::int64_t value = 0;
-  const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (field.empty() || result.ec != std::errc() || result.ptr != field.data() + field.size())
-    fail(fmt::format("{} = \"{}\", must be a whole number", name, shownField(field)));
-  return value;
+  if (const auto value = parseNumber<std::int64_t>(m_fields.at(column)))
+    return *value;
+  fail(fmt::format("{} = \"{}\", must be a whole number", name, shownField(m_fields.at(column))));
+}
+
+void CsvReader::requireNear(double stamp_s, const char *hint) const
+{
+  if (!(std::abs(stamp_s) <= double(kFarthest_s)))
+    fail(fmt::format("timestamp = {:.3g} s, must be at most {:g} s from the epoch{}", stamp_s, double(kFarthest_s),
+                     hint));
 }
 
 std::int64_t CsvReader::rising(std::int64_t stamp_ns)
 {
-  if (stamp_ns < -kFarthest_ns || stamp_ns > kFarthest_ns)
-    fail(fmt::format("timestamp = {:.3g} s, must be at most {:g} s from the epoch", 1e-9 * double(stamp_ns),
-                     double(kFarthest_s)));
   if (m_rows > 1 && stamp_ns <= m_last_stamp_ns)
     fail(fmt::format("timestamp = {} ns, must be later than the {} ns of the row before", stamp_ns, m_last_stamp_ns));
   m_last_stamp_ns = stamp_ns;
   return stamp_ns;
 }
 
-std::int64_t CsvReader::risingStampNs(std::size_t column) { return rising(integer(column, "timestamp")); }
-
-std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
+std::int64_t CsvReader::risingStampNs(std::size_t column)
 {
-  std::int64_t stamp_ns = 0;
-  if (!parseSeconds(m_fields.at(column), stamp_ns))
-    // Scientific notation, as numpy.savetxt writes it: exact enough after rounding for stamps below 2^53 ns.
-    stamp_ns = std::llround(number(column, "timestamp") * 1e9);
+  const std::int64_t stamp_ns = integer(column, "timestamp");
+  requireNear(1e-9 * static_cast<double>(stamp_ns), "");
+  if (m_rows == 3 && stamp_ns >= 2 && stamp_ns <= 3 && m_last_stamp_ns == stamp_ns - 1)
+    fail(fmt::format("timestamp = {} ns: looks like an index of the rows, which must be left out", stamp_ns));
   return rising(stamp_ns);
 }
 
-std::string oneField(std::string text)
+std::int64_t CsvReader::risingStampFromSeconds(std::size_t column)
 {
-  for (char &c : text)
-    if (c == ',' || c == '\n' || c == '\r')
-      c = c == ',' ? ';' : ' ';
-  return text;
+  if (const auto stamp_ns = parseSeconds(m_fields.at(column)))
+    return rising(*stamp_ns);
+  // Scientific notation, as numpy.savetxt writes it: exact enough after rounding for stamps below 2^53 ns.
+  const double stamp_s = number(column, "timestamp");
+  requireNear(stamp_s, " (nanoseconds?)");
+  return rising(std::llround(stamp_s * 1e9));
+}
+
+std::string csvField(std::string_view text)
+{
+  if (text.find_first_of(",;\"\r\n") == std::string_view::npos && trimmed(text) == text && text.substr(0, 1) != "#")
+    return std::string(text);
+  std::string field = "\"";
+  for (const char c : text)
+    field.append(c == '"' ? 2 : 1, c);
+  return field + '"';
 }
 } // namespace bole

@@ -19,11 +19,11 @@ struct CsvFormat
 {
   std::size_t min_columns = 1; ///< rows with fewer columns are an error
   char separator = ',';        ///< ',' or ' ' (any run of blanks)
-  std::string header = {};     ///< the first line must be this; empty: no header but comments
+  std::string header = {};     ///< the first row must begin with these names; empty: there may be a header or none
 };
 
-/// Reads a table row by row. Lines that start with '#' and empty lines are skipped; every row has
-/// the number of columns of the first one.
+/// Reads a table row by row. Fields may be quoted as RFC 4180 says (csvField()); rows that start with '#' and empty
+/// ones are skipped. A first row of names is the header; every row has as many columns as the first one.
 ///
 /// Errors: every fault throws vpException "file:line: what, must be ...": a missing file, a wrong header, a wrong
 /// number of columns, a field that is not a whole or finite number, a stamp that goes back.
@@ -41,6 +41,8 @@ public:
   /// The next row; false at the end of the file.
   bool next();
   std::size_t columns() const { return m_fields.size(); }
+  /// The names of the columns, empty where there is no header.
+  const std::vector<std::string> &header() const { return m_header; }
 
   const std::string &text(std::size_t column) const { return m_fields.at(column); }
   /// A finite number; \p name is used in the error only.
@@ -67,16 +69,23 @@ public:
   [[noreturn]] void fail(const std::string &message) const;
 
 private:
-  void split(const std::string &line);
+  bool readRecord();
+  void split();
+  void requireColumns() const;
+  void requireNear(double stamp_s, const char *hint) const;
   std::int64_t rising(std::int64_t stamp_ns);
 
   TextLines m_lines;
   CsvFormat m_format;
+  std::string m_record;      ///< the row as it stands in the file
+  std::size_t m_line = 1;    ///< where it begins
+  bool m_is_pending = false; ///< the first row was read by the constructor and is no header
   std::size_t m_rows = 0;
   std::size_t m_columns = 0;
   std::int64_t m_last_stamp_ns = 0;
-  std::vector<std::string> m_fields;
+  std::vector<std::string> m_header, m_fields;
 };
-/// \p text as one field of such a table: commas become semicolons, ends of lines blanks.
-std::string oneField(std::string text);
+
+/// \p text as a field of a comma separated table: in quotes where RFC 4180 wants them.
+std::string csvField(std::string_view text);
 } // namespace bole

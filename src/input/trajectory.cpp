@@ -23,7 +23,8 @@ Pose readPose(const CsvReader &csv, const std::array<std::size_t, 4> &order)
   const double qy = csv.number(order[2], "qy"), qz = csv.number(order[3], "qz");
   const double norm = std::sqrt(qw * qw + qx * qx + qy * qy + qz * qz);
   if (std::abs(norm - 1) > kNormTolerance)
-    csv.fail(fmt::format("norm of the quaternion = {:.4g}, must be 1", norm));
+    csv.fail(fmt::format("norm of the quaternion = {:.4g}, must be 1; the columns must be {}", norm,
+                         order[0] == 4 ? "stamp [ns],x,y,z,qw,qx,qy,qz" : "t [s] x y z qx qy qz qw"));
   return Pose::fromQuaternion(qw, qx, qy, qz, t);
 }
 
@@ -98,6 +99,10 @@ Trajectory readTumTrajectory(const std::string &path)
   Trajectory trajectory;
   CsvReader csv(path, {8, ' ', {}});
   while (csv.next()) {
+    if (csv.columns() == 12 || csv.columns() == 9)
+      csv.fail(fmt::format("{}, must be t [s] x y z qx qy qz qw",
+                           csv.columns() == 9 ? "9 columns look like an index in front of a pose"
+                                              : "12 columns look like KITTI's poses, which have no stamps"));
     const std::int64_t stamp_ns = csv.risingStampFromSeconds(0);
     append(trajectory, {stamp_ns, readPose(csv, {7, 4, 5, 6})}, csv);
   }
@@ -106,8 +111,10 @@ Trajectory readTumTrajectory(const std::string &path)
 
 Trajectory readTrajectory(const std::string &path)
 {
-  CsvReader csv(path, {1});
-  const bool has_commas = csv.next() && csv.columns() > 1;
+  CsvReader csv(path, {1, ' ', {}});
+  const std::string first = csv.next() ? csv.text(0) : "";
+  const bool has_decimal_commas = csv.columns() >= 7 && first.back() != ','; // which the reader of blanks names
+  const bool has_commas = first.find(',') != std::string::npos && !has_decimal_commas;
   return has_commas ? readAslTrajectory(path) : readTumTrajectory(path);
 }
 } // namespace bole

@@ -38,7 +38,7 @@ void writeTrace(const std::string &folder, const FlightTrace &trace)
     fmt::format_to(std::back_inserter(text), "{},{},{},{:.4f},{:.4f},{:.4f},{:.4e},{:.4e},{:.4e},{}\n", frame.index,
                    secondsText(frame.stamp_ns), toString(frame.status), frame.place.x(), frame.place.y(),
                    frame.place.z(), frame.covariance_xy(0, 0), frame.covariance_xy(0, 1), frame.covariance_xy(1, 1),
-                   oneField(frame.reason));
+                   csvField(frame.reason));
   writeAtomically(folder + "/frames.csv", text);
 
   text = fmt::format("{}\n# units,s,,m,m,m,m,m,m,m,m\n", kViewsHeader);

@@ -105,11 +105,8 @@ void writeHypotheses(const std::string &path, const std::vector<TrunkRecord> &ma
 
 std::vector<TrunkRecord> readTrunks(const std::string &path)
 {
-  TextLines first(path);
-  first.next();
-  const std::string &header = first.line();
-  const bool has_fate = header == std::string(kTrunksCsvHeader) + kFateColumn;
-  CsvReader csv(path, {kColumns + (has_fate ? 1 : 0), ',', has_fate ? header : kTrunksCsvHeader});
+  CsvReader csv(path, {kColumns, ',', kTrunksCsvHeader});
+  const bool has_fate = csv.header().size() > kColumns;
   std::vector<TrunkRecord> trunks;
   while (csv.next()) {
     trunks.push_back(readRow(csv));

@@ -8,6 +8,7 @@
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -64,22 +65,13 @@ void readSummaryInto(RunRecord &run, const std::string &path)
 TimingTable readTiming(const std::string &path)
 {
   TimingTable timing;
-  TextLines first(path);
-  first.next();
-  const std::string &header = first.line();
-  std::istringstream names(header);
-  std::string name;
-  std::size_t columns = 0, total = 0;
-  for (; std::getline(names, name, ','); ++columns) {
-    name = name.substr(0, name.find(" ["));
-    if (name == "total")
-      total = columns;
-    else if (columns > 1 && total == 0)
-      timing.stages.push_back(name);
-  }
-  if (total == 0)
+  CsvReader csv(path, {3, ',', "frame,timestamp [s]"});
+  const std::vector<std::string> &names = csv.header();
+  const auto total = static_cast<std::size_t>(std::find(names.begin(), names.end(), "total [ms]") - names.begin());
+  if (total == names.size())
     throw badValue("{}: has no column \"total [ms]\"", path);
-  CsvReader csv(path, {columns, ',', header});
+  for (std::size_t i = 2; i < total; ++i)
+    timing.stages.push_back(names[i].substr(0, names[i].find(" [")));
   while (csv.next()) {
     FrameTiming frame;
     frame.index = static_cast<std::size_t>(csv.integer(0, "frame"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
 #include "input/atomic_file.h"
+#include "output/flight_trace.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 
@@ -65,6 +66,23 @@ TEST_F(RunFiles, AnAtomicFileIsThereWholeAfterCommit)
   file.commit();
   EXPECT_EQ(content("a.txt"), "new");
   EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(RunFiles, TheReasonOfAFrameComesBackWhateverItSays)
+{
+  const std::vector<std::string> reasons = {"image of 640x480 px, must be 320x240", "woods; north, \"a\"/7.png", "a\nb",
+                                            ""};
+  FlightTrace trace;
+  for (std::size_t i = 0; i < reasons.size(); ++i) {
+    trace.frames.emplace_back();
+    trace.frames.back().stamp_ns = static_cast<std::int64_t>(i);
+    trace.frames.back().reason = reasons[i];
+  }
+  writeTrace(m_folder.string(), trace);
+  const std::vector<FrameTrace> read = readFrames(m_folder.string());
+  ASSERT_EQ(read.size(), reasons.size());
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    EXPECT_EQ(read[i].reason, reasons[i]);
 }
 
 TEST_F(RunFiles, NamesTheFileThatCannotBeWritten)

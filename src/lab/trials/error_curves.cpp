@@ -125,7 +125,7 @@ std::string samplesCsv(const LoopRecord &record)
         s.speed, s.clearance, s.loop_ms);
     for (const std::string &name : names)
       text += "," + value(s.believed, name) + "," + value(s.real, name);
-    text += "," + oneField(s.reason) + "\n";
+    text += "," + csvField(s.reason) + "\n";
   }
   return text;
 }
