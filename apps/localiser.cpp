@@ -34,7 +34,7 @@ std::vector<TrunkRecord> readKnownMap(const std::string &path)
         map.push_back(trunk);
   }
   else {
-    for (const Cylinder &cylinder : readCao(path)) {
+    for (const Cylinder &cylinder : readTrunkModel(path)) {
       TrunkRecord trunk;
       trunk.id = static_cast<int>(map.size());
       trunk.xy = (0.5 * (cylinder.foot + cylinder.top)).head<2>();

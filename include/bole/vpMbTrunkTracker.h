@@ -14,7 +14,8 @@
 /// track() ends with testTracking(), which throws vpTrackingException unless getStatus() is `tracked` or
 /// `partly_on_prior`. The pose is then the estimate (`uncertain`) or the prediction (the rest), and the next call of
 /// track() tries again: nothing has to be initialised anew.
-/// Models hold cylinders only; others are refused with file and line. LOD, Ogre and scan-line settings have no effect.
+/// Of a model the cylinders are tracked, its faces and circles are not. LOD, Ogre and scan-line settings have no
+/// effect.
 ///
 /// \code
 /// vpMbTrunkTracker tracker;

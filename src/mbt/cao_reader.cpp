@@ -1,119 +1,112 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "mbt/cao_reader.h"
-#include "input/atomic_file.h"
+#include "geometry/constants.h"
+#include "geometry/failure.h"
+#include "geometry/parse_number.h"
 #include "input/regular_file.h"
+#include "input/atomic_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <iterator>
-#include <sstream>
-#include <visp3/core/vpException.h>
+#include <optional>
 
 namespace bole
 {
 namespace
 {
-/// The lines that say something, without comments and line endings.
+/// The lines that say something, without comments, as words.
 class CaoLines
 {
 public:
   explicit CaoLines(const std::string &path) : m_lines(path) {}
 
-  /// Next line as words; \p what is missing if there is none.
-  std::istringstream next(const char *what)
+  /// False at the end of the file.
+  bool next()
   {
-    while (m_lines.next()) {
-      std::string line = m_lines.line();
-      line.erase(std::min(line.find('#'), line.size()));
-      const std::size_t last = line.find_last_not_of(" \t\r");
-      if (last == std::string::npos)
-        continue;
-      line.erase(last + 1);
-      return std::istringstream(line);
+    m_words.clear();
+    while (m_words.empty() && m_lines.next()) {
+      m_text = m_lines.line().substr(0, m_lines.line().find('#'));
+      for (std::size_t end = 0, at; (at = m_text.find_first_not_of(" \t", end)) != std::string::npos;) {
+        end = std::min(m_text.find_first_of(" \t", at), m_text.size());
+        m_words.push_back(m_text.substr(at, end - at));
+      }
     }
-    fail(fmt::format("the file ends, must go on with {}", what));
+    return !m_words.empty();
   }
 
-  bool atEnd()
+  /// The next line; \p what is missing if there is none.
+  void require(const char *what)
   {
-    while (m_lines.next()) {
-      const std::string &line = m_lines.line();
-      if (line.find_first_not_of(" \t\r") < line.find('#'))
-        return false;
-    }
-    return true;
+    if (!next())
+      fail(fmt::format("the file ends, must go on with {}", what));
   }
 
   [[noreturn]] void fail(const std::string &message) const
   {
-    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", m_lines.name(), m_lines.number(), message));
+    throw badValue("{}:{}: {}", m_lines.name(), m_lines.number(), message);
   }
 
-  template <class T> T word(std::istringstream &line, const char *what) const
+  const std::string &word(std::size_t i) const { return m_words.at(i); }
+  const std::string &text() const { return m_text; }
+
+  /// Word \p i of the line, which must hold \p what.
+  template <class Number> Number number(std::size_t i, const char *what) const
   {
-    T value;
-    if (!(line >> value))
-      fail(fmt::format("'{}', must be {}", line.str(), what));
-    return value;
+    const auto value = i < m_words.size() ? parseNumber<Number>(m_words[i]) : std::nullopt;
+    if (!value)
+      fail(fmt::format("'{}', must be {}", m_text, what));
+    return *value;
   }
 
-  void endOf(std::istringstream &line) const
+  /// How many of \p what follow; the rest of the line says nothing.
+  int count(const char *what) const
   {
-    std::string rest;
-    if (line >> rest)
-      fail(fmt::format("'{}' at the end of the line, must not be there", rest));
-  }
-
-  int count(const char *what)
-  {
-    std::istringstream line = next(what);
-    const int n = word<int>(line, what);
-    endOf(line);
+    const int n = number<int>(0, fmt::format("the number of {}", what).c_str());
     if (n < 0 || n > 100000)
       fail(fmt::format("{} = {}, must be 0 .. 100000", what, n));
     return n;
   }
 
-  /// A part of the model that a trunk does not have: zero, or refused at the line of its count.
-  void none(const char *what)
-  {
-    const int n = count(what);
-    if (n > 0)
-      fail(fmt::format("{} = {}, must be 0: a model of trunks holds cylinders only", what, n));
-  }
-
 private:
   TextLines m_lines;
+  std::string m_text;
+  std::vector<std::string> m_words;
 };
 
-std::string nameOf(const CaoLines &file, std::istringstream &line)
+/// `name=oak` or `name="old oak"` among the words behind a radius.
+std::string nameIn(const std::string &line)
 {
-  std::string rest;
-  std::getline(line >> std::ws, rest);
-  if (rest.empty())
+  const std::string key = "name=";
+  const std::size_t at = line.find(key);
+  if (at == std::string::npos)
     return "";
-  const std::string key = "name=\"";
-  if (rest.compare(0, key.size(), key) != 0 || rest.size() < key.size() + 1 || rest.back() != '"')
-    file.fail(fmt::format("'{}' after the radius, must be name=\"...\"", rest));
-  return rest.substr(key.size(), rest.size() - key.size() - 1);
+  const std::string name = line.substr(at + key.size());
+  return name[0] == '"' ? name.substr(1, name.find('"', 1) - 1) : name.substr(0, name.find_first_of(" \t"));
 }
 
-Cylinder readCylinder(CaoLines &file, const std::vector<Eigen::Vector3d> &points)
+Cylinder readCylinder(const CaoLines &file, const std::vector<Eigen::Vector3d> &points)
 {
-  std::istringstream line = file.next("a cylinder");
-  const int i = file.word<int>(line, "two points and a radius"), j = file.word<int>(line, "two points and a radius");
+  constexpr double kWidest_m = 5, kFarthest_m = 10000;
+  constexpr const char *kWhat = "two points and a radius";
   Cylinder cylinder;
-  cylinder.radius = file.word<double>(line, "two points and a radius");
-  for (int index : {i, j})
+  Eigen::Vector3d *const ends[] = {&cylinder.foot, &cylinder.top};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const int index = file.number<int>(i, kWhat);
     if (index < 0 || index >= int(points.size()))
       file.fail(fmt::format("point = {}, must be 0 .. {}", index, int(points.size()) - 1));
-  if (!(cylinder.radius > 0) || !std::isfinite(cylinder.radius))
-    file.fail(fmt::format("radius = {}, must be above 0", cylinder.radius));
-  cylinder.foot = points[std::size_t(i)];
-  cylinder.top = points[std::size_t(j)];
+    *ends[i] = points[std::size_t(index)];
+    if (!(ends[i]->norm() <= kFarthest_m))
+      file.fail(fmt::format("point {} is {:g} m from the origin, must be at most {:g} m (millimetres?)", index,
+                            ends[i]->norm(), kFarthest_m));
+  }
+  cylinder.radius = file.number<double>(2, kWhat);
+  if (!(cylinder.radius > 0 && cylinder.radius <= kWidest_m))
+    file.fail(fmt::format("radius = {:g}, must be above 0 and at most {:g} m{}", cylinder.radius, kWidest_m,
+                          cylinder.radius > 0 ? " (millimetres?)" : ""));
   if (!((cylinder.top - cylinder.foot).norm() > 1e-6))
     file.fail("the two points of the axis must differ");
-  cylinder.name = nameOf(file, line);
+  cylinder.name = nameIn(file.text());
   return cylinder;
 }
 } // namespace
@@ -121,56 +114,58 @@ Cylinder readCylinder(CaoLines &file, const std::vector<Eigen::Vector3d> &points
 std::vector<Cylinder> readCao(const std::string &path)
 {
   CaoLines file(path);
-  std::istringstream header = file.next("V1");
-  const std::string version = file.word<std::string>(header, "V1");
-  if (version != "V1")
-    file.fail(fmt::format("version = {}, must be V1", version));
-  file.endOf(header);
-
-  std::istringstream line = file.next("the number of points");
-  if (line.str().find("load") != std::string::npos)
-    file.fail(fmt::format("'{}': models inside models are not read", line.str()));
-  const int n_points = file.word<int>(line, "the number of points");
-  file.endOf(line);
-  if (n_points < 0 || n_points > 100000)
-    file.fail(fmt::format("points = {}, must be 0 .. 100000", n_points));
+  file.require("V1");
+  if (file.word(0) != "V0" && file.word(0) != "V1" && file.word(0) != "V2")
+    file.fail(fmt::format("version = {}, must be V1", file.word(0)));
+  file.require("the number of points");
+  if (file.word(0).rfind("load", 0) == 0)
+    file.fail(fmt::format("'{}': models inside models are not read", file.text()));
   std::vector<Eigen::Vector3d> points;
-  for (int k = 0; k < n_points; ++k) {
-    std::istringstream row = file.next("a point");
+  for (int left = file.count("points"); left > 0; --left) {
+    file.require("a point");
     Eigen::Vector3d p;
     for (int c = 0; c < 3; ++c)
-      p(c) = file.word<double>(row, "three numbers");
-    file.endOf(row);
+      p(c) = file.number<double>(std::size_t(c), "three numbers");
     points.push_back(p);
   }
-  file.none("lines");
-  file.none("faces from lines");
-  file.none("faces from points");
+  for (const char *part : {"lines", "faces from lines", "faces from points"}) {
+    file.require(part);
+    for (int left = file.count(part); left > 0; --left)
+      file.require(part);
+  }
   std::vector<Cylinder> cylinders;
-  const int n_cylinders = file.count("cylinders");
-  for (int k = 0; k < n_cylinders; ++k)
+  for (int left = file.next() ? file.count("cylinders") : 0; left > 0; --left) {
+    file.require("a cylinder");
     cylinders.push_back(readCylinder(file, points));
-  file.none("circles");
-  if (!file.atEnd())
-    file.fail("more after the circles, must be the end of the file");
+  }
+  if (cylinders.empty())
+    throw badValue("{}: no cylinder in it, must have one a trunk", path);
   return cylinders;
+}
+
+std::vector<Cylinder> readTrunkModel(const std::string &path)
+{
+  constexpr double kLargestLean = 45;
+  std::vector<Cylinder> trunks = readCao(path);
+  for (const Cylinder &trunk : trunks)
+    if (const double lean = std::acos(std::min(1.0, std::abs(trunk.axis().z()))) / kDegree; lean > kLargestLean)
+      throw badValue("{}: cylinder {}{} lies: its axis is {:.0f} degrees off z, which is up, must be at most {:g}",
+                     path, &trunk - trunks.data() + 1, trunk.name.empty() ? "" : " (" + trunk.name + ")", lean,
+                     kLargestLean);
+  return trunks;
 }
 
 void writeCao(const std::string &path, const std::vector<Cylinder> &cylinders, const std::string &comment)
 {
-  std::string text = "V1\n";
-  const auto out = std::back_inserter(text);
-  if (!comment.empty())
-    fmt::format_to(out, "# {}\n", comment);
-  fmt::format_to(out, "{} # points\n", 2 * cylinders.size());
+  std::string text = comment.empty() ? "V1\n" : fmt::format("V1\n# {}\n", comment);
+  text += fmt::format("{} # points\n", 2 * cylinders.size());
   for (const Cylinder &c : cylinders)
     for (const Eigen::Vector3d &p : {c.foot, c.top})
-      fmt::format_to(out, "{:.6f} {:.6f} {:.6f}\n", p.x(), p.y(), p.z());
-  fmt::format_to(out, "0 # lines\n0 # faces from lines\n0 # faces from points\n{} # cylinders\n", cylinders.size());
+      text += fmt::format("{:.6f} {:.6f} {:.6f}\n", p.x(), p.y(), p.z());
+  text += fmt::format("0 # lines\n0 # faces from lines\n0 # faces from points\n{} # cylinders\n", cylinders.size());
   for (std::size_t k = 0; k < cylinders.size(); ++k)
-    fmt::format_to(out, "{} {} {:.6f}{}\n", 2 * k, 2 * k + 1, cylinders[k].radius,
-                   cylinders[k].name.empty() ? "" : fmt::format(" name=\"{}\"", cylinders[k].name));
-  text += "0 # circles\n";
-  writeAtomically(path, text);
+    text += fmt::format("{} {} {:.6f}{}\n", 2 * k, 2 * k + 1, cylinders[k].radius,
+                        cylinders[k].name.empty() ? "" : fmt::format(" name=\"{}\"", cylinders[k].name));
+  writeAtomically(path, text + "0 # circles\n");
 }
 } // namespace bole
