@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/failure.h"
 #include "geometry/names.h"
+#include "geometry/parse_number.h"
 #include "input/camera_plausibility.h"
-#include "input/regular_file.h"
 #include "input/sensor_yaml.h"
+#include "input/xml_file.h"
 #include "input/yaml_file.h"
 
 #include <bole/open_source.h>
@@ -12,15 +13,17 @@
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
+#include <map>
+#include <optional>
 #include <set>
-#include <visp3/core/vpException.h>
-#include <visp3/core/vpXmlParserCamera.h>
+#include <utility>
 
 namespace bole
 {
 namespace
 {
-constexpr std::size_t kMostNames = 100; // of cameras in one file: each is looked for on its own
+constexpr const char *kForms =
+    "EuRoC's sensor.yaml, a calibration of OpenCV, ROS (camera_info) or Kalibr, or ViSP's XML";
 const std::set<std::string> kCameraKeys = {
     "sensor_type", "comment",      "T_BS",       "rate_hz",          "resolution",
     "intrinsics",  "camera_model", "camera_fov", "distortion_model", "distortion_coefficients"};
@@ -49,146 +52,204 @@ PinholeCamera readPinhole(const SensorYaml &yaml)
   return {k[0], k[1], k[2], k[3], static_cast<int>(size[0]), static_cast<int>(size[1])};
 }
 
-void readDistortion(const SensorYaml &yaml, CameraModel &model)
+/// The coefficients of a lens under \p key, \p least to \p most of them: what stands behind must be 0.
+std::vector<double> readCoefficients(const SensorYaml &yaml, const std::string &key, std::size_t least,
+                                     std::size_t most, const std::string &model)
+{
+  std::vector<double> k = yaml.numbers(key);
+  while (k.size() > most && k.back() == 0)
+    k.pop_back();
+  if (k.size() < least || k.size() > most)
+    yaml.fail(key, fmt::format("{} numbers for {}", most, model));
+  k.resize(most, 0);
+  return k;
+}
+
+void setDistortion(CameraModel &model, Distortion distortion, const std::vector<double> &k)
+{
+  model.distortion = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; }) ? Distortion::none : distortion;
+  std::copy_n(k.begin(), std::min(k.size(), model.coefficients.size()), model.coefficients.begin());
+}
+
+void readDistortion(const SensorYaml &yaml, const std::string &key, CameraModel &model)
 {
   const std::string name = yaml.has("distortion_model") ? yaml.text("distortion_model") : "none";
   const auto known = valueNamed(name == "radtan" ? "radial-tangential" : name, Distortion::fov);
   if (!known)
     yaml.fail("distortion_model", "none, radial-tangential, equidistant or fov");
-  model.distortion = *known;
-  if (model.distortion == Distortion::none)
+  if (*known == Distortion::none)
     return;
-  const std::size_t needed = model.distortion == Distortion::fov ? 1 : 4;
-  auto k = yaml.numbers("distortion_coefficients");
-  if (needed == 4 && k.size() == 5 && k[4] == 0)
-    k.pop_back();
-  if (k.size() != needed)
-    yaml.fail("distortion_coefficients", fmt::format("{} numbers for {}", needed, name));
-  if (model.distortion == Distortion::fov && (k[0] < 0 || k[0] > 3))
-    yaml.fail("distortion_coefficients", "0 to 3 rad");
-  std::copy(k.begin(), k.end(), model.coefficients.begin());
-  if (std::all_of(k.begin(), k.end(), [](double v) { return v == 0; }))
-    model.distortion = Distortion::none;
+  const std::size_t count = *known == Distortion::fov ? 1 : 4;
+  const std::vector<double> k = readCoefficients(yaml, key, count, count, name);
+  if (*known == Distortion::fov && (k[0] < 0 || k[0] > 3))
+    yaml.fail(key, "0 to 3 rad");
+  setDistortion(model, *known, k);
 }
 
-/// OpenCV's calibration, and ROS's camera_info, which has the same keys. The camera looks straight ahead.
-MountedCamera readCalibration(const SensorYaml &yaml)
+/// OpenCV's calibration, and ROS's camera_info as a file or a printed message. The camera looks straight ahead.
+MountedCamera readCalibration(const SensorYaml &yaml, const std::string &matrix_key)
 {
+  const auto keyOf = [&yaml](std::initializer_list<const char *> names) {
+    const auto *const found =
+        std::find_if(names.begin(), names.end(), [&](const char *name) { return yaml.has(name); });
+    return std::string(found == names.end() ? *names.begin() : *found);
+  };
   MountedCamera camera{{}, forwardCamera()};
   PinholeCamera &pinhole = camera.model.pinhole;
-  const auto size = [&yaml](const char *key) {
+  const auto side = [&yaml](const std::string &key) {
     const auto numbers = yaml.numbers(key);
     if (numbers.size() != 1 || !isSide(numbers[0]))
       yaml.fail(key, "8 to 16384 px");
     return static_cast<int>(numbers[0]);
   };
-  pinhole.width = size("image_width");
-  pinhole.height = size("image_height");
-  const auto k = yaml.matrix("camera_matrix");
-  if (k.size() != 9 || !(k[0] > 0) || !(k[4] > 0))
-    yaml.fail("camera_matrix", "a 3x3 matrix with focal lengths above 0");
+  pinhole.width = side(keyOf({"image_width", "image_Width", "width"}));
+  pinhole.height = side(keyOf({"image_height", "image_Height", "height"}));
+  const auto k = yaml.numbers(matrix_key);
+  constexpr double kSkew_px = 1e-6;
+  if (k.size() != 9 || !(k[0] > 0) || !(k[4] > 0) || std::abs(k[1]) > kSkew_px || k[3] != 0 || k[6] != 0 || k[7] != 0 ||
+      k[8] != 1)
+    yaml.fail(matrix_key, "fx 0 cx, 0 fy cy, 0 0 1 with fx and fy above 0");
   pinhole.fx = k[0];
   pinhole.fy = k[4];
   pinhole.cx = k[2];
   pinhole.cy = k[5];
-  const std::string model = yaml.has("distortion_model") ? yaml.text("distortion_model") : "plumb_bob";
-  if (model != "plumb_bob" && model != "equidistant")
-    yaml.fail("distortion_model", "plumb_bob or equidistant");
-  auto d = yaml.has("distortion_coefficients") ? yaml.matrix("distortion_coefficients") : std::vector<double>();
-  if (d.size() > 5 && std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; }))
-    yaml.fail("distortion_coefficients", "at most 5 numbers that are not 0");
-  d.resize(5, 0);
-  if (model == "equidistant")
-    camera.model.distortion = Distortion::equidistant;
-  else if (std::any_of(d.begin(), d.end(), [](double v) { return v != 0; }))
-    camera.model.distortion = Distortion::radial_tangential;
+
+  const bool is_fisheye = yaml.has("fisheye_model") && yaml.numbers("fisheye_model") != std::vector<double>{0};
+  const std::string model = is_fisheye                     ? "equidistant"
+                            : yaml.has("distortion_model") ? yaml.text("distortion_model")
+                                                           : "plumb_bob";
+  const std::string key = keyOf({"distortion_coefficients", "Distortion_Coefficients", "DistCoeff", "D", "d"});
+  if (model == "equidistant" || model == "fisheye") {
+    setDistortion(camera.model, Distortion::equidistant, readCoefficients(yaml, key, 4, 4, model));
+    return camera;
+  }
+  if (model != "plumb_bob" && model != "rational_polynomial")
+    yaml.fail("distortion_model", "plumb_bob, rational_polynomial or equidistant");
+  auto d = yaml.has(key) ? readCoefficients(yaml, key, 0, 5, "plumb_bob") : std::vector<double>(5, 0);
   constexpr double kLargestRest_px = 1;
-  if (model == "plumb_bob" && d[4] != 0 && foldThirdCoefficient(pinhole, d[4], d[0], d[1]) > kLargestRest_px)
-    yaml.fail("distortion_coefficients", "radial by two coefficients to 1 px: calibrate with k3 = 0 (CALIB_FIX_K3)");
-  std::copy_n(d.begin(), 4, camera.model.coefficients.begin());
+  if (d[4] != 0 && foldThirdCoefficient(pinhole, d[4], d[0], d[1]) > kLargestRest_px)
+    yaml.fail(key, "radial by two coefficients to 1 px: calibrate with k3 = 0 (CALIB_FIX_K3)");
+  d.pop_back();
+  setDistortion(camera.model, Distortion::radial_tangential, d);
   return camera;
 }
 
-/// Throws where \p camera, read from \p yaml, cannot be one.
-void requireCamera(const MountedCamera &camera, const SensorYaml &yaml, const char *pinhole_key)
+/// Throws where \p camera, read from \p yaml, cannot be one: at the key of what is wrong.
+void requireCamera(const MountedCamera &camera, const SensorYaml &yaml, const char *pinhole_key,
+                   const char *distortion_key, const char *mounting_key)
 {
   using Part = Implausibility::Part;
   const Implausibility fault = implausibility(camera);
   if (fault.part != Part::none)
     yaml.refuse(fault.part == Part::pinhole      ? pinhole_key
-                : fault.part == Part::distortion ? "distortion_coefficients"
-                                                 : "T_BS",
+                : fault.part == Part::distortion ? distortion_key
+                                                 : mounting_key,
                 fault.text);
+}
+
+/// Kalibr's camchain of one camera.
+MountedCamera readKalibr(const SensorYaml &chain)
+{
+  if (chain.has("cam1"))
+    chain.refuse("cam1", "a second camera, must be cam0 alone");
+  const SensorYaml yaml = chain.at("cam0");
+  MountedCamera camera{{}, forwardCamera()};
+  camera.model.pinhole = readPinhole(yaml);
+  readDistortion(yaml, "distortion_coeffs", camera.model);
+  if (yaml.has("T_cam_imu"))
+    camera.bMc = yaml.rigidMotion("T_cam_imu").inverse();
+  requireCamera(camera, yaml, "intrinsics", "distortion_coeffs", "T_cam_imu");
+  return camera;
 }
 
 MountedCamera readYaml(const std::string &path)
 {
-  if (const SensorYaml any(path, {}); any.has("camera_matrix")) {
-    const MountedCamera camera = readCalibration(any);
-    requireCamera(camera, any, "camera_matrix");
-    return camera;
-  }
+  const SensorYaml any(path, {});
+  for (const char *matrix : {"camera_matrix", "Camera_Matrix", "CameraMat", "K", "k"})
+    if (any.has(matrix)) {
+      const MountedCamera camera = readCalibration(any, matrix);
+      requireCamera(camera, any, matrix, matrix, matrix);
+      return camera;
+    }
+  if (any.has("cam0"))
+    return readKalibr(any);
+  if (!any.has("resolution"))
+    throw ioError("{}: no camera that is known, must be {}", path, kForms);
   const SensorYaml yaml(path, kCameraKeys);
   MountedCamera camera;
   camera.model.pinhole = readPinhole(yaml);
-  readDistortion(yaml, camera.model);
+  readDistortion(yaml, "distortion_coefficients", camera.model);
   camera.bMc = yaml.has("T_BS") ? yaml.rigidMotion("T_BS") : forwardCamera();
-  requireCamera(camera, yaml, "intrinsics");
+  requireCamera(camera, yaml, "intrinsics", "distortion_coefficients", "T_BS");
   return camera;
 }
 
-/// Names of the cameras in ViSP's XML: its parser wants to be told the one it is to read.
-std::set<std::string> cameraNames(const std::string &path)
+/// The cameras of ViSP's XML by their names, each by the better one of its models.
+std::vector<std::pair<std::string, CameraModel>> readXmlCameras(const std::string &path)
 {
-  const std::string text = readSmallFile(path), tag = "<name>", blanks = " \t\r\n";
-  std::set<std::string> names;
-  for (std::size_t at = text.find(tag); at != std::string::npos; at = text.find(tag, at)) {
-    at += tag.size();
-    const std::string name = text.substr(at, text.find('<', at) - at);
-    const std::size_t first = std::min(name.find_first_not_of(blanks), name.size());
-    names.insert(name.substr(first, name.find_last_not_of(blanks) + 1 - first));
-  }
-  if (names.size() > kMostNames)
-    throw ioError("{}: {} names in it, must be at most {}", path, names.size(), kMostNames);
-  return names;
-}
-
-bool readXmlModel(const std::string &path, const std::string &name, int width, int height, CameraModel &model)
-{
-  for (const auto type :
-       {vpCameraParameters::perspectiveProjWithDistortion, vpCameraParameters::perspectiveProjWithoutDistortion}) {
-    vpXmlParserCamera parser;
-    vpCameraParameters cam;
-    if (parser.parse(cam, path, name, type, static_cast<unsigned>(width), static_cast<unsigned>(height)) !=
-        vpXmlParserCamera::SEQUENCE_OK)
-      continue;
-    model.pinhole =
-        PinholeCamera::fromVisp(cam, static_cast<int>(parser.getWidth()), static_cast<int>(parser.getHeight()));
-    if (type == vpCameraParameters::perspectiveProjWithDistortion && cam.get_kud() != 0) {
-      model.distortion = Distortion::radial_tangential;
-      model.coefficients = {{cam.get_kud(), 0, 0, 0}};
+  std::vector<std::pair<std::string, CameraModel>> cameras;
+  std::optional<CameraModel> model;
+  std::map<std::string, std::string> values; // of the camera so far, and of its last model
+  for (const XmlElement &element : readXml(path)) {
+    const auto number = [&](const char *key) {
+      if (const auto value = parseNumber<double>(values[key]))
+        return *value;
+      throw badValue("{}:{}: {} = \"{}\", must be a number", path, element.line, key, values[key]);
+    };
+    const auto side = [&](const char *key) {
+      if (values.count(key) == 0)
+        return 0;
+      if (!isSide(number(key)))
+        throw badValue("{}:{}: {} = {}, must be 8 to 16384 px", path, element.line, key, values[key]);
+      return static_cast<int>(number(key));
+    };
+    const std::string place = element.path.substr(std::min(element.path.find('/'), element.path.size()));
+    if (place == "/camera/model") {
+      const bool is_distorted = values["type"] == "perspectiveProjWithDistortion";
+      if (!is_distorted && (model || values["type"] != "perspectiveProjWithoutDistortion"))
+        continue;
+      model = CameraModel();
+      model->pinhole = {number("px"), number("py"), number("u0"), number("v0"), 0, 0};
+      setDistortion(*model, Distortion::radial_tangential, {is_distorted ? number("kud") : 0, 0, 0, 0});
     }
-    return true;
+    else if (place == "/camera") {
+      if (!model)
+        throw badValue(
+            "{}:{}: <camera> has no <model> of a type that is known, must have perspectiveProjWithDistortion "
+            "or perspectiveProjWithoutDistortion",
+            path, element.line);
+      model->pinhole.width = side("image_width");
+      model->pinhole.height = side("image_height");
+      cameras.emplace_back(values["name"], *std::exchange(model, std::nullopt));
+      values.clear();
+    }
+    else
+      values[place.substr(place.rfind('/') + 1)] = element.text;
   }
-  return false;
+  return cameras;
 }
 
-MountedCamera readXml(const std::string &path, int width, int height)
+/// Of the cameras of \p path the one for images of this size.
+MountedCamera readXmlCamera(const std::string &path, int width, int height)
 {
+  const auto cameras = readXmlCameras(path);
+  if (cameras.empty())
+    throw ioError("{}: no <camera> in it, must be {}", path, kForms);
   MountedCamera camera{{}, forwardCamera()};
-  int found = 0;
-  const auto names = cameraNames(path);
-  try {
-    for (const std::string &name : names)
-      found += readXmlModel(path, name, width, height, camera.model) ? 1 : 0;
-  }
-  catch (const vpException &error) { // ViSP refuses what it reads, without the name of the file
-    throw badValue("{}: {}", path, error.getStringMessage());
-  }
-  const std::string size = width > 0 ? fmt::format(" for {}x{} images", width, height) : "";
-  if (found != 1)
-    throw ioError("{}: {} ViSP cameras{} in it, must be one", path, found, size);
   PinholeCamera &pinhole = camera.model.pinhole;
+  int fitting = 0;
+  std::string names;
+  for (const auto &[name, model] : cameras) {
+    const PinholeCamera &p = model.pinhole;
+    names += fmt::format("{}{} ({}x{})", names.empty() ? "" : ", ", name, p.width, p.height);
+    if (width > 0 && p.width > 0 && (p.width != width || p.height != height))
+      continue;
+    camera.model = model;
+    ++fitting;
+  }
+  if (fitting != 1)
+    throw ioError("{}: {} of its cameras are for images of {}x{} px, must be one: {}", path, fitting, width, height,
+                  names);
   if (pinhole.width == 0 || pinhole.height == 0) {
     pinhole.width = width;
     pinhole.height = height;
@@ -198,6 +259,13 @@ MountedCamera readXml(const std::string &path, int width, int height)
   if (const Implausibility fault = implausibility(camera); fault.part != Implausibility::Part::none)
     throw badValue("{}: {}", path, fault.text);
   return camera;
+}
+
+bool isXml(const std::string &path)
+{
+  const std::string text = readSmallFile(path);
+  const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return first != std::string::npos && text[first] == '<';
 }
 } // namespace
 
@@ -210,17 +278,12 @@ Pose forwardCamera()
 
 MountedCamera readCamera(const std::string &path, int width, int height)
 {
-  openRegularFile(path); // whatever its name
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension != ".xml" && extension != ".yaml" && extension != ".yml")
-    throw ioError("{}: a camera file must end in .yaml, .yml or .xml", path);
-  return extension == ".xml" ? readXml(path, width, height) : readYaml(path);
+  return isXml(path) ? readXmlCamera(path, width, height) : readYaml(path);
 }
 
 std::optional<double> readFrameRate(const std::string &path)
 {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (!std::filesystem::is_regular_file(path) || (extension != ".yaml" && extension != ".yml"))
+  if (path.empty() || isXml(path))
     return std::nullopt;
   const SensorYaml yaml(path, {});
   if (!yaml.has("rate_hz"))

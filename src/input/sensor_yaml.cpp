@@ -2,10 +2,11 @@
 #include "input/sensor_yaml.h"
 
 #include "geometry/failure.h"
+#include "geometry/parse_number.h"
 #include "geometry/rotation.h"
 #include "input/yaml_file.h"
 
-#include <cmath>
+#include <algorithm>
 #include <fmt/format.h>
 
 namespace bole
@@ -17,55 +18,65 @@ namespace
   throw ioError("{}: {}", placeOf(path, mark), message);
 }
 
+/// On one line and not too long.
 std::string dumped(const YAML::Node &node)
 {
   YAML::Emitter emitter;
   emitter << YAML::Flow << node;
-  const std::string text = emitter.c_str();
+  std::string text;
+  for (const char *c = emitter.c_str(); *c != '\0'; ++c)
+    if (*c != '\n' && (*c != ' ' || text.empty() || text.back() != ' '))
+      text += *c;
+    else if (*c == '\n' && !text.empty() && text.back() != ' ')
+      text += ' ';
   return text.size() > 80 ? text.substr(0, 77) + "..." : text;
 }
 
-void appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
+/// False where one is none.
+bool appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
 {
-  if (node.IsSequence()) {
-    for (const auto &entry : node)
-      appendNumbers(entry, numbers);
-    return;
-  }
-  const double value = node.as<double>();
-  if (!std::isfinite(value))
-    throw YAML::BadConversion(node.Mark());
-  numbers.push_back(value);
+  if (node.IsMap() && node["data"])
+    return appendNumbers(node["data"], numbers);
+  if (node.IsSequence())
+    return std::all_of(node.begin(), node.end(), [&](const auto &entry) { return appendNumbers(entry, numbers); });
+  const auto value = node.IsScalar() ? parseNumber<double>(node.Scalar()) : std::nullopt;
+  numbers.push_back(value.value_or(0));
+  return value.has_value();
 }
 } // namespace
 
-SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &known_keys) : m_path(path)
+SensorYaml::SensorYaml(const std::string &path, const std::set<std::string> &known_keys)
+    : SensorYaml(path, loadYaml(path), known_keys)
 {
-  m_root = loadYaml(path);
+}
+
+SensorYaml::SensorYaml(std::string path, YAML::Node root, const std::set<std::string> &known_keys)
+    : m_path(std::move(path)), m_root(std::move(root))
+{
   if (!m_root.IsMap())
-    failAt(path, m_root.Mark(), "the file must be a map of keys");
+    failAt(m_path, m_root.Mark(), "the file must be a map of keys");
   std::set<std::string> seen;
   for (const auto &entry : m_root) {
     const auto key = entry.first.as<std::string>();
     if (!known_keys.empty() && known_keys.count(key) == 0)
-      failAt(path, entry.first.Mark(), fmt::format("unknown key \"{}\"", key));
+      failAt(m_path, entry.first.Mark(), fmt::format("unknown key \"{}\"", key));
     if (!seen.insert(key).second)
-      failAt(path, entry.first.Mark(), fmt::format("repeated key \"{}\"", key));
+      failAt(m_path, entry.first.Mark(), fmt::format("repeated key \"{}\"", key));
   }
 }
 
-YAML::Node SensorYaml::at(const std::string &key) const
+YAML::Node SensorYaml::node(const std::string &key) const
 {
-  const YAML::Node node = m_root[key];
-  if (!node)
+  const YAML::Node found = m_root[key];
+  if (!found)
     throw ioError("{}: the key \"{}\" is missing", m_path, key);
-  return node;
+  return found;
 }
 
 void SensorYaml::fail(const std::string &key, const std::string &must_be) const
 {
-  const YAML::Node node = at(key);
-  failAt(m_path, node.Mark(), fmt::format("{} = {}, must be {}", key, dumped(node), must_be));
+  const YAML::Node found = node(key);
+  failAt(m_path, found.Mark(), fmt::format("{} = {}, must be {}", key, dumped(found), must_be));
 }
 
 void SensorYaml::refuse(const std::string &key, const std::string &message) const
@@ -77,41 +88,23 @@ void SensorYaml::refuse(const std::string &key, const std::string &message) cons
 
 std::string SensorYaml::text(const std::string &key) const
 {
-  const YAML::Node node = at(key);
-  if (!node.IsScalar())
+  const YAML::Node found = node(key);
+  if (!found.IsScalar())
     fail(key, "one word");
-  return node.as<std::string>();
+  return found.Scalar();
 }
 
 std::vector<double> SensorYaml::numbers(const std::string &key) const
 {
   std::vector<double> values;
-  const YAML::Node node = at(key);
-  try {
-    appendNumbers(node, values);
-  }
-  catch (const YAML::Exception &) {
+  if (!appendNumbers(node(key), values))
     fail(key, "finite numbers");
-  }
-  return values;
-}
-
-std::vector<double> SensorYaml::matrix(const std::string &key) const
-{
-  std::vector<double> values;
-  const YAML::Node node = at(key);
-  try {
-    appendNumbers(node.IsMap() && node["data"] ? node["data"] : node, values);
-  }
-  catch (const YAML::Exception &) {
-    fail(key, "finite numbers");
-  }
   return values;
 }
 
 Pose SensorYaml::rigidMotion(const std::string &key) const
 {
-  const std::vector<double> values = matrix(key);
+  const std::vector<double> values = numbers(key);
   if (values.size() != 16)
     fail(key, "16 numbers");
   const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());

@@ -22,9 +22,10 @@ public:
 
   bool has(const std::string &key) const { return static_cast<bool>(m_root[key]); }
   std::string text(const std::string &key) const;
+  /// A number, a list of any depth, or a matrix as {cols, rows, data: [...]}, row by row.
   std::vector<double> numbers(const std::string &key) const;
-  /// Numbers of a matrix of any shape, as {cols, rows, data: [...]} or a list, row by row.
-  std::vector<double> matrix(const std::string &key) const;
+  /// The map under \p key, of any keys.
+  SensorYaml at(const std::string &key) const { return SensorYaml(m_path, node(key), {}); }
   /// 4x4 rigid motion under \p key, as {cols, rows, data: [16 numbers]} or a list of four rows.
   Pose rigidMotion(const std::string &key) const;
   [[noreturn]] void fail(const std::string &key, const std::string &must_be) const;
@@ -32,7 +33,8 @@ public:
   [[noreturn]] void refuse(const std::string &key, const std::string &message) const;
 
 private:
-  YAML::Node at(const std::string &key) const;
+  SensorYaml(std::string path, YAML::Node root, const std::set<std::string> &known_keys);
+  YAML::Node node(const std::string &key) const;
 
   std::string m_path;
   YAML::Node m_root;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "mbt/trunk_settings.h"
 
+#include "geometry/failure.h"
+#include "geometry/parse_number.h"
 #include "geometry/require_range.h"
-#include "input/yaml_file.h"
+#include "input/xml_file.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
+#include <map>
 #include <visp3/core/vpException.h>
 #include <visp3/core/vpMath.h>
 
@@ -14,112 +16,18 @@ namespace bole
 {
 namespace
 {
-struct Leaf
+using Leaves = std::multimap<std::string, XmlElement>;
+
+[[noreturn]] void fail(const std::string &path, int line, const std::string &message)
 {
-  std::string text;
-  int line = 0;
-};
+  throw badValue("{}:{}: {}", path, line, message);
+}
 
-/// The part of XML that settings use: nested elements with text, comments, a declaration.
-class XmlText
+double number(const std::string &path, const std::string &key, const XmlElement &leaf)
 {
-public:
-  explicit XmlText(const std::string &path) : m_path(path), m_text(readSmallFile(path)) {}
-
-  /// Text of every innermost element, by its path, e.g. "conf/camera/u0".
-  std::multimap<std::string, Leaf> leaves()
-  {
-    std::multimap<std::string, Leaf> found;
-    std::vector<std::string> open;
-    std::string text;
-    bool innermost = false;
-    while (m_at < m_text.size()) {
-      if (m_text[m_at] != '<') {
-        text += m_text[m_at];
-        advance(1);
-        continue;
-      }
-      if (skip("<!--", "-->") || skip("<?", "?>") || skip("<!", ">"))
-        continue;
-      const std::size_t end = m_text.find('>', m_at);
-      if (end == std::string::npos)
-        fail(m_line, "'<' without '>'");
-      std::string tag = m_text.substr(m_at + 1, end - m_at - 1);
-      const bool closed_at_once = !tag.empty() && tag.back() == '/';
-      const bool closes = !tag.empty() && tag[0] == '/';
-      const std::string name = trimmed(closes ? tag.substr(1) : tag.substr(0, tag.find_first_of(" \t\r\n/")));
-      if (!closes) {
-        open.push_back(name);
-        text.clear();
-        innermost = true;
-      }
-      if (closes && (open.empty() || open.back() != name))
-        fail(m_line, fmt::format("</{}> closes what is not open", name));
-      if (closes || closed_at_once) {
-        if (innermost)
-          found.emplace(joined(open), Leaf{trimmed(text), m_line});
-        innermost = false;
-        open.pop_back();
-      }
-      advance(end + 1 - m_at);
-    }
-    if (!open.empty())
-      fail(m_line, fmt::format("<{}> is never closed", open.back()));
-    return found;
-  }
-
-  [[noreturn]] void fail(int line, const std::string &message) const
-  {
-    throw vpException(vpException::badValue, fmt::format("{}:{}: {}", m_path, line, message));
-  }
-
-private:
-  void advance(std::size_t n)
-  {
-    for (std::size_t i = 0; i < n && m_at < m_text.size(); ++i, ++m_at)
-      m_line += m_text[m_at] == '\n' ? 1 : 0;
-  }
-  bool skip(const std::string &from, const std::string &to)
-  {
-    if (m_text.compare(m_at, from.size(), from) != 0)
-      return false;
-    const std::size_t end = m_text.find(to, m_at + from.size());
-    if (end == std::string::npos)
-      fail(m_line, fmt::format("'{}' without '{}'", from, to));
-    advance(end + to.size() - m_at);
-    return true;
-  }
-  static std::string trimmed(const std::string &s)
-  {
-    const std::size_t a = s.find_first_not_of(" \t\r\n"), b = s.find_last_not_of(" \t\r\n");
-    return a == std::string::npos ? "" : s.substr(a, b - a + 1);
-  }
-  static std::string joined(const std::vector<std::string> &names)
-  {
-    std::string path;
-    for (const std::string &name : names)
-      path += (path.empty() ? "" : "/") + name;
-    return path;
-  }
-
-  std::string m_path, m_text;
-  std::size_t m_at = 0;
-  int m_line = 1;
-};
-
-double number(const XmlText &xml, const std::string &key, const Leaf &leaf)
-{
-  std::size_t used = 0;
-  double value = NAN;
-  try {
-    value = std::stod(leaf.text, &used);
-  }
-  catch (const std::exception &) {
-    used = std::string::npos;
-  }
-  if (used != leaf.text.size() || !std::isfinite(value))
-    xml.fail(leaf.line, fmt::format("{} = {}, must be a number", key, leaf.text));
-  return value;
+  if (const auto value = parseNumber<double>(leaf.text))
+    return *value;
+  fail(path, leaf.line, fmt::format("{} = {}, must be a number", key, leaf.text));
 }
 
 using Options = vpMbTrunkTracker::Options;
@@ -143,7 +51,7 @@ constexpr OptionKey kOptions[] = {
     {"detect_frozen", &Options::detect_frozen, 0, 1},
 };
 
-void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf> &leaves, TrunkSettings &settings)
+void readTrunkSection(const std::string &path, const Leaves &leaves, TrunkSettings &settings)
 {
   const std::string section = "conf/trunk/";
   for (auto it = leaves.lower_bound(section); it != leaves.end() && it->first.compare(0, section.size(), section) == 0;
@@ -152,15 +60,15 @@ void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf>
     const auto option = std::find_if(std::begin(kOptions), std::end(kOptions),
                                      [&](const OptionKey &known) { return key == known.name; });
     if (option == std::end(kOptions))
-      xml.fail(it->second.line, fmt::format("trunk/{}: no such key", key));
+      fail(path, it->second.line, fmt::format("trunk/{}: no such key", key));
     if (leaves.count(it->first) > 1)
-      xml.fail(it->second.line, fmt::format("trunk/{}: given twice", key));
-    settings.options.*option->member = number(xml, key, it->second);
+      fail(path, it->second.line, fmt::format("trunk/{}: given twice", key));
+    settings.options.*option->member = number(path, key, it->second);
     try {
       settings.options.validate();
     }
     catch (const vpException &error) {
-      xml.fail(it->second.line, error.getStringMessage());
+      fail(path, it->second.line, error.getStringMessage());
     }
   }
 }
@@ -168,21 +76,22 @@ void readTrunkSection(const XmlText &xml, const std::multimap<std::string, Leaf>
 
 TrunkSettings readTrunkSettings(const std::string &path, const vpMbTrunkTracker::Options &options, bool verbose)
 {
-  XmlText xml(path);
-  const std::multimap<std::string, Leaf> leaves = xml.leaves();
+  Leaves leaves;
+  for (const XmlElement &element : readXml(path))
+    leaves.emplace(element.path, element);
   TrunkSettings settings;
   settings.options = options;
   const auto get = [&](const std::string &key) -> std::optional<double> {
     const auto it = leaves.find("conf/" + key);
-    return it == leaves.end() ? std::nullopt : std::optional<double>(number(xml, key, it->second));
+    return it == leaves.end() ? std::nullopt : std::optional<double>(number(path, key, it->second));
   };
   const auto u0 = get("camera/u0"), v0 = get("camera/v0"), px = get("camera/px"), py = get("camera/py");
   const int given = int(u0.has_value()) + int(v0.has_value()) + int(px.has_value()) + int(py.has_value());
   if (given != 0 && given != 4)
-    xml.fail(1, "camera: must hold u0, v0, px and py");
+    fail(path, 1, "camera: must hold u0, v0, px and py");
   if (given == 4) {
     if (!(*px > 0 && *py > 0))
-      xml.fail(1, fmt::format("camera: px = {}, py = {}, must be above 0", *px, *py));
+      fail(path, 1, fmt::format("camera: px = {}, py = {}, must be above 0", *px, *py));
     settings.has_camera = true;
     settings.camera.initPersProjWithoutDistortion(*px, *py, *u0, *v0);
   }
@@ -193,9 +102,9 @@ TrunkSettings readTrunkSettings(const std::string &path, const vpMbTrunkTracker:
     settings.angle_appear = vpMath::rad(*angle);
   if (const auto angle = get("face/angle_disappear"))
     settings.angle_disappear = vpMath::rad(*angle);
-  readTrunkSection(xml, leaves, settings);
+  readTrunkSection(path, leaves, settings);
   if (verbose)
-    fmt::print("{}: {} settings\n", path, leaves.size());
+    fmt::print("{}: read\n", path);
   return settings;
 }
 } // namespace bole

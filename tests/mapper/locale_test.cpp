@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A host program whose decimals have a comma reads and writes the same bytes.
+#include "exchange/exchange.h"
+#include "input/asl_source.h"
+#include "input/trajectory.h"
+#include "mbt/cao_reader.h"
+#include "mbt/trunk_settings.h"
+#include "output/flight_trace.h"
+#include "output/summary_json.h"
+#include "output/trajectory_writer.h"
+#include "output/trunks_csv.h"
+#include "support/german_locale.h"
+#include <bole/config.h>
+#include <bole/pipeline.h>
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+namespace
+{
+using namespace bole;
+namespace fs = std::filesystem;
+
+class Locales : public testing::Test
+{
+protected:
+  Locales()
+  {
+    std::string pattern = (fs::temp_directory_path() / "bole-locales-XXXXXX").string();
+    m_folder = mkdtemp(pattern.data());
+  }
+  ~Locales() override { fs::remove_all(m_folder); }
+
+  std::string write(const std::string &name, const std::string &text) const
+  {
+    std::ofstream(m_folder + "/" + name) << text;
+    return m_folder + "/" + name;
+  }
+  static std::string contentOf(const fs::path &path)
+  {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+  /// Files of a short flight, mapped here and now.
+  std::map<std::string, std::string> filesOfAFlight(const std::string &name) const
+  {
+    const std::string run = m_folder + "/" + name;
+    fs::create_directories(run);
+    Options options;
+    readConfig(write("options.yaml", "odometry:\n  height: 0.125\n"), options);
+    AslSource source(BOLE_SOURCE_DIR "/data/park-forward");
+    Pipeline pipeline(source.camera(), source.bMc(), options);
+    Frame frame;
+    for (int k = 0; k < 40 && source.next(frame); ++k)
+      pipeline.process(frame);
+    pipeline.finish();
+    RunSummary summary;
+    summary.camera = source.camera();
+    summary.options = toYaml(options);
+    summary.path_m = 1234.5;
+    writeSummary(run + "/summary.json", summary);
+    std::vector<TrunkRecord> trunks = pipeline.map();
+    for (TrunkRecord &trunk : trunks)
+      trunk.status = TrunkStatus::confirmed;
+    writeTrunks(run + "/trunks.csv", trunks);
+    writeTrajectory(run + "/trajectory.tum", pipeline.smoothedTrajectory());
+    std::map<std::string, std::string> files;
+    const std::vector<Cylinder> many(600);
+    writeCao(run + "/many.cao", many);
+    for (const auto &entry : fs::directory_iterator(run))
+      files[entry.path().filename().string()] = contentOf(entry.path());
+    return files;
+  }
+
+  std::string m_folder;
+};
+
+TEST_F(Locales, AFlightIsMappedToTheSameBytes)
+{
+  const auto here = filesOfAFlight("here");
+  EXPECT_GE(here.size(), 4u);
+  const test::GermanLocale german;
+  if (!german.isOn())
+    GTEST_SKIP() << "no German locale, and localedef cannot make it";
+  for (const auto &[name, bytes] : filesOfAFlight("there"))
+    EXPECT_EQ(bytes, here.at(name)) << name;
+}
+
+TEST_F(Locales, FilesOfOthersAreReadAlike)
+{
+  const test::GermanLocale german;
+  if (!german.isOn())
+    GTEST_SKIP() << "no German locale, and localedef cannot make it";
+  EXPECT_EQ(readCamera(write("c.yaml", "resolution: [320, 240]\nintrinsics: [200.5, 201.25, 160.5, 120.5]\n"))
+                .model.pinhole.fx,
+            200.5);
+  const std::string model = "<type>perspectiveProjWithDistortion</type><px>200.5</px><py>201.25</py><u0>160.5</u0>"
+                            "<v0>120.5</v0><kud>-0.125</kud>";
+  const CameraModel xml =
+      readCamera(write("c.xml", "<root><camera><model>" + model + "</model></camera></root>"), 320, 240).model;
+  EXPECT_EQ(xml.pinhole.fy, 201.25);
+  EXPECT_EQ(xml.coefficients[0], -0.125);
+  EXPECT_EQ(readTrunkSettings(write("t.xml", "<conf><trunk><radius_sigma>0.125</radius_sigma></trunk></conf>"), {})
+                .options.radius_sigma,
+            0.125);
+  EXPECT_EQ(readCao(write("m.cao", "V1\n2\n0.5 0 0\n0.5 0 3\n0\n0\n0\n1\n0 1 0.125\n0\n"))[0].radius, 0.125);
+  EXPECT_EQ(readTrajectory(write("o.tum", "1.5 0.25 0 1 0 0 0 1\n"))[0].wMb.t.x(), 0.25);
+  EXPECT_EQ(parseOrigin("59.25,18.5,0.5").longitude, 18.5);
+}
+} // namespace
