@@ -47,8 +47,10 @@ void addExport(CLI::App &app)
     const auto format = std::find_if(kExportFormats.begin(), kExportFormats.end(),
                                      [&](const ExportFormat &known) { return known.name == arguments->format; });
     const std::string file = arguments->output.empty() ? arguments->run + "/" + format->file : arguments->output;
-    exportRun(arguments->run, arguments->format, file, origin);
+    const std::string note = exportRun(arguments->run, arguments->format, file, origin);
     std::printf("%s\n", file.c_str());
+    if (!note.empty())
+      std::fprintf(stderr, "bole: %s\n", note.c_str());
   });
 }
 } // namespace bole::apps

@@ -5,6 +5,7 @@
 
 #include "input/regular_file.h"
 #include "output/run_folder.h"
+#include "output/summary_json.h"
 #include "output/versions.h"
 
 #include <filesystem>

@@ -38,37 +38,45 @@ MapOfRun readMapOfRun(const std::string &run)
   return map;
 }
 
-void exportRun(const std::string &run, const std::string &format, const std::string &file,
-               const std::optional<GeoOrigin> &origin)
+std::string exportRun(const std::string &run, const std::string &format, const std::string &file,
+                      const std::optional<GeoOrigin> &origin)
 {
   if (format == "g2o") {
     writeG2o(file, readG2o(run + "/graph.g2o"));
-    return;
+    return {};
   }
   const MapOfRun map = readMapOfRun(run);
-  if (format == "tum")
+  if (format == "tum") {
     writeTrajectory(file, map.trajectory);
-  else if (format == "colmap") {
+    return {};
+  }
+  if (format == "colmap") {
     std::error_code error;
     std::filesystem::create_directories(file, error);
     if (error)
       throw ioError("{}: cannot be made: {}", file, error.message());
-    writeAtomically(file + "/cameras.txt", toColmapCameras(map));
-    writeAtomically(file + "/images.txt", toColmapImages(map));
+    const PicturesOfRun pictures = picturesOf(run, map);
+    writeAtomically(file + "/cameras.txt", toColmapCamera(pictures.lens));
+    writeAtomically(file + "/images.txt", toColmapImages(map, pictures));
     writeAtomically(file + "/points3D.txt", toColmapPoints(map));
+    return pictures.note;
   }
-  else if (map.trunks.empty())
+  if (map.trunks.empty())
     throw badValue("{}/trunks.csv: no trunk, so that there is no map to be exported", run);
-  else if (format == "cao") {
+  if (format == "cao") {
     std::vector<Cylinder> cylinders;
     for (const TrunkRecord &trunk : map.trunks)
       cylinders.push_back(cylinderOf(trunk));
     writeCao(file, cylinders, "map of trunks; " + describe(map.reference));
+    return {};
   }
-  else
-    writeAtomically(file, format == "ply"       ? toPly(map)
-                          : format == "geojson" ? toGeoJson(map, origin)
-                          : format == "dxf"     ? toDxf(map)
-                                                : toInventory(map));
+  writeAtomically(file, format == "ply"       ? toPly(map)
+                        : format == "geojson" ? toGeoJson(map, origin)
+                        : format == "dxf"     ? toDxf(map)
+                                              : toInventory(map));
+  return format == "geojson" && !origin
+             ? "coordinates are metres of the run's world, which other programs take for degrees: --origin tells where "
+               "it lies"
+             : "";
 }
 } // namespace bole

@@ -2,7 +2,9 @@
 #include "exchange/exchange.h"
 #include "geometry/constants.h"
 #include "geometry/failure.h"
+#include "geometry/parse_number.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -17,15 +19,15 @@ double rounded(double value, double parts) { return std::round(value * parts) / 
 
 GeoOrigin parseOrigin(const std::string &text)
 {
-  GeoOrigin origin;
-  char comma[2] = {0, 0};
-  std::string rest;
+  std::vector<double> numbers;
   std::istringstream stream(text);
-  stream >> origin.latitude >> comma[0] >> origin.longitude >> comma[1] >> origin.heading;
-  const bool is_read = !stream.fail() && comma[0] == ',' && comma[1] == ',' && !(stream >> rest);
-  if (!is_read || std::abs(origin.latitude) > 89 || std::abs(origin.longitude) > 180 || std::abs(origin.heading) > 360)
+  for (std::string word; std::getline(stream >> std::ws, word, ',');)
+    if (const auto number = parseNumber<double>(word))
+      numbers.push_back(*number);
+  if (std::count(text.begin(), text.end(), ',') != 2 || numbers.size() != 3 || std::abs(numbers[0]) > 89 ||
+      std::abs(numbers[1]) > 180 || std::abs(numbers[2]) > 360)
     throw badValue("--origin {}: must be LATITUDE,LONGITUDE,HEADING in degrees, within 89, 180 and 360", text);
-  return origin;
+  return {numbers[0], numbers[1], numbers[2]};
 }
 
 Eigen::Vector2d toEarth(const GeoOrigin &origin, const Eigen::Vector2d &xy)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/recorded_source.h"
 
+#include <filesystem>
+
 namespace bole
 {
 const ImageRow *firstReadable(const std::vector<ImageRow> &rows, ImageFile &file)
@@ -14,6 +16,11 @@ const ImageRow *firstReadable(const std::vector<ImageRow> &rows, ImageFile &file
   }
   file.message = fault;
   return nullptr;
+}
+
+std::string ImageFilesSource::pictureName(std::size_t index) const
+{
+  return index < m_rows.size() ? std::filesystem::path(m_rows[index].path).filename().string() : std::string();
 }
 
 bool ImageFilesSource::next(Frame &frame)

@@ -5,6 +5,7 @@
 
 #include "input/frame_builder.h"
 
+#include <fmt/format.h>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,10 @@ public:
   bool hasGyro() const override { return !m_builder->recording().gyro.empty(); }
   bool isCameraKnown() const override { return m_note.empty(); } // the note tells of a guess
   std::string note() const override { return m_note; }
+  /// The camera as it films, with its lens and before it is shrunk.
+  const CameraModel &lens() const { return m_builder->lens(); }
+  /// Name of the file of frame \p index; of a video that which `ffmpeg -i VIDEO %06d.png` would give it.
+  virtual std::string pictureName(std::size_t index) const { return fmt::format("{:06}.png", index + 1); }
 
 protected:
   std::string m_name, m_note;
@@ -44,6 +49,7 @@ class ImageFilesSource : public RecordedSource
 public:
   bool next(Frame &frame) override;
   std::size_t size() const override { return m_rows.size(); }
+  std::string pictureName(std::size_t index) const override;
 
 protected:
   std::vector<ImageRow> m_rows;

@@ -9,6 +9,7 @@
 #include "output/versions.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 namespace bole
@@ -169,7 +170,7 @@ double numberOrZero(const Json &json, const char *key)
 nlohmann::ordered_json readSummary(const std::string &path)
 {
   constexpr std::size_t kMostBytes = 16'000'000;
-  Json json = Json::parse(readWholeFile(path, kMostBytes), nullptr, false);
+  const Json json = Json::parse(readWholeFile(path, kMostBytes), nullptr, false);
   if (!json.is_object())
     throw badValue("{}: is no summary of a run", path);
   if (const Json *frames = json.contains("frames") ? &json["frames"] : nullptr;
@@ -211,6 +212,21 @@ PinholeCamera readCameraOfRun(const std::string &path)
   }
   catch (const Json::exception &error) {
     throw badValue("{}", faultOf(path + ": camera", error));
+  }
+}
+
+RunInput readInputOfRun(const std::string &path)
+{
+  const Json json = readSummary(path);
+  const auto text = [](const Json &value) { return value.is_string() ? value.get<std::string>() : std::string(); };
+  try {
+    const Json &input = json.at("input");
+    const std::filesystem::path folder = text(json.at("working_folder"));
+    const std::string camera = text(input.at("camera_file"));
+    return {(folder / text(input.at("source"))).string(), camera.empty() ? camera : (folder / camera).string()};
+  }
+  catch (const Json::exception &error) {
+    throw badValue("{}", faultOf(path + ": input", error));
   }
 }
 

@@ -10,6 +10,7 @@
 #include <bole/trunk_record.h>
 #include <bole/world_reference.h>
 
+#include <exception>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -70,6 +71,12 @@ std::string faultOf(const std::string &path, const std::exception &error);
 WorldReference readReference(const std::string &path);
 /// The camera of a summary.json, likewise.
 PinholeCamera readCameraOfRun(const std::string &path);
+/// Where the input of a run lay, and its camera file, empty where none was given. Likewise.
+struct RunInput
+{
+  std::string path, camera_path;
+};
+RunInput readInputOfRun(const std::string &path);
 /// toJson(), written atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
 } // namespace bole

@@ -4,6 +4,8 @@
 #include "exchange/exchange.h"
 #include "geometry/cylinder.h"
 #include "geometry/so3.h"
+#include "input/flight_folder.h"
+#include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
@@ -216,6 +218,28 @@ TEST_F(Exported, GeoJsonWithoutAnOriginHasMetresAndSaysSo)
   EXPECT_NEAR(json["features"][1]["geometry"]["coordinates"][0].get<double>(), m_map.trunks[1].xy.x(), 1e-4);
 }
 
+TEST_F(Exported, GeoJsonWithoutAnOriginIsSaidToBeInMetres)
+{
+  EXPECT_THAT(exportRun(m_run, "geojson", m_run + "/m.geojson", {}), HasSubstr("coordinates are metres"));
+  EXPECT_EQ(exportRun(m_run, "geojson", m_run + "/m.geojson", GeoOrigin{59.34, 18.07, 30}), "");
+  EXPECT_EQ(exportRun(m_run, "ply", m_run + "/m.ply", {}), "");
+}
+
+TEST_F(Exported, ADamagedSummaryIsNamedInPlainWords)
+{
+  for (const char *text : {"{\"scale\": 5}", "{\"ranges\": \"no\"}", "{}"}) {
+    std::ofstream(m_run + "/summary.json") << text;
+    try {
+      readMapOfRun(m_run);
+      FAIL() << text;
+    }
+    catch (const vpException &error) {
+      EXPECT_THAT(error.what(), HasSubstr("summary.json: is damaged: ")) << text;
+      EXPECT_THAT(error.what(), testing::Not(HasSubstr("json.exception")));
+    }
+  }
+}
+
 TEST_F(Exported, GeoJsonIsReadByGdal)
 {
   RUN_TOOL(outcome, "ogrinfo", "-al -ro " + path("geojson", GeoOrigin{59.34, 18.07, 30}));
@@ -313,6 +337,29 @@ TEST_F(Exported, ColmapProjectsWhatOurCameraProjects)
   EXPECT_GT(c.z(), 0);
   EXPECT_LT((theirs - Eigen::Vector2d(0.5, 0.5) - ours).norm(), 1e-4);
   EXPECT_THAT(images[2 + 2 * 3], testing::EndsWith(" 1 1403636580063555584.png"));
+}
+
+TEST_F(Exported, ColmapHasTheNamesAndTheLensOfThePicturesThatAreThere)
+{
+  const test::FlightFolder flight(6);
+  flight.write("mav0/cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [50, 51, 31.5, 23.5]\n"
+                                        "distortion_model: equidistant\ndistortion_coefficients: [0.01, 0.02, 0, 0]\n");
+  RunSummary summary;
+  summary.camera = m_map.camera;
+  summary.working_folder = "/";
+  summary.input = flight.path();
+  writeSummary(m_run + "/summary.json", summary);
+  FlightTrace trace;
+  for (std::size_t i = 0; i < m_map.trajectory.size(); ++i) {
+    trace.frames.emplace_back();
+    trace.frames.back().index = i;
+    trace.frames.back().stamp_ns = m_map.trajectory[i].stamp_ns;
+  }
+  writeTrace(m_run, trace);
+  const std::string folder = m_run + "/colmap";
+  EXPECT_EQ(exportRun(m_run, "colmap", folder, {}), "");
+  EXPECT_EQ(linesOf(folder + "/cameras.txt").at(1), "1 OPENCV_FISHEYE 64 48 50 51 32 24 0.01 0.02 0 0");
+  EXPECT_THAT(linesOf(folder + "/images.txt").at(2 + 2 * 3), testing::EndsWith(" 1 0003.png"));
 }
 
 TEST_F(Exported, ColmapIsReadByColmap)
