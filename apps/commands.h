@@ -4,6 +4,11 @@
 /// The subcommands of `bole`. Each adds itself to the command line with its options and its callback; a
 /// callback throws vpException for a user's mistake, which main() prints as one line.
 
+#include "geometry/failure.h"
+#include "input/live_video.h"
+#include <bole/ardrone_source.h>
+#include <bole/frame.h>
+
 #include <CLI/CLI.hpp>
 
 #include <string>
@@ -23,6 +28,20 @@ inline CLI::Validator within(double low, double high)
                    : text + ", must be in [" + CLI::detail::to_string(low) + ", " + CLI::detail::to_string(high) + "]";
       },
       "", "");
+}
+
+/// Throws where a height of the camera is given [m], and \p source tells the scale itself.
+inline void requireHeightUsed(double camera_height, const FrameSource &source)
+{
+  if (camera_height > 0 && source.hasOdometry())
+    throw badValue("{}: --camera-height has no effect: the odometry tells the scale", source.name());
+}
+
+/// Throws where \p command was told how long a live stream may be silent, and \p input is none.
+inline void requireGiveUpUsed(const CLI::App &command, const std::string &input)
+{
+  if (command.count("--give-up") > 0 && !LiveVideoSource::accepts(input) && !ArDroneSource::accepts(input))
+    throw badValue("{}: --give-up has no effect: a recording ends by itself", input);
 }
 
 /// What the process returns; `bole --help` tells the same.

@@ -11,6 +11,7 @@
 #include "geometry/so3.h"
 #include "geometry/visp_matrix.h"
 #include "input/atomic_file.h"
+#include "input/csv_reader.h"
 #include "input/live_video.h"
 #include "input/secrets.h"
 #include "mbt/cao_reader.h"
@@ -216,7 +217,7 @@ public:
       : m_arguments(arguments),
         m_camera(camera),
         m_cMb(bMc.inverse()),
-        m_model(readCao(arguments.model)),
+        m_model(readTrunkModel(arguments.model)),
         m_window(arguments.is_shown, "bole follow"),
         m_folder(arguments.folder, {"follow.json", "status.csv", "trajectory.tum", "overlay.mp4"}),
         m_status(m_folder.file("status.csv"),
@@ -256,8 +257,7 @@ public:
                           std::sqrt(P.bottomRightCorner<3, 3>().trace()) * 180 / M_PI);
     }
     ++m_counts[status];
-    std::replace(message.begin(), message.end(), '"', '\'');
-    m_status.add(fmt::format("{},{:.6f},{},{},\"{}\"\n", frame.index, time_s, status, place, message));
+    m_status.add(fmt::format("{},{:.6f},{},{},{}\n", frame.index, time_s, status, place, csvField(message)));
     draw(frame, follower, is_held, status);
   }
 
@@ -346,6 +346,7 @@ void follow(const FollowArguments &arguments)
                                                   : openSource(arguments.input, arguments.source);
   if (!source->note().empty() && !arguments.is_quiet)
     fmt::print(stderr, "bole: {}\n", source->note());
+  requireHeightUsed(arguments.camera_height, *source);
   const Pose bMc = source->bMc();
   Follower follower(arguments, source->camera());
   // A flight without a pose filter is mapped as it goes: its point features carry the tracker from frame to frame.
@@ -418,7 +419,8 @@ void addFollow(CLI::App &app)
       ->capture_default_str();
   command->add_option("-o,--output", arguments->folder, "Folder for the results")->required();
   command->add_option("--settings", arguments->settings, "XML settings of the tracker (models/*.xml)");
-  command->add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
+  command->add_option("--camera", arguments->source.camera_path,
+                      "Camera: EuRoC, OpenCV, ROS or Kalibr YAML, or ViSP XML");
   command->add_option("--odometry", arguments->source.odometry_path, "Poses for a video: TUM or ASL csv");
   command->add_option("--field-of-view", arguments->source.field_of_view_deg,
                       "Horizontal, where there is no camera file [degrees]");
@@ -447,6 +449,9 @@ void addFollow(CLI::App &app)
       "  bole follow monday.mp4 --model sunday.cao --camera phone.yaml -o run\n"
       "  bole follow data/park-forward --model map.cao --init 0,0,1.5,0 -o run\n"
       "  bole follow rtsp://192.168.0.20/stream --model map.cao --init click --show -o run");
-  command->callback([arguments] { follow(*arguments); });
+  command->callback([arguments, command] {
+    requireGiveUpUsed(*command, arguments->input);
+    follow(*arguments);
+  });
 }
 } // namespace bole::apps

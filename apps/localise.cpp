@@ -30,6 +30,7 @@ void localise(const LocaliseArguments &arguments)
 {
   std::vector<TrunkRecord> map = readKnownMap(arguments.map);
   const std::unique_ptr<FrameSource> source = openSource(arguments.input, arguments.source);
+  requireHeightUsed(arguments.camera_height, *source);
   const OutputFolder folder(arguments.folder, {"localise.json", "trajectory.tum"});
   Localiser localiser(std::move(map), *source, arguments.camera_height);
   std::size_t frames = 0, placed_frames = 0;

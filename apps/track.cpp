@@ -36,8 +36,8 @@ namespace
 /// As it is given, or as the video tells its field of view; \p arguments open the same once more.
 std::unique_ptr<FrameSource> openVideo(TrackArguments &arguments, RunSummary &made)
 {
-  MeasuredSource opened =
-      openMeasured(arguments.input, arguments.source, arguments.is_field_of_view_given, arguments.give_up_s);
+  MeasuredSource opened = openMeasured(arguments.input, arguments.source, arguments.give_up_s);
+  requireHeightUsed(arguments.is_without_odometry ? 0 : arguments.camera_height, *opened.source);
   arguments.source = opened.options;
   made.note = opened.note;
   made.is_camera_known = opened.is_camera_known;
@@ -74,9 +74,13 @@ std::unique_ptr<FrameSource> openInput(TrackArguments &arguments, const Options 
 {
   if (!ArDroneSource::accepts(arguments.input))
     return openRecording(arguments, options, made, calibration);
+  requireUsed(arguments.source, arguments.input, kDrone);
   ArDroneSource::Options link;
   link.give_up_s = arguments.give_up_s;
-  return std::make_unique<ArDroneSource>(arguments.input, link);
+  link.max_width_px = arguments.source.max_width_px;
+  auto source = std::make_unique<ArDroneSource>(arguments.input, link);
+  requireHeightUsed(arguments.is_without_odometry ? 0 : arguments.camera_height, *source);
+  return source;
 }
 
 Options readOptions(const TrackArguments &arguments, bool is_compressed)

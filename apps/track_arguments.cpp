@@ -17,7 +17,8 @@ void addTrackOptions(CLI::App &command, const std::shared_ptr<TrackArguments> &a
                      "YAML file of options, or a preset by its name (paper: the paper's method); `bole options` lists "
                      "them. Videos and live drones start with camera.compressed=true");
   command.add_option("--set", arguments->settings, "One option, e.g. --set detection.window=30");
-  command.add_option("--camera", arguments->source.camera_path, "Camera: EuRoC sensor.yaml or ViSP XML");
+  command.add_option("--camera", arguments->source.camera_path,
+                     "Camera: EuRoC, OpenCV, ROS or Kalibr YAML, or ViSP XML");
   command.add_option("--odometry", arguments->source.odometry_path,
                      "Poses for a video: TUM or ASL csv; `none` withholds odometry and gyro");
   command
@@ -79,9 +80,9 @@ void settle(const CLI::App &command, TrackArguments &arguments)
   for (const char *needed : {"INPUT", "--output"})
     if (command.count(needed) == 0)
       throw CLI::RequiredError(needed);
+  requireGiveUpUsed(command, arguments.input);
   for (const std::string &sensor : arguments.without)
     (sensor == "gyro" ? arguments.is_without_gyro : arguments.is_without_odometry) = true;
-  arguments.is_field_of_view_given = command.count("--field-of-view") > 0;
   if (arguments.source.odometry_path == "none") {
     arguments.is_without_odometry = arguments.is_without_gyro = true;
     arguments.source.odometry_path.clear();

@@ -25,7 +25,6 @@ struct TrackArguments
   bool is_cut = false; ///< without a last look: as a run was that was killed after frames_most frames
   double give_up_s = ArDroneSource::Options().give_up_s;
   double camera_height = 0;
-  bool is_field_of_view_given = false;
 };
 
 /// The options of `bole track`, to be kept in \p arguments.

@@ -108,10 +108,8 @@ Options optionsOf(const py::dict &values, Options options = {})
 class Input
 {
 public:
-  Input(const std::filesystem::path &input, const SourceOptions &options, bool is_field_of_view_given)
-      : m_input(input.string()),
-        m_opened(openMeasured(m_input, options, is_field_of_view_given, kGiveUp_s)),
-        m_next(std::move(m_opened.source))
+  Input(const std::filesystem::path &input, const SourceOptions &options)
+      : m_input(input.string()), m_opened(openMeasured(m_input, options, kGiveUp_s)), m_next(std::move(m_opened.source))
   {
     m_first = m_next;
   }
@@ -176,7 +174,10 @@ Pipeline pipelineOf(const std::array<double, 4> &camera, const std::array<int, 2
 /// A mistake in the words of this module.
 std::string inPython(std::string message)
 {
-  const std::pair<const char *, const char *> kWords[] = {{"frame_rate_hz", "rate"},
+  const std::pair<const char *, const char *> kWords[] = {{"frame_rate_hz (--rate)", "rate"},
+                                                          {"field_of_view_deg (--field-of-view)", "field_of_view"},
+                                                          {"odometry_offset_s (--odometry-offset)", "odometry_offset"},
+                                                          {"frame_rate_hz", "rate"},
                                                           {"field_of_view_deg", "field_of_view"},
                                                           {"max_width_px", "max_width"},
                                                           {"odometry_offset_s, --odometry-offset,", "odometry_offset"},
@@ -335,10 +336,10 @@ PYBIND11_MODULE(_bole, module)
         options.odometry_path = odometry.string();
         options.odometry_offset_s = odometry_offset;
         options.frame_rate_hz = rate;
-        options.field_of_view_deg = field_of_view.value_or(options.field_of_view_deg);
+        options.field_of_view_deg = field_of_view;
         options.max_width_px = max_width;
         const py::gil_scoped_release release;
-        return std::make_unique<Input>(input, options, field_of_view.has_value());
+        return std::make_unique<Input>(input, options);
       },
       py::arg("input"), py::arg("camera") = "", py::arg("odometry") = "", py::arg("odometry_offset") = 0.0,
       py::arg("rate") = py::none(), py::arg("field_of_view") = py::none(),

@@ -22,17 +22,16 @@ struct MountedCamera
 /// Pose in the body (x forward, y left, z up) of a camera at its origin that looks straight ahead.
 Pose forwardCamera();
 
-/// Reads a camera: EuRoC, OpenCV or ROS YAML (`.yaml`, `.yml`) or ViSP XML (`.xml`).
+/// Reads a camera, whatever the name of its file: EuRoC, OpenCV, ROS or Kalibr YAML, or ViSP XML.
 ///
 /// YAML: keys of the EuRoC datasets and no others; distortion_model is `none`, `radial-tangential`
 /// (or `radtan`; k1 k2 p1 p2, a fifth coefficient must be 0), `equidistant` (k1 .. k4) or `fov` (s
 /// [rad]). `T_BS` takes coordinates of the camera to those of the body; without it the camera is
-/// forwardCamera(). XML: read by vpXmlParserCamera, the model with distortion where there is one
-/// (kud becomes k1); a file with several cameras is resolved by \p width and \p height [px], 0 for
-/// any.
+/// forwardCamera(). XML: the model with distortion where there is one (kud becomes k1); a file with
+/// several cameras is resolved by \p width and \p height [px], 0 for any.
 ///
-/// A file with the key `camera_matrix` is a calibration of OpenCV or ROS: the camera is forwardCamera(), a third radial
-/// coefficient is folded into the other two.
+/// A calibration of OpenCV or ROS (`camera_matrix`, or K as a printed camera_info has it) is that of a forwardCamera(),
+/// of a fisheye where it says so; a third radial coefficient is folded into the other two.
 ///
 /// Errors: vpException "file:line: key = value, must be ..." for an unknown, repeated, missing,
 /// mistyped or out-of-range key, and for a T_BS that is not a rigid motion;
@@ -65,7 +64,7 @@ struct SensorCalibration
       verdicts; ///< sensors that contradict the others from the start on, for which no constant helps
 };
 
-/// Options of every frame source. validate() throws vpException "name = value, must be ...".
+/// Options of every frame source. One that has no effect on the source is refused.
 struct SourceOptions
 {
   std::string camera_path;   ///< camera file (readCamera()); empty: the one of the folder, or a guess
@@ -80,9 +79,9 @@ struct SourceOptions
   std::optional<double> frame_rate_hz;
   /// [px], 0 (keep) or >= 64: wider images are shrunk to this. Default 640: see Rectifier.
   int max_width_px = 640;
-  /// [degrees], 10 to 150: horizontal field of view that is assumed, and said, where no camera is
-  /// given. Default 65: between a phone's video and an action camera's.
-  double field_of_view_deg = 65;
+  /// [degrees], 10 to 150: horizontal field of view where no camera is given. Default: 65 is assumed, and said, which
+  /// is between a phone's video and an action camera's.
+  std::optional<double> field_of_view_deg;
   /// Errors of gyro and odometry that are taken out. Default: none.
   SensorCalibration calibration;
 
@@ -90,9 +89,9 @@ struct SourceOptions
   void validate() const;
 };
 
-/// Opens \p input: an ASL folder (AslSource), a pattern such as `image%04d.png` or a folder of
-/// numbered images (SequenceSource), or else a video file (VideoSource). Errors: vpException, one
-/// line that names the input and what is wrong with it.
+/// Opens \p input: an ASL folder (AslSource), a video file whatever its name (VideoSource), a folder of numbered images
+/// or a pattern such as `image%04d.png` (SequenceSource), or an address. Errors: vpException, one line that names the
+/// input and what is wrong with it.
 ///
 /// \code
 /// const auto source = openSource("data/park-forward");

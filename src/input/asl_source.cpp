@@ -177,9 +177,9 @@ void requireCameraSize(const std::vector<ImageRow> &rows, const CameraModel &mod
 
 AslSource::AslSource(const std::string &folder, const SourceOptions &options)
 {
-  options.validate();
   if (!accepts(folder))
     throw ioError("{}: no ASL folder (cam0/data.csv is missing)", folder);
+  requireUsed(options, folder, kAslFolder);
   const fs::path root = sensorRoot(folder);
   m_name = folder;
   m_rows = readImageRows(root / "cam0");

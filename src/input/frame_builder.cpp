@@ -30,7 +30,8 @@ Recording corrected(Recording recording, const SensorCalibration &calibration)
 }
 
 FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
-    : m_rectifier(camera.model, options.max_width_px),
+    : m_lens(camera.model),
+      m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
       m_recording(corrected(std::move(recording), options.calibration)),
       m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9)),
@@ -86,14 +87,15 @@ void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int6
                  first_ns * 1e-9, last_ns * 1e-9);
 }
 
-MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note)
+MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note, double pixel_aspect)
 {
   if (options.camera_path.empty()) {
-    const double f = 0.5 * width / std::tan(0.5 * options.field_of_view_deg * M_PI / 180);
-    note = fmt::format("no camera file: assuming a field of view of {:g} degrees (f = {:.0f} px)",
-                       options.field_of_view_deg, f);
+    constexpr double kUsual_deg = 65;
+    const double view_deg = options.field_of_view_deg.value_or(kUsual_deg);
+    const double f = 0.5 * width / std::tan(0.5 * view_deg * M_PI / 180);
+    note = fmt::format("no camera file: assuming a field of view of {:g} degrees (f = {:.0f} px)", view_deg, f);
     CameraModel model;
-    model.pinhole = {f, f, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
+    model.pinhole = {f, f * pixel_aspect, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
     return {model, forwardCamera()};
   }
   const MountedCamera camera = readCamera(options.camera_path, width, height);

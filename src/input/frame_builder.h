@@ -15,6 +15,21 @@
 
 namespace bole
 {
+/// Which of SourceOptions a source has a use for.
+struct SourceKind
+{
+  const char *name;
+  bool takes_camera, has_camera, takes_odometry, takes_rate;
+};
+constexpr SourceKind kAslFolder{"an ASL folder", true, true, true, false};
+constexpr SourceKind kNumberedImages{"a sequence of images", true, false, true, true};
+constexpr SourceKind kVideo{"a video", true, false, true, false};
+constexpr SourceKind kStream{"a live stream", true, false, false, false};
+constexpr SourceKind kDrone{"a drone", false, true, false, false};
+
+/// Throws vpException where \p options are out of range, or hold what has no effect on \p input of this \p kind.
+void requireUsed(const SourceOptions &options, const std::string &input, const SourceKind &kind);
+
 /// Motion sensors of a recording; each may be empty.
 struct Recording
 {
@@ -42,9 +57,11 @@ public:
   int inputHeight() const { return m_rectifier.inputHeight(); }
   const PinholeCamera &camera() const { return m_rectifier.camera(); }
   const Pose &bMc() const { return m_bMc; }
+  const CameraModel &lens() const { return m_lens; }
   const Recording &recording() const { return m_recording; }
 
 private:
+  CameraModel m_lens;
   Rectifier m_rectifier;
   Pose m_bMc;
   Recording m_recording;
@@ -64,5 +81,7 @@ void requireOverlap(const Trajectory &odometry, std::int64_t first_ns, std::int6
 
 /// The camera of \p options for images of this size, checked against it; without a camera file one
 /// that looks straight ahead with the assumed field of view, which \p note then says.
-MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note);
+/// \p pixel_aspect: width of a pixel over its height.
+MountedCamera cameraFor(const SourceOptions &options, int width, int height, std::string &note,
+                        double pixel_aspect = 1);
 } // namespace bole

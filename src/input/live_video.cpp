@@ -198,7 +198,9 @@ struct LiveVideoSource::State
 
 bool LiveVideoSource::accepts(const std::string &address)
 {
-  return isDevice(address) || (address.find("://") != std::string::npos && address.rfind("ardrone:", 0) != 0);
+  std::error_code error;
+  return isDevice(address) || (address.find("://") != std::string::npos && address.rfind("ardrone:", 0) != 0 &&
+                               !std::filesystem::exists(address, error));
 }
 
 LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s)
@@ -209,11 +211,9 @@ LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions
 LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s,
                                  std::unique_ptr<VideoFile> file)
 {
-  options.validate();
+  requireUsed(options, withoutSecrets(address), kStream);
   if (!(give_up_s > 0 && give_up_s <= 86400))
     throw badValue("give_up_s = {:g}, must be in (0, 86400]", give_up_s);
-  if (!options.odometry_path.empty())
-    throw badValue("{}: a live stream has no odometry file ({})", withoutSecrets(address), options.odometry_path);
   m_name = withoutSecrets(address);
   m_state = std::make_unique<State>();
   State &state = *m_state;
@@ -222,14 +222,15 @@ LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions
   state.give_up_ns = static_cast<std::int64_t>(give_up_s * 1e9);
   if (file)
     state.limit = file->limit();
+  const double pixel_aspect = file ? file->pixelAspect() : 1;
   state.reader = file ? readerOf(std::move(file)) : openReader(address, state.limit);
   state.counters.connections = 1;
   Picture first = state.first();
   state.beginning = first;
   const std::int64_t first_ns = first.stamp_ns;
   first.stamp_ns = 0;
-  const MountedCamera camera =
-      cameraFor(options, static_cast<int>(first.image.getWidth()), static_cast<int>(first.image.getHeight()), m_note);
+  const MountedCamera camera = cameraFor(options, static_cast<int>(first.image.getWidth()),
+                                         static_cast<int>(first.image.getHeight()), m_note, pixel_aspect);
   m_builder = std::make_unique<FrameBuilder>(camera, options, Recording());
   state.begun_ns = state.heard_ns = now_ns();
   state.take(std::move(first), state.begun_ns);

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <map>
+#include <numeric>
 #include <regex>
 
 namespace bole
@@ -57,8 +58,8 @@ void requireNoHole(const std::vector<long> &sorted, const std::string &pattern)
                      sorted[i] - 1, kLargest);
 }
 
-/// The least and the largest.
-std::pair<long, long> numbersOf(const std::string &pattern)
+/// Of all images, rising.
+std::vector<long> numbersOf(const std::string &pattern)
 {
   const fs::path folder = fs::path(pattern).parent_path().empty() ? "." : fs::path(pattern).parent_path();
   const std::string name = fs::path(pattern).filename().string();
@@ -76,31 +77,46 @@ std::pair<long, long> numbersOf(const std::string &pattern)
     throw ioError("{}: no such image", pattern);
   std::sort(all.begin(), all.end());
   requireNoHole(all, pattern);
-  return {all.front(), all.back()};
+  return all;
 }
 
-bool isImage(const fs::path &path)
+/// How far apart the numbers are, which is 1 but where somebody took every fifth picture of a video.
+long stepOf(const std::vector<long> &numbers)
 {
-  std::string extension = path.extension().string();
+  constexpr std::size_t kFewest = 4; // that cannot be so by chance
+  long step = 0;
+  for (const long number : numbers)
+    step = std::gcd(step, number - numbers.front());
+  return numbers.size() < kFewest ? 1 : step;
+}
+} // namespace
+
+bool SequenceSource::isImage(const std::string &path)
+{
+  std::string extension = fs::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   static const std::vector<std::string> kExtensions = {".png", ".jpg", ".jpeg", ".pgm", ".ppm",
                                                        ".pnm", ".bmp", ".tif",  ".tiff"};
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
-} // namespace
 
 SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &options)
 {
-  options.validate();
+  requireUsed(options, pattern, kNumberedImages);
   m_name = fs::is_directory(pattern) ? patternOf(pattern) : pattern;
   if (m_name.empty())
     throw ioError("{}: no numbered images in it", pattern);
-  const auto [first_number, last_number] = numbersOf(m_name);
+  const std::vector<long> numbers = numbersOf(m_name);
+  const long first_number = numbers.front(), step = stepOf(numbers);
+  if (step > 1 && !options.frame_rate_hz)
+    throw badValue(
+        "{}: the numbers go in steps of {}: frame_rate_hz (--rate) must tell how many of them pass in a second", m_name,
+        step);
   constexpr double kUsual_hz = 25;
   const double rate_hz =
       options.frame_rate_hz ? *options.frame_rate_hz : readFrameRate(options.camera_path).value_or(kUsual_hz);
-  for (long number = first_number; number <= last_number; ++number)
+  for (long number = first_number; number <= numbers.back(); number += step)
     m_rows.push_back(
         {std::llround(static_cast<double>(number - first_number) * 1e9 / rate_hz), imagePath(m_name, number)});
   ImageFile first;
@@ -123,7 +139,7 @@ std::string SequenceSource::patternOf(const std::string &folder)
   for (const auto &entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     std::smatch match;
-    if (!isImage(entry.path()) || name.find('%') != std::string::npos || !std::regex_match(name, match, kNumbered))
+    if (!isImage(name) || name.find('%') != std::string::npos || !std::regex_match(name, match, kNumbered))
       continue;
     const std::string digits = match[2].str();
     const bool is_padded = digits.size() > 1 && digits.front() == '0';

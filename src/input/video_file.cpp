@@ -143,18 +143,25 @@ int isOver(void *limit)
   const auto *of = static_cast<const ReadLimit *>(limit);
   return of->is_stopped || steady_ns() > of->until_ns ? 1 : 0;
 }
+/// Whether the file begins as an MP4 or a QuickTime does.
+bool isMp4(const std::string &path)
+{
+  char head[8] = {};
+  openRegularFile(path).read(head, sizeof head);
+  return std::memcmp(head + 4, "ftyp", 4) == 0;
+}
 } // namespace
 
 VideoFile::VideoFile(const std::string &path) : m_path(path), m_name(path), m_libav(std::make_unique<Libav>())
 {
   openRegularFile(path);
-  open();
+  open("file:" + path); // else "12:30.mp4" is a protocol
 }
 
 VideoFile::VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limit)
     : m_path(address), m_name(withoutSecrets(address)), m_limit(std::move(limit)), m_libav(std::make_unique<Libav>())
 {
-  open();
+  open(address);
 }
 
 void VideoFile::allowReading(double seconds) const
@@ -163,7 +170,7 @@ void VideoFile::allowReading(double seconds) const
     m_limit->until_ns = steady_ns() + static_cast<std::int64_t>(seconds * 1e9);
 }
 
-void VideoFile::open()
+void VideoFile::open(const std::string &url)
 {
   const QuietLibav quiet;
   AVFormatContext *format = avformat_alloc_context();
@@ -174,9 +181,12 @@ void VideoFile::open()
       av_dict_set(&options, "rtsp_flags", "prefer_tcp", 0); // over UDP a lost packet is a broken picture
   }
   allowReading(kOpening_s);
-  const int opened = avformat_open_input(&format, m_path.c_str(), nullptr, &options);
+  const int opened = avformat_open_input(&format, url.c_str(), nullptr, &options);
   av_dict_free(&options);
-  checkLibav(opened, m_name + ": no video");
+  const bool has_no_index = opened == AVERROR_INVALIDDATA && !m_limit && isMp4(m_path);
+  checkLibav(opened,
+             m_name + (has_no_index ? ": no video: its index is missing (moov), as of a recording that was cut off"
+                                    : ": no video"));
   m_libav->format.reset(format);
   format->use_wallclock_as_timestamps = m_limit && isMultipart(*format) ? 1 : 0;
   checkLibav(avformat_find_stream_info(format, nullptr), m_name + ": no video");
@@ -216,6 +226,16 @@ bool VideoFile::isLive() const
   const AVFormatContext &format = *m_libav->format;
   const bool has_length = !isMultipart(format) && format.pb != nullptr && avio_size(format.pb) > 0;
   return m_limit != nullptr && duration_ns() == 0 && !has_length;
+}
+
+double VideoFile::pixelAspect() const
+{
+  AVFormatContext &format = *m_libav->format;
+  const double aspect = av_q2d(av_guess_sample_aspect_ratio(&format, format.streams[m_libav->stream], nullptr));
+  constexpr double kMost = 2; // of any lens or format: beyond, the header is damaged
+  if (!(aspect >= 1 / kMost && aspect <= kMost))
+    return 1;
+  return m_libav->quarter_turns % 2 == 0 ? aspect : 1 / aspect;
 }
 
 bool VideoFile::next(Picture &picture)

@@ -62,12 +62,14 @@ public:
   std::int64_t duration_ns() const;
   /// Whether it comes from an address and does not say how long it is, in time nor in bytes.
   bool isLive() const;
+  /// Width of a pixel over its height: 1 but of anamorphic video.
+  double pixelAspect() const;
   const std::shared_ptr<ReadLimit> &limit() const { return m_limit; }
 
 private:
   struct Libav;
 
-  void open();
+  void open(const std::string &url);
   void allowReading(double seconds) const;
   void decodeMore();
   void take(const AVFrame &frame);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/video_source.h"
+#include "geometry/failure.h"
 #include "input/video_file.h"
 
 #include <limits>
@@ -13,16 +14,22 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
 
 VideoSource::VideoSource(const std::string &path, const SourceOptions &options, std::unique_ptr<VideoFile> file)
 {
-  options.validate();
+  requireUsed(options, path, kVideo);
   m_name = path;
   m_file = std::move(file);
   const vpImage<unsigned char> &first = m_file->firstWhole().image;
-  const MountedCamera camera =
-      cameraFor(options, static_cast<int>(first.getWidth()), static_cast<int>(first.getHeight()), m_note);
+  const std::int64_t duration_ns = m_file->duration_ns();
+  constexpr double kFastest_hz = 500;
+  if (const double rate_hz = 1e9 * static_cast<double>(m_file->frames()) / static_cast<double>(duration_ns);
+      duration_ns > 0 && rate_hz > kFastest_hz)
+    throw badValue("{}: {:.0f} pictures a second by its container, must be at most {:g} (`ffmpeg -r RATE -i` gives it "
+                   "another rate)",
+                   path, rate_hz, kFastest_hz);
+  const MountedCamera camera = cameraFor(options, static_cast<int>(first.getWidth()),
+                                         static_cast<int>(first.getHeight()), m_note, m_file->pixelAspect());
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
-  const std::int64_t duration_ns = m_file->duration_ns();
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
                  options.odometry_path, path);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));

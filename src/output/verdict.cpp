@@ -176,6 +176,15 @@ Verdict judge(const RunSummary &summary)
                                  ? sensor.text + "."
                                  : fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));
   }
+  const auto figure = [&summary](const char *name) {
+    const auto at = summary.figures.find(name);
+    return at == summary.figures.end() ? 0 : at->second;
+  };
+  if (const double refused = figure("live_navdata_refused"); refused > figure("live_navdata"))
+    verdict.doubts.push_back(
+        fmt::format("Of {:.0f} packets of navdata {:.0f} were refused (wrong checksum, or cut): no "
+                    "gyro or odometry by these.",
+                    refused + figure("live_navdata"), refused));
   constexpr double kFew = 0.8;
   const double good = static_cast<double>(goodFrames(summary));
   if (good > 0 && good < kFew * static_cast<double>(framesIn(summary)))

@@ -39,15 +39,14 @@ FieldOfView fieldOfView(FrameSource &source)
 }
 } // namespace
 
-MeasuredSource openMeasured(const std::string &input, const SourceOptions &options, bool is_field_of_view_given,
-                            double give_up_s)
+MeasuredSource openMeasured(const std::string &input, const SourceOptions &options, double give_up_s)
 {
   const bool is_stream = LiveVideoSource::accepts(input);
   MeasuredSource opened;
   opened.options = options;
   opened.source = is_stream ? openStream(input, options, give_up_s) : openSource(input, options);
   opened.note = opened.source->note();
-  opened.is_camera_known = opened.source->isCameraKnown() || is_field_of_view_given;
+  opened.is_camera_known = opened.source->isCameraKnown() || options.field_of_view_deg;
   if (opened.is_camera_known || is_stream)
     return opened;
   const FieldOfView view = fieldOfView(*openSource(input, options));

@@ -21,9 +21,7 @@ struct MeasuredSource
 };
 
 /// As openSource(), or openStream() with \p give_up_s, whose video cannot be looked through twice.
-/// \param is_field_of_view_given: that of \p options is no guess
-MeasuredSource openMeasured(const std::string &input, const SourceOptions &options, bool is_field_of_view_given,
-                            double give_up_s);
+MeasuredSource openMeasured(const std::string &input, const SourceOptions &options, double give_up_s);
 
 /// Standard deviation of the log of the focal length of \p source (Options::Camera::focal_sigma), with what is said of
 /// it in a MeasuredSource.

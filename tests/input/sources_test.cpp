@@ -306,6 +306,108 @@ TEST_F(Sources, SaysWhatIsWrongInOneLine)
   EXPECT_THAT(open("i%02d.png", "", "camera.yaml"), HasSubstr("resolution = 640x480, must be 96x64"));
 }
 
+TEST_F(Sources, AFileThatExistsIsThatFileWhateverItsName)
+{
+  writeVideo("v.avi", 3, 10);
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(m_flight.path()); // a name without a slash might be an address
+  for (const char *name : {"My Video 100%.AVI", "2026-11-28T10:00:05.avi", "rtsp:.avi", "%d.avi", "-[1]{a,b}*?.avi",
+                           "no extension", "file:v.avi", "concat:a|b.avi"}) {
+    std::filesystem::copy_file("v.avi", name);
+    EXPECT_EQ(messageOf([&] { EXPECT_EQ(readAll(*openSource(name)).size(), 3u) << name; }), "") << name;
+  }
+  std::filesystem::current_path(before);
+  std::filesystem::create_directories(path("12:30 %05d"));
+  std::filesystem::copy_file(path("v.avi"), path("12:30 %05d/v.avi"));
+  EXPECT_EQ(readAll(*openSource(path("12:30 %05d/v.avi"))).size(), 3u);
+  writeImages("image%d.png", {7, 8});
+  for (const int number : {7, 8})
+    std::filesystem::rename(path(cv::format("image%d.png", number)),
+                            path("12:30 %05d/") + cv::format("image%d.png", number));
+  EXPECT_EQ(readAll(*openSource(path("12:30 %05d"))).size(), 2u);
+  EXPECT_EQ(readAll(*openSource(path("12:30 %05d/image%d.png"))).size(), 2u);
+  EXPECT_THAT(messageOf([&] { openSource(path("12:30 %05d/image7.png")); }),
+              HasSubstr("image7.png: is one picture, must be"));
+}
+
+TEST_F(Sources, AnOptionWithoutEffectIsRefusedByItsName)
+{
+  writeVideo("v.avi", 3, 10);
+  writeImages("i%02d.png", {0, 1});
+  m_flight.write("o.tum", "0 0 0 1 0 0 0 1\n1 0 0 1 0 0 0 1\n");
+  m_flight.write("camera.yaml", "resolution: [96, 64]\nintrinsics: [80, 80, 47.5, 31.5]\n");
+  SourceOptions rate, view, offset, camera_and_view;
+  rate.frame_rate_hz = 10;
+  view.field_of_view_deg = 70;
+  offset.odometry_offset_s = 1;
+  camera_and_view.camera_path = path("camera.yaml");
+  camera_and_view.field_of_view_deg = 70;
+  struct Case
+  {
+    std::string input;
+    SourceOptions options;
+    const char *message;
+  };
+  const Case cases[] = {
+      {path("v.avi"), rate, "v.avi: frame_rate_hz (--rate) has no effect: a video has stamps"},
+      {m_flight.path(), rate, "frame_rate_hz (--rate) has no effect: an ASL folder has stamps"},
+      {path("i%02d.png"), rate, nullptr},
+      {path("v.avi"), view, nullptr},
+      {m_flight.path(), view, "field_of_view_deg (--field-of-view) has no effect: the camera is known"},
+      {path("v.avi"), camera_and_view, "field_of_view_deg (--field-of-view) has no effect: the camera"},
+      {path("v.avi"), offset, "odometry_offset_s (--odometry-offset) has no effect: no odometry file"},
+      {m_flight.path(), offset, "odometry_offset_s (--odometry-offset) has no effect: no odometry file"}};
+  for (const Case &c : cases)
+    EXPECT_THAT(messageOf([&] { openSource(c.input, c.options); }),
+                c.message == nullptr ? testing::Eq("") : testing::Matcher<std::string>(HasSubstr(c.message)));
+}
+
+TEST_F(Sources, ASequenceInStepsHasAFrameAStep)
+{
+  writeImages("s%03d.png", {10, 15, 20, 30});
+  EXPECT_THAT(messageOf([&] { SequenceSource(path("s%03d.png")); }),
+              HasSubstr("s%03d.png: the numbers go in steps of 5: frame_rate_hz (--rate) must tell"));
+  SourceOptions options;
+  options.frame_rate_hz = 50;
+  SequenceSource source(path("s%03d.png"), options);
+  const auto frames = readAll(source);
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_EQ(frames[1].stamp_ns, 100000000);
+  EXPECT_EQ(frames[1].status, FrameStatus::ok);
+  EXPECT_EQ(frames[3].status, FrameStatus::missing);
+}
+
+TEST_F(Sources, PixelsOfAVideoMayBeWiderThanHigh)
+{
+  writeVideo("square.avi", 3, 10);
+  const std::string make =
+      "ffmpeg -loglevel error -y -i " + path("square.avi") + " -c copy -aspect 2:1 " + path("wide.mp4");
+  if (std::system(make.c_str()) != 0)
+    GTEST_SKIP() << "no ffmpeg";
+  const PinholeCamera square = openSource(path("square.avi"))->camera(), wide = openSource(path("wide.mp4"))->camera();
+  EXPECT_DOUBLE_EQ(square.fy, square.fx);
+  EXPECT_DOUBLE_EQ(wide.fx, square.fx);
+  EXPECT_NEAR(wide.fy / wide.fx, 4.0 / 3, 1e-6) << "96x64 pixels shown as 2:1";
+}
+
+TEST_F(Sources, ARecordingWithoutItsIndexAndARateOfNoCameraAreNamed)
+{
+  std::ofstream(path("cut.mp4"), std::ios::binary) << std::string("\0\0\0\x20"
+                                                                  "ftypisom",
+                                                                  12)
+                                                   << std::string(4000, 'x');
+  EXPECT_THAT(messageOf([&] { openSource(path("cut.mp4")); }),
+              HasSubstr("cut.mp4: no video: its index is missing (moov)"));
+  writeVideo("fast.avi", 5, 10);
+  std::fstream file(path("fast.avi"), std::ios::in | std::ios::out | std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  file.clear();
+  file.seekp(static_cast<std::streamoff>(bytes.find("strh") + 28));
+  file.write("\1\0\0\0\xe8\3\0\0", 8);
+  file.close();
+  EXPECT_THAT(messageOf([&] { openSource(path("fast.avi")); }), HasSubstr("1000 pictures a second by its container"));
+}
+
 TEST_F(Sources, SaysThatTheCameraIsAssumed)
 {
   writeImages("i%02d.png", {0, 1});
