@@ -125,7 +125,8 @@ TEST_F(OutputFolders, ThatHoldNothingElseAreRemovedWithTheirFiles)
 
 TEST_F(OutputFolders, ALinkToAFolderIsNotEntered)
 {
-  write("../far/table.csv");
+  fs::create_directories(m_root / "far");
+  std::ofstream(m_root / "far/table.csv") << "somebody's";
   fs::create_directory_symlink(m_root / "far", m_folder);
   removeFiles(m_folder.string(), kNames);
   EXPECT_TRUE(fs::exists(m_root / "far/table.csv"));
