@@ -35,7 +35,7 @@ std::string readWholeFile(const std::string &path, std::size_t most_bytes)
   std::ifstream file = openRegularFile(path);
   const std::uintmax_t size = fs::file_size(path);
   if (size > most_bytes)
-    throw ioError("{}: is larger than {} bytes", path, most_bytes);
+    throw ioError("{}: {} bytes, must be at most {}", path, size, most_bytes);
   std::string text(static_cast<std::size_t>(size), '\0');
   file.read(text.data(), static_cast<std::streamsize>(size));
   if (file.bad())

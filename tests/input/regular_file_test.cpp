@@ -58,7 +58,7 @@ TEST_F(RegularFile, NothingElseIsOpenedByAnyReader)
 TEST_F(RegularFile, IsReadUpToALimit)
 {
   EXPECT_EQ(readWholeFile(at("text"), 100).size(), 17u);
-  EXPECT_THAT(messageOf([&] { readWholeFile(at("text"), 16); }), HasSubstr("text: is larger than 16 bytes"));
+  EXPECT_THAT(messageOf([&] { readWholeFile(at("text"), 16); }), HasSubstr("text: 17 bytes, must be at most 16"));
 }
 
 TEST_F(RegularFile, LinesLoseTheirEndsAndTheMarkOfTheFile)
