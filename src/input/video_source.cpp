@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/video_source.h"
 #include "geometry/failure.h"
+#include "input/secrets.h"
 #include "input/video_file.h"
 
 #include <limits>
@@ -14,8 +15,8 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options)
 
 VideoSource::VideoSource(const std::string &path, const SourceOptions &options, std::unique_ptr<VideoFile> file)
 {
-  requireUsed(options, path, kVideo);
-  m_name = path;
+  m_name = withoutSecrets(path);
+  requireUsed(options, m_name, kVideo);
   m_file = std::move(file);
   const vpImage<unsigned char> &first = m_file->firstWhole().image;
   const std::int64_t duration_ns = m_file->duration_ns();
@@ -24,14 +25,14 @@ VideoSource::VideoSource(const std::string &path, const SourceOptions &options, 
       duration_ns > 0 && rate_hz > kFastest_hz)
     throw badValue("{}: {:.0f} pictures a second by its container, must be at most {:g} (`ffmpeg -r RATE -i` gives it "
                    "another rate)",
-                   path, rate_hz, kFastest_hz);
+                   m_name, rate_hz, kFastest_hz);
   const MountedCamera camera = cameraFor(options, static_cast<int>(first.getWidth()),
                                          static_cast<int>(first.getHeight()), m_note, m_file->pixelAspect());
   Recording recording;
   recording.odometry = readOdometry(options);
   // A video that does not tell its length meets every odometry that is not over before it begins.
   requireOverlap(recording.odometry, 0, duration_ns > 0 ? duration_ns : std::numeric_limits<std::int64_t>::max(),
-                 options.odometry_path, path);
+                 options.odometry_path, m_name);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
 }
 

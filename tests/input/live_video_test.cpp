@@ -215,8 +215,9 @@ TEST(LiveVideo, ARecordingBehindAnAddressIsReadWhole)
     HttpServer server([&](int socket, int) {
       sendAll(socket, fmt::format("HTTP/1.0 200 OK\r\nContent-Length: {}\r\n\r\n", bytes.size()) + bytes);
     });
-    const auto source = openStream(server.address(), {});
+    const auto source = openStream("http://user:secret@" + server.address().substr(7), {});
     EXPECT_EQ(dynamic_cast<LiveVideoSource *>(source.get()), nullptr);
+    EXPECT_EQ(source->name(), server.address());
     int frames = 0;
     for (Frame frame; source->next(frame); ++frames)
       EXPECT_EQ(frame.stamp_ns, frames * 40'000'000LL);
