@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_builder.h"
 #include "geometry/failure.h"
+#include "input/camera_plausibility.h"
 #include "input/frame_check.h"
 
 #include <cmath>
@@ -96,7 +97,9 @@ MountedCamera cameraFor(const SourceOptions &options, int width, int height, std
     note = fmt::format("no camera file: assuming a field of view of {:g} degrees (f = {:.0f} px)", view_deg, f);
     CameraModel model;
     model.pinhole = {f, f * pixel_aspect, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
-    return {model, forwardCamera()};
+    const MountedCamera guess = {model, forwardCamera()};
+    requirePlausible(guess); // pictures of a few pixels hold no trunk
+    return guess;
   }
   const MountedCamera camera = readCamera(options.camera_path, width, height);
   const PinholeCamera &pinhole = camera.model.pinhole;

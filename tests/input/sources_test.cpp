@@ -408,6 +408,14 @@ TEST_F(Sources, ARecordingWithoutItsIndexAndARateOfNoCameraAreNamed)
   EXPECT_THAT(messageOf([&] { openSource(path("fast.avi")); }), HasSubstr("1000 pictures a second by its container"));
 }
 
+TEST_F(Sources, PicturesOfAFewPixelsAreRefused)
+{
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(320, 1), cv::Size(8, 200)}) {
+    cv::imwrite(path("tiny1.png"), cv::Mat(size, CV_8UC1, cv::Scalar(128)));
+    EXPECT_THAT(messageOf([&] { SequenceSource(path("tiny%d.png")); }), HasSubstr("must be 16 to"));
+  }
+}
+
 TEST_F(Sources, SaysThatTheCameraIsAssumed)
 {
   writeImages("i%02d.png", {0, 1});
