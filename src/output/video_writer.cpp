@@ -52,8 +52,7 @@ struct VideoWriter::Libav
 void VideoWriter::Libav::open(int w, int h, const std::string &name)
 {
   AVFormatContext *context = nullptr;
-  const std::string url = "file:" + name; // else a folder "12:30" is a protocol
-  check(avformat_alloc_output_context2(&context, nullptr, "mp4", url.c_str()), "no mp4 writer");
+  check(avformat_alloc_output_context2(&context, nullptr, "mp4", name.c_str()), "no mp4 writer");
   format.reset(context);
   PictureEncoder::Settings settings;
   settings.width = w;
@@ -72,7 +71,7 @@ void VideoWriter::Libav::open(int w, int h, const std::string &name)
   check(stream == nullptr ? AVERROR(ENOMEM) : 0, "no stream");
   check(avcodec_parameters_from_context(stream->codecpar, &encoder->context()), "no stream");
   stream->time_base = kTimeBase;
-  check(avio_open(&context->pb, url.c_str(), AVIO_FLAG_WRITE), "cannot be written");
+  check(avio_open(&context->pb, name.c_str(), AVIO_FLAG_WRITE), "cannot be written");
   AVDictionary *options = nullptr;
   av_dict_set(&options, "movflags", "+faststart", 0);
   const int code = avformat_write_header(context, &options);
