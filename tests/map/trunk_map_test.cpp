@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
 #include <functional>
 #include <random>
 

@@ -3,6 +3,7 @@
 #include "input/asl_source.h"
 #include "map/trunk_map.h"
 #include "mbt/cao_reader.h"
+#include <bole/options.h>
 #include <bole/vpMbTrunkTracker.h>
 #include <bole/vpTrunkMapper.h>
 

@@ -3,6 +3,7 @@
 
 #include "motion/made_flight.h"
 
+#include <Eigen/Geometry>
 #include <functional>
 #include <gtest/gtest.h>
 

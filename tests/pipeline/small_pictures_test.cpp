@@ -19,7 +19,7 @@ bool flies(int width, int height)
 {
   const double f = 0.6 * std::max(width, height);
   const PinholeCamera camera = {f, f, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
-  const Pose bMc = SmootherOptions::forwardCamera();
+  const Pose bMc = forwardCamera();
   std::optional<Pipeline> pipeline;
   try {
     pipeline.emplace(camera, bMc);
