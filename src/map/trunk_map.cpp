@@ -196,16 +196,17 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
   blendContrast(trunk.right_contrast, view.right_contrast);
 }
 
-TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk) const
+TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk, bool has_ranges) const
 {
   const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
   if (trunk.status != TrunkStatus::confirmed && !is_out_of_sight)
     return trunk.status;
-  const bool is_placed = m_options.most_place_sigma == 0 || trunk.placeSigma() <= m_options.most_place_sigma;
+  const bool is_any_placed = !has_ranges || m_options.at_once || m_options.most_place_sigma == 0;
+  const bool is_placed = is_any_placed || trunk.placeSigma() <= m_options.most_place_sigma;
   return is_placed ? TrunkStatus::confirmed : TrunkStatus::candidate;
 }
 
-TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double breast_z) const
+TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double breast_z, bool has_ranges) const
 {
   TrunkRecord record;
   record.id = trunk.id;
@@ -219,16 +220,16 @@ TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double br
   record.observations = trunk.observations;
   record.first_seen_s = trunk.first_seen_s;
   record.last_seen_s = trunk.last_seen_s;
-  record.status = statusOf(trunk);
+  record.status = statusOf(trunk, has_ranges);
   record.fate = record.status == TrunkStatus::candidate ? TrunkFate::undecided : trunk.fate;
   return record;
 }
 
-std::vector<TrunkRecord> TrunkMap::records(double breast_z) const
+std::vector<TrunkRecord> TrunkMap::records(double breast_z, bool has_ranges) const
 {
   std::vector<TrunkRecord> records;
   for (const MapTrunk &trunk : m_trunks)
-    records.push_back(recordOf(trunk, logOdds(trunk), breast_z));
+    records.push_back(recordOf(trunk, logOdds(trunk), breast_z, has_ranges));
   for (const GivenUp &gone : m_given_up) {
     MapTrunk trunk;
     trunk.id = gone.id;

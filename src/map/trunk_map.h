@@ -307,16 +307,16 @@ public:
   const LogNormal &radii() const { return m_radii; }
 
   /// As users get it: one that was confirmed and is out of sight is confirmed, one whose place is known less well than
-  /// is asked for a candidate.
-  TrunkStatus statusOf(const MapTrunk &trunk) const;
+  /// is asked for a candidate. \p has_ranges: false while the camera has only rotated, so that no place is known.
+  TrunkStatus statusOf(const MapTrunk &trunk, bool has_ranges = true) const;
   /// \p breast_z: breast height in the world, where places are told [m].
-  std::vector<TrunkRecord> records(double breast_z = kBreastHeight) const;
+  std::vector<TrunkRecord> records(double breast_z = kBreastHeight, bool has_ranges = true) const;
 
 private:
   std::size_t place(int id) const;
   MapTrunk &at(int id) { return m_trunks[place(id)]; }
   void bury(MapUpdate &update, double now_s);
-  TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double breast_z) const;
+  TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double breast_z, bool has_ranges = true) const;
   bool isDisproved(const MapTrunk &trunk, bool has_ranges) const;
   bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;

@@ -48,7 +48,7 @@ FrameReport Engine::review(std::size_t index) const
   report.has_ranges = m_motion->hasRanges();
   const Viewpoint view{m_camera, report.wMc, report.has_ranges, m_motion->groundZ(), secondsOf(report.stamp_ns)};
   for (const MapTrunk &trunk : m_map.trunks()) {
-    if (m_map.statusOf(trunk) != TrunkStatus::confirmed)
+    if (m_map.statusOf(trunk, report.has_ranges) != TrunkStatus::confirmed)
       continue;
     const HorizontalView from = horizontalView(view.wMc, trunk.trunk);
     const RelativeTrunk relative = relativeTrunk(view.wMc, Pose(), trunk.trunk);

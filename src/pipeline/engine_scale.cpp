@@ -76,7 +76,7 @@ std::vector<TrunkRecord> Engine::map() const
   const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>() * m_metres;
   const double sigma = m_motion->hasRanges() ? estimateScale(true).sigma : 0;
   const double ground_z = m_motion->groundZ().value_or(0);
-  for (const TrunkRecord &in_units : m_map.records(ground_z + kBreastHeight / m_metres)) {
+  for (const TrunkRecord &in_units : m_map.records(ground_z + kBreastHeight / m_metres, m_motion->hasRanges())) {
     TrunkRecord record = inMetres(in_units, m_metres);
     record.ground_z = ground_z * m_metres;
     Vector5d by_log_scale;
