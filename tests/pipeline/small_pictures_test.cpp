@@ -2,6 +2,7 @@
 // Pictures of a few pixels: refused, or taken by every stage. Worth most under a sanitizer or valgrind.
 #include "support/drawn_trunks.h"
 
+#include <bole/open_source.h>
 #include <bole/pipeline.h>
 
 #include <gtest/gtest.h>
