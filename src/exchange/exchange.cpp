@@ -4,6 +4,7 @@
 #include "geometry/cylinder.h"
 #include "geometry/failure.h"
 #include "input/atomic_file.h"
+#include "input/regular_file.h"
 #include "mbt/cao_reader.h"
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
@@ -23,6 +24,22 @@ const std::vector<ExportFormat> kExportFormats = {
     {"tum", "smoothed.tum", "trajectory of the body"},
     {"colmap", "colmap", "folder of cameras.txt, images.txt and points3D.txt"},
     {"g2o", "map.g2o", "factor graph"}};
+
+namespace
+{
+/// Throws where \p folder holds a model of COLMAP's own: its files begin with other words than those of an export.
+void requireNoOtherModel(const std::string &folder)
+{
+  for (const char *name : {"/cameras.txt", "/images.txt", "/points3D.txt"}) {
+    if (!std::filesystem::exists(folder + name))
+      continue;
+    TextLines lines(folder + name);
+    lines.next();
+    if (lines.line().find("_ID, ") == std::string::npos)
+      throw ioError("{}{}: was not written by bole, must not be lost: choose another folder", folder, name);
+  }
+}
+} // namespace
 
 MapOfRun readMapOfRun(const std::string &run)
 {
@@ -55,6 +72,7 @@ std::string exportRun(const std::string &run, const std::string &format, const s
     std::filesystem::create_directories(file, error);
     if (error)
       throw ioError("{}: cannot be made: {}", file, error.message());
+    requireNoOtherModel(file);
     const PicturesOfRun pictures = picturesOf(run, map);
     writeAtomically(file + "/cameras.txt", toColmapCamera(pictures.lens));
     writeAtomically(file + "/images.txt", toColmapImages(map, pictures));

@@ -362,6 +362,15 @@ TEST_F(Exported, ColmapHasTheNamesAndTheLensOfThePicturesThatAreThere)
   EXPECT_THAT(linesOf(folder + "/images.txt").at(2 + 2 * 3), testing::EndsWith(" 1 0003.png"));
 }
 
+TEST_F(Exported, AModelOfColmapsOwnStays)
+{
+  const std::string folder = m_run + "/model";
+  fs::create_directories(folder);
+  std::ofstream(folder + "/cameras.txt") << "# Camera list with one line of data per camera:\n";
+  EXPECT_THROW(exportRun(m_run, "colmap", folder, {}), vpException);
+  EXPECT_FALSE(fs::exists(folder + "/images.txt"));
+}
+
 TEST_F(Exported, ColmapIsReadByColmap)
 {
   setenv("QT_QPA_PLATFORM", "offscreen", 1);
