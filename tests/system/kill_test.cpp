@@ -92,8 +92,8 @@ void killAsSoonAs(const std::vector<std::string> &arguments, const std::function
 /// Frames that the run in \p folder knows; -1 where there is none yet.
 int framesOf(const std::string &folder)
 {
-  const auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"), nullptr, false);
-  return summary.is_object() ? summary.at("frames").at("all").get<int>() : -1;
+  auto summary = nlohmann::json::parse(std::ifstream(folder + "/summary.json"), nullptr, false);
+  return summary.contains("frames") ? summary["frames"]["all"].get<int>() : -1;
 }
 
 TEST(Kill, OfARunLeavesWhatIsShownExportedRepeatedAndCompleted)
