@@ -3,8 +3,8 @@
 #include "geometry/constants.h"
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
-#include "input/regular_file.h"
 #include "input/atomic_file.h"
+#include "input/regular_file.h"
 
 #include <algorithm>
 #include <cmath>
