@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/csv_reader.h"
+
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
+#include "input/frame_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -60,7 +62,7 @@ std::string shownField(std::string_view text)
   return text.size() > kLongest ? shown + "..." : shown;
 }
 
-constexpr std::int64_t kFarthest_s = 4'000'000'000; ///< of a stamp from the epoch: in ns differences fit as well
+constexpr std::int64_t kLatest_s = kFarthestStamp_ns / 1'000'000'000; ///< of a stamp from the epoch
 
 /// Seconds in decimal notation as nanoseconds, without a detour through floating point.
 std::optional<std::int64_t> parseSeconds(std::string_view text)
@@ -69,7 +71,7 @@ std::optional<std::int64_t> parseSeconds(std::string_view text)
   const std::string fraction(text.substr(std::min(point + 1, text.size())));
   const auto seconds = parseNumber<std::int64_t>(text.substr(0, point));
   const auto nanoseconds = parseNumber<std::int64_t>((fraction + "000000000").substr(0, 9));
-  if (!seconds || !nanoseconds || *seconds < -kFarthest_s || *seconds > kFarthest_s ||
+  if (!seconds || !nanoseconds || *seconds < -kLatest_s || *seconds > kLatest_s ||
       !std::all_of(fraction.begin(), fraction.end(), isDigit))
     return std::nullopt;
   return *seconds * 1'000'000'000 + (text.front() == '-' ? -*nanoseconds : *nanoseconds);
@@ -202,9 +204,9 @@ std::int64_t CsvReader::integer(std::size_t column, std::string_view name) const
 
 void CsvReader::requireNear(double stamp_s, const char *hint) const
 {
-  if (!(std::abs(stamp_s) <= double(kFarthest_s)))
-    fail(fmt::format("timestamp = {:.3g} s, must be at most {:g} s from the epoch{}", stamp_s, double(kFarthest_s),
-                     hint));
+  if (!(std::abs(stamp_s) <= double(kLatest_s)))
+    fail(
+        fmt::format("timestamp = {:.3g} s, must be at most {:g} s from the epoch{}", stamp_s, double(kLatest_s), hint));
 }
 
 std::int64_t CsvReader::rising(std::int64_t stamp_ns)

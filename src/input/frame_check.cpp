@@ -10,7 +10,7 @@ namespace bole
 {
 namespace
 {
-constexpr double kFarthest_m = 1e7; // of a body from the origin: grids of a country begin far away
+constexpr double kFarthestPlace_m = 1e7; // of a body from the origin: grids of a country begin far away
 constexpr double kFarthest_s = 1e-9 * static_cast<double>(kFarthestStamp_ns);
 
 std::string inSeconds(std::int64_t stamp_ns) { return fmt::format("{} s", secondsOfStamp(stamp_ns)); }
@@ -21,9 +21,9 @@ bool isInRange(std::int64_t stamp_ns) { return stamp_ns >= -kFarthestStamp_ns &&
 
 std::string faultOf(const Pose &wMb)
 {
-  if (!wMb.t.allFinite() || wMb.t.norm() > kFarthest_m)
+  if (!wMb.t.allFinite() || wMb.t.norm() > kFarthestPlace_m)
     return fmt::format("position of the odometry = {} m, must be finite and at most {:g} m from the origin",
-                       shown(wMb.t), kFarthest_m);
+                       shown(wMb.t), kFarthestPlace_m);
   if (!isRotation(wMb.R))
     return fmt::format("rotation of the odometry = {}, {}, {} by rows, must be a rotation", shown(wMb.R.row(0)),
                        shown(wMb.R.row(1)), shown(wMb.R.row(2)));
