@@ -47,7 +47,7 @@ inline std::vector<Stage> readStages(const fs::path &cmake_file)
     words >> stage.name;
     std::string keyword;
     for (std::string word; words >> word;) {
-      if (word == "DEPENDS" || word == "HEADERS" || word == "INTO")
+      if (word == "DEPENDS" || word == "HEADERS" || word == "INTO" || word == "FILES_A_UNIT")
         keyword = word;
       else if (keyword == "DEPENDS")
         stage.depends.insert(word);

@@ -546,7 +546,9 @@ TEST_F(Life, ACandidateThatWasLeftBehindIsConfirmedInTheEndWhereItsEstimatesNowA
 {
   const int candidate = add(trunkAt(3, 1));
   see(candidate, 20);
-  m_map.refresh({candidate, trunkAt(3, 1), 1e2 * Matrix5d::Identity()}); // its place is not known yet
+  Trunk wide = trunkAt(3, 1);
+  wide.log_radius = std::log(1.05 * m_options.radius_max); // as it is read for now
+  m_map.refresh({candidate, wide, 1e-4 * Matrix5d::Identity()});
   m_map.review(100);
   ASSERT_TRUE(at(candidate).inactive);
 
