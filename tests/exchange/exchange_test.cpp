@@ -349,6 +349,7 @@ TEST_F(Exported, ColmapHasTheNamesAndTheLensOfThePicturesThatAreThere)
   summary.camera = m_map.camera;
   summary.working_folder = "/";
   summary.input = flight.path();
+  summary.frames[FrameStatus::ok] = m_map.trajectory.size();
   writeSummary(m_run + "/summary.json", summary);
   FlightTrace trace;
   for (std::size_t i = 0; i < m_map.trajectory.size(); ++i) {
