@@ -74,8 +74,8 @@ struct Options
   struct Map
   {
     MapPolicy policy = MapPolicy::earned; ///< who becomes a trunk
-    double confirm_probability = 0.38;    ///< that a candidate is a trunk, at which it is confirmed
-    double confirm_sigma = 0.4;  ///< of the place from where it was seen: the map leaves out what has more [m];
+    double confirm_probability = 0.5;     ///< that a candidate is a trunk, at which it is confirmed
+    double confirm_sigma = 0.8;  ///< of the place from where it was seen: the map leaves out what has more [m];
                                  ///< 0: nothing
     double merge_distance = 0.3; ///< trunks with less than this between their bark are one [m]
     double candidate_memory = 5; ///< a candidate not seen for longer is no longer looked for, a trunk only

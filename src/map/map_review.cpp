@@ -14,8 +14,8 @@ namespace bole
 {
 namespace
 {
-constexpr double kMostLean = 5;     ///< standard deviations of the lean of trunks: two lines that are none bend to it
-constexpr double kHysteresis = 0.5; ///< log-odds between being good enough for the map and being given up
+constexpr double kMostLean = 5;   ///< standard deviations of the lean of trunks: two lines that are none bend to it
+constexpr double kHysteresis = 1; ///< log-odds between being good enough for the map and being given up
 } // namespace
 
 bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const

@@ -47,7 +47,7 @@ struct MapOptions
   int confirm_observations = 10;  ///< views before a candidate may be confirmed, 2 to 1000
   int confirm_predicted = 3;      ///< of them after it was found, where its place was predicted, 0 to 1000
   double confirm_parallax = 0.05; ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
-  double confirm_odds = -0.4895;  ///< log odds (TrunkMap::logOdds) at which it is, in flight and at the end, -20 to 20;
+  double confirm_odds = 0;        ///< log odds (TrunkMap::logOdds) at which it is, in flight and at the end, -20 to 20;
                                   ///< higher: fewer trunks, and fewer that are none
   double most_place_sigma = 0; ///< standard deviation of the place beyond which records() has it as a candidate [m]; 0:
                                ///< none is

@@ -93,6 +93,7 @@ private:
   void placeByColumns();
   void noteViews();
   bool isSeen(const MapTrunk &trunk, std::size_t pose) const;
+  bool isPlaced(const Eigen::Matrix2d &covariance) const;
   void decideByAllFrames();
   ScaleEstimate estimateScale(bool with_radii) const;
   void followScale(double seconds_passed);

@@ -129,7 +129,7 @@ std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely
   for (std::size_t i = 0; i < likely.size(); ++i) {
     Reading &reading = readings[i];
     const MapTrunk &known = m_map.trunk(likely[i].id);
-    const bool is_held = !known.removed && reading.is_seen;
+    const bool is_held = !known.removed && reading.is_seen && isPlaced(known.place_covariance);
     if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
       reading.judged = likely[i];
       reading.views.reset();
@@ -186,6 +186,13 @@ void Engine::placeByColumns()
   }
 }
 
+/// Whether a place is known as well as is asked for, from where it was seen.
+bool Engine::isPlaced(const Eigen::Matrix2d &covariance) const
+{
+  const double most = m_units.map.most_place_sigma;
+  return most == 0 || covariance.trace() <= most * most;
+}
+
 /// Every hypothesis in the light of all frames.
 void Engine::decideByAllFrames()
 {
@@ -200,8 +207,9 @@ void Engine::decideByAllFrames()
   std::vector<Reading> readings =
       readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views, gradients);
   std::vector<Judged> again;
-  for (const Reading &reading : readings)
-    if (reading.judged)
+  for (const Reading &reading : readings) // one that is not placed would keep another of the same lines away
+    if (reading.judged && isPlaced(reading.views ? reading.views->trunk.covariance.topLeftCorner<2, 2>()
+                                                 : m_map.trunk(reading.judged->id).place_covariance))
       again.push_back(*reading.judged);
   const std::vector<Judged> chosen = chooseSet(again, m_units.map.confirm_odds, apart, views, farthestJudged());
   std::map<int, TrunkDecision> decisions;
