@@ -266,13 +266,13 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
       {"misses", [&](MapTrunk &t) { t.misses = 20 * t.hits; }},
       {"predictions", [&](MapTrunk &t) { t.hits = m_options.confirm_predicted - 1; }},
-      {"innovation", [&](MapTrunk &t) { t.innovation2 = 4; }},
+      {"innovation", [&](MapTrunk &t) { t.innovation2 = 9; }},
   };
   for (const Case &c : cases)
     for (const bool is_spoilt : {true, false}) { // and it was only that
       m_map = TrunkMap(m_options);
       const int trunk = add(trunkAt(3, 1));
-      see(trunk, 20, 0.38);
+      see(trunk, 20, 0.38, 1);
       if (is_spoilt)
         change(trunk, c.spoil);
       review();
