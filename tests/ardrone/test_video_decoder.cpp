@@ -2,7 +2,8 @@
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
 #include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
-#include "lab/emulator/h264_encoder.h"
+#include "emulator/h264_encoder.h"
+#include "emulator/uvlc_encoder.h"
 
 #include "flight.h"
 
