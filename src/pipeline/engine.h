@@ -79,7 +79,7 @@ private:
   void lookAtColumns(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
   std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
-  void keepNearby();
+  void keepConfirmed();
   TrunkEstimate estimateOf(const MapTrunk &trunk, bool with_covariance) const;
   void refreshMap(double seen_since_s);
   void refreshWholeMap();

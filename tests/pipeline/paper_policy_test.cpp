@@ -38,7 +38,7 @@ TEST(PaperPreset, IsThePaperToTheLetter)
   // 3: theta is x, y and r: trees stand upright; Eq. 2 is a product of likelihoods, none of them cut off
   EXPECT_LE(paper.smoothing.prior_lean_sigma, 1e-4);
   EXPECT_EQ(paper.smoothing.summary_loss.kind, LossKind::quadratic);
-  EXPECT_EQ(paper.smoothing.fixed_lag, 0);
+  EXPECT_FALSE(paper.smoothing.forgets);
   // 5: labels i.i.d., each from its own pixel; two consecutive frames; Eq. 13: mean 0 and V omega; one Gauss-Newton
   // update an M-step from the gyro
   const SaliencyOptions &s = paper.saliency;
