@@ -106,21 +106,4 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   result.R = orthonormalized(result.R);
   return result;
 }
-
-GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,
-                    const Eigen::Matrix3d &covariance, const GyroOptions &options)
-{
-  // phi = -duration * (error of the bias) + white noise: the gain carries what was learnt of phi to
-  // the bias.
-  const Eigen::Vector3d phi = logSo3(prior.R.transpose() * R);
-  const Eigen::Matrix3d prior_covariance = prior.covariance();
-  const Eigen::Matrix3d gain =
-      -prior.duration * bias.covariance * prior_covariance.ldlt().solve(Eigen::Matrix3d::Identity());
-  GyroBias refined;
-  refined.mean = bias.mean + gain * phi;
-  refined.covariance = bias.covariance - gain * (prior_covariance - covariance) * gain.transpose();
-  refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
-  refined.covariance += options.bias_walk * options.bias_walk * prior.duration * Eigen::Matrix3d::Identity();
-  return refined;
-}
 } // namespace bole

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Rotation of the body between two stamps from its gyro, with a covariance that knows the bias,
-/// and the bias itself, learnt from rotations that are better than the gyro's.
+/// Rotation of the body between two stamps from its gyro, with a covariance that knows the bias.
 ///
 /// Idea: over a frame the white noise of a MEMS gyro averages out and what is left is its bias (0.2
-/// to 0.6 deg/s on the rendered flights). So the bias is a state with a covariance: every rotation
-/// says how much of its uncertainty is common to all of them, and a rotation refined by points
-/// gives the bias back.
+/// to 0.6 deg/s on the rendered flights): every rotation says how much of its uncertainty is common to all of them.
 ///
 /// Laws (each a test): a constant rate over dt integrates to Exp(rate dt); rotations of adjoining
-/// intervals multiply; refining with the rotation that the gyro itself gave leaves the bias where
-/// it was.
+/// intervals multiply.
 
 #include "geometry/so3.h"
 #include <bole/frame.h>
@@ -62,10 +58,4 @@ struct GyroRotation
 /// sample: identity, not complete, with the covariance of a gap. Cost: 0.1 us a sample.
 GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::int64_t to_ns,
                            const GyroBias &bias = {}, const GyroOptions &options = {});
-
-/// Bias after the rotation \p prior was refined to \p R with the covariance \p covariance [rad^2],
-/// the prior having been used in the refinement (a conditional Gaussian: exact to first order).
-/// Feed intervals that do not overlap.
-GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,
-                    const Eigen::Matrix3d &covariance, const GyroOptions &options = {});
 } // namespace bole

@@ -45,7 +45,7 @@ PathScale::Step PathScale::stepTo(const Frame &frame)
   if (frame.wMb_odometry)
     step.up = frame.wMb_odometry->R.transpose() * Vector3d::UnitZ();
   std::int64_t at_ns = m_stamp_ns;
-  step.is_known = m_frames > 0;
+  step.is_known = !m_steps.empty();
   int samples = 0;
   const auto advance = [&](const GyroSample &first, const GyroSample &second, std::int64_t end_ns) {
     const double dt = 1e-9 * static_cast<double>(end_ns - at_ns);
@@ -74,7 +74,7 @@ PathScale::Step PathScale::stepTo(const Frame &frame)
   if (m_last && frame.stamp_ns > at_ns)
     advance(*m_last, *m_last, frame.stamp_ns);
   step.is_known = step.is_known && m_last;
-  step.duration = m_frames > 0 ? 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns) : 0;
+  step.duration = !m_steps.empty() ? 1e-9 * static_cast<double>(frame.stamp_ns - m_stamp_ns) : 0;
   if (samples > 0)
     step.longer = std::max(1.0, accelerometer::kRate * step.duration / samples);
   return step;

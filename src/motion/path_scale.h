@@ -43,10 +43,13 @@ public:
 
   static constexpr double kWalkAmongTrees = 0.02; ///< of a path that points hold [m/sqrt(s)]
 
-  /// \param walk horizontal, of the errors of the path [m/sqrt(s)]
-  explicit PathScale(const GyroOptions &gyro = {}, double walk = kWalkAmongTrees) : m_gyro(gyro), m_walk(walk) {}
+  /// \param walk horizontal, of the errors of the path [m/sqrt(s)]; \param first number of the first frame
+  explicit PathScale(const GyroOptions &gyro = {}, double walk = kWalkAmongTrees, std::size_t first = 0)
+      : m_gyro(gyro), m_walk(walk), m_frames(first)
+  {
+  }
 
-  /// Takes in the next frame, the frames being counted from 0. One without samples of the accelerometer begins anew.
+  /// Takes in the next frame. One without samples of the accelerometer begins anew.
   void add(const Frame &frame);
 
   /// Logarithm of the length of \p path over the true length, a path of scale 1 within \p prior_sigma being expected:

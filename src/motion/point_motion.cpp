@@ -155,18 +155,4 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   m_tracker.forgetLast();
   m_seen.pop_back();
 }
-
-void PointMotion::learn(const std::vector<RelativeMotion> &motions)
-{
-  if (motions.empty())
-    return;
-  const RelativeMotion &step =
-      *std::max_element(motions.begin(), motions.end(),
-                        [](const RelativeMotion &x, const RelativeMotion &y) { return x.frames_back < y.frames_back; });
-  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns)
-    return;
-  m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
-                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(), m_options.gyro);
-  m_bias_until_ns = step.b_ns;
-}
 } // namespace bole

@@ -5,9 +5,7 @@
 /// frames.
 ///
 /// Idea: PointTracker follows corners, integrateGyro() and the pose filter say what to expect,
-/// estimateRelativePose() joins the three. The rotation it finds gives the gyro's bias back, so
-/// that after a few frames the gyro alone is several times better than at the start, also on frames
-/// without a single point.
+/// estimateRelativePose() joins the three.
 ///
 /// Every missing part is allowed: no gyro, no odometry (a plain video), no points (a white wall);
 /// the status of each RelativePoseEstimate says what it rests on.
@@ -70,8 +68,9 @@ public:
   /// One RelativeMotion for each entry of frames_back that the video reaches, in every so many frames. Frames that
   /// are not ok, and those that fault() names, are passed over: the next one is tracked from the last good one.
   std::vector<RelativeMotion> process(const Frame &frame);
-  /// Learns the bias of the gyro from the last result of process(), once nothing speaks against it.
-  void learn(const std::vector<RelativeMotion> &motions);
+  void setGyroBias(const GyroBias &bias) { m_bias = bias; }
+  /// As if \p count frames without a picture had come.
+  void skip(std::size_t count) { m_frames += count; }
 
   /// Follows the points alone, where nobody asks for a motion.
   void track(const Frame &frame);
@@ -107,7 +106,6 @@ private:
   std::optional<GyroRotation> m_turned;     ///< from the good frame before to the newest
   int m_good_frames = 0;                    ///< that were processed
   std::size_t m_frames = 0;                 ///< that came, good or not
-  std::int64_t m_bias_until_ns = 0;         ///< end of the last interval that taught the bias
   std::string m_fault;                      ///< of the newest image
   int m_refused = 0;                        ///< images in a row
   std::optional<std::int64_t> m_sheared_ns; ///< stamp of the last that was

@@ -4,8 +4,7 @@
 #include "geometry/constants.h"
 #include "motion/calibration_fit.h"
 #include "motion/camera_gyro.h"
-#include "motion/inertial_scale.h"
-#include "motion/sensor_monitor.h"
+#include "motion/motion_filter.h"
 
 #include <Eigen/Dense>
 
@@ -111,7 +110,6 @@ public:
   {
     if (!m_samples.empty() && m_turns.size() >= kLeastMotions)
       calibrateGyro();
-    const SensorCalibration gyro_alone = m_result;
     if (!m_result.verdicts.empty())
       return m_result; // whatever else is measured rests on camera and gyro
     if (m_is_gyro_explained) {
@@ -119,13 +117,7 @@ public:
       calibrateRotation();
       calibrateScale();
     }
-    judge();
-    const auto is_odometry = [](const SensorVerdict &verdict) { return verdict.sensor == toString(Sensor::odometry); };
-    if (std::none_of(m_result.verdicts.begin(), m_result.verdicts.end(), is_odometry))
-      return m_result;
-    SensorCalibration without_odometry = gyro_alone;
-    without_odometry.verdicts = m_result.verdicts;
-    return without_odometry;
+    return m_result;
   }
 
 private:
@@ -133,7 +125,6 @@ private:
   void calibrateRotation();
   void calibrateOdometryClock();
   void calibrateScale();
-  void judge();
   template <typename Take> void replay(const Take &take) const;
   void addDirections(const std::vector<Frame> &frames, std::vector<Row> &rows) const;
   void addGravity(const std::vector<Frame> &frames, std::vector<Row> &rows) const;
@@ -209,7 +200,7 @@ void Estimation::calibrateGyro()
 /// Direction of flight: bRo takes that of the odometry to that of the points.
 void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row> &rows) const
 {
-  const SensorMonitorOptions noise;
+  const PointMotionOptions noise;
   for (const RelativeMotion &motion : m_motions) {
     const Frame &a = frames[motion.a_index], &b = frames[motion.b_index];
     if (!motion.points.hasDirection() || motion.points.parallax_px < 1 || !a.wMb_odometry || !b.wMb_odometry)
@@ -222,7 +213,7 @@ void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row
     const double variance =
         0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() +
         (std::pow(noise.odometry_walk, 2) * dt + std::pow(noise.odometry_height_sigma, 2)) / (length * length) +
-        std::pow(noise.odometry_relative, 2);
+        std::pow(noise.odometry_relative_sigma, 2);
     Matrix23d across;
     across.row(0) = by_points.unitOrthogonal().transpose();
     across.row(1) = by_points.cross(Vector3d(across.row(0))).transpose();
@@ -393,25 +384,15 @@ template <typename Take> void Estimation::replay(const Take &take) const
   }
 }
 
-/// A sensor that contradicts the others from the start on, and for which no constant helps.
-void Estimation::judge()
-{
-  constexpr double kAtOnce_s = 1.5;
-  SensorMonitor monitor(m_bMc);
-  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) { monitor.process(frame, seen); });
-  for (const SensorVerdict &verdict : monitor.verdicts())
-    for (const Sensor sensor : {Sensor::gyro, Sensor::odometry})
-      if (verdict.sensor == toString(sensor) && !monitor.trusts(sensor) && verdict.kind != "jump" &&
-          verdict.kind != "ended" && verdict.kind != "stuck" &&
-          verdict.since_s < secondsOf(m_frames.front().stamp_ns) + kAtOnce_s)
-        m_result.verdicts.push_back(verdict);
-}
-
 void Estimation::calibrateScale()
 {
-  InertialScale inertial(m_bMc, m_gyro, kMostScale);
-  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) { inertial.process(frame, seen); });
-  const std::optional<LogScale> measured = inertial.scale(kMostScale);
+  MotionFilter filter(m_bMc, m_gyro);
+  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) {
+    Frame room;
+    filter.expect(frame, room);
+    filter.process(frame, seen);
+  });
+  const std::optional<LogScale> measured = filter.measuredScale();
   if (!measured || std::abs(measured->mean) > kMostScale)
     return;
   const auto density = [&](double prior_sigma) {

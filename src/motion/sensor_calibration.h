@@ -8,13 +8,13 @@
 /// - gyro: offset of its clock and bias, by its rotations against those of the points;
 /// - odometry: rotation of its body against the camera's, by its direction of flight against that of the points, its
 ///   gravity against the accelerometer's, and its rotations against the gyro's; offset of its clock, by its rotations
-///   against the gyro's; scale of its horizontal lengths, by the accelerometer (InertialScale).
+///   against the gyro's; scale of its horizontal lengths, by the accelerometer (MotionFilter).
 /// All are robust least squares. The prior of each has two parts: as the sensor is stated (narrow), or anything within
 /// kMost... (wide). A constant is taken over where the wide part explains the measurements better, so a sensor that is
 /// as stated is read as it stands, and the constants that are taken over carry the covariance of their measurement.
 /// Focal lengths and attitude of the camera and the scale of the gyro are not taken over but named (SensorVerdict),
 /// where under another one the points' rotations would agree with the gyro's: they are the user's. A fault that begins
-/// later is no constant: what the constants do not explain is left alone, for SensorMonitor.
+/// later is no constant: what the constants do not explain is left alone, for MotionFilter.
 ///
 /// Frames: b body, w world, o the body as the odometry has it: wRo = wRb * bRo.
 ///

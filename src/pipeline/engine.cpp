@@ -138,14 +138,45 @@ FrameReport Engine::process(const Frame &frame)
 
 Motion Engine::move(const Frame &frame)
 {
+  constexpr double kAwaited_s = 2; // an odometry that begins later is not used
+  if (m_motion && m_awaits_odometry && frame.wMb_odometry &&
+      secondsOf(frame.stamp_ns - m_online.front().stamp_ns) < kAwaited_s)
+    return beginAgain(frame);
   if (m_motion)
     return m_motion->step(frame, m_smoother.pose(newest()), m_velocity);
+  m_awaits_odometry = !frame.wMb_odometry;
   m_motion = makeMotionSource(frame, m_camera, m_bMc, m_options);
   SmootherOptions options = m_options.smoothing;
   options.max_iterations = m_motion->iterations(options.max_iterations);
   m_smoother = Smoother(options);
   Motion motion;
   motion.start = m_motion->first(frame);
+  return motion;
+}
+
+/// An odometry begins shortly after the pictures: what was made without it is forgotten, and the frames until then are
+/// poses that lead to where it begins.
+Motion Engine::beginAgain(const Frame &frame)
+{
+  const Trajectory before = std::move(m_online);
+  *this = Engine(PinholeCamera(m_camera), Pose(m_bMc), StageOptions(m_options));
+  m_online = before;
+  m_motion = makeMotionSource(frame, m_camera, m_bMc, m_options, before.size());
+  const PosePrior start = m_motion->first(frame);
+  const Eigen::Matrix3d wRw = start.mean.R * before.back().wMb.R.transpose(); // from what was taken for the world
+  m_smoother.addFirstPose(Pose(wRw * before.front().wMb.R, start.mean.t), Matrix6d::Identity());
+  Motion motion;
+  Matrix6d &unknown = motion.step.covariance;
+  for (std::size_t i = 1; i <= before.size(); ++i) {
+    const bool is_now = i == before.size();
+    const double dt = secondsOf((is_now ? frame.stamp_ns : before[i].stamp_ns) - before[i - 1].stamp_ns);
+    const double step = std::max(dt, 0.01) * m_options.motion.free_step_sigma / 0.1;
+    unknown.diagonal() << Eigen::Vector3d::Constant(step * step), Eigen::Vector3d::Constant(0.1 * step * step);
+    if (!is_now)
+      m_smoother.addPose(Pose(before[i - 1].wMb.R.transpose() * before[i].wMb.R, Eigen::Vector3d::Zero()), unknown);
+  }
+  motion.step.absolute = start;
+  motion.is_odometry_used = true;
   return motion;
 }
 

@@ -64,6 +64,7 @@ private:
   };
 
   Motion move(const Frame &frame);
+  Motion beginAgain(const Frame &frame);
   Viewpoint extend(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
   void loseUnplaced(std::vector<PredictedTrunk> &predicted, const Viewpoint &view);
@@ -112,6 +113,7 @@ private:
   double m_metres_of_units = 1;  ///< for which m_units was made
   std::size_t m_next_scale = 10; ///< frame at which the scale is measured next
   std::unique_ptr<MotionSource> m_motion;
+  bool m_awaits_odometry = false; ///< the first frame had none
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;

@@ -55,7 +55,7 @@ MonocularMotion::MonocularMotion(const PinholeCamera &camera, const Pose &bMc, c
       m_focal_sigma(options.focal_sigma),
       m_model(options.motion, options.points.gyro),
       m_odometry(camera, options.focal_sigma),
-      m_monitor(bMc)
+      m_filter(bMc, options.points.gyro)
 {
 }
 
@@ -67,7 +67,7 @@ PosePrior MonocularMotion::first(const Frame &frame)
   constexpr double kGuessed = 0.15; // of an image taken to be upright [rad]
   constexpr double kSeen = 0.06;    // of one whose trunks were seen [rad]
   double tilt = kGuessed;
-  m_points.track(frame);
+  followPoints(frame);
   if (frame.status == FrameStatus::ok) {
     place(frame, std::nullopt);
     if (m_first_up) {
@@ -209,10 +209,10 @@ void MonocularMotion::addBacklog(Motion &motion) const
 /// On the gyro, and on an odometry that the first frame does not have.
 std::vector<SensorVerdict> MonocularMotion::verdicts() const
 {
-  std::vector<SensorVerdict> verdicts = m_monitor.verdicts();
+  std::vector<SensorVerdict> verdicts = m_filter.verdicts();
   if (m_odometry_from_s)
     verdicts.push_back(
-        {toString(Sensor::odometry), "time", *m_odometry_from_s,
+        {"odometry", "time", *m_odometry_from_s,
          fmt::format("odometry: begins at {:.1f} s, after the images, and is not used", *m_odometry_from_s)});
   return verdicts;
 }
@@ -224,12 +224,24 @@ MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const 
   return step;
 }
 
-/// By the points.
-void MonocularMotion::judgeGyro(const Frame &frame)
+/// They tell what the gyro errs by.
+void MonocularMotion::followPoints(const Frame &frame)
 {
+  if (frame.gyro.empty()) { // nobody asks for a motion
+    m_points.track(frame);
+    Frame empty, room;
+    empty.stamp_ns = frame.stamp_ns;
+    m_filter.expect(empty, room);
+    m_filter.process(empty, {});
+    return;
+  }
   Frame images = frame, room;
-  images.wMb_odometry.reset(); // one that begins late is not used
-  m_monitor.process(images, m_points.process(m_monitor.withoutLiars(images, room)));
+  images.wMb_odometry.reset();           // one that begins late is not used
+  for (GyroSample &sample : images.gyro) // without an odometry it would be the only one to tell a speed
+    sample.force.reset();
+  const std::vector<RelativeMotion> seen = m_points.process(m_filter.expect(images, room));
+  m_filter.process(images, seen);
+  m_points.setGyroBias(m_filter.gyroBias());
 }
 
 Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
@@ -240,11 +252,8 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
     m_odometry_from_s = secondsOf(frame.stamp_ns);
   motion.is_rotation_seen = true;
   Frame room;
-  if (frame.gyro.empty())
-    m_points.track(frame);
-  else
-    judgeGyro(frame);
-  motion.step = expected(m_monitor.trusted(frame, room), wMa, velocity);
+  followPoints(frame);
+  motion.step = expected(m_filter.believed(frame, room), wMa, velocity);
   motion.step.is_step_measured = false;
   motion.image_fault = m_points.fault();
   if (frame.status == FrameStatus::ok && motion.image_fault.empty())

@@ -12,8 +12,8 @@
 /// What is learnt of earlier frames only later (the first baseline, frames after a gap) comes as more odometry.
 
 #include "motion/ground_plane.h"
+#include "motion/motion_filter.h"
 #include "motion/point_odometry.h"
-#include "motion/sensor_monitor.h"
 #include "motion/vertical.h"
 #include "pipeline/motion_source.h"
 
@@ -37,7 +37,7 @@ public:
 
 private:
   MotionStep expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity);
-  void judgeGyro(const Frame &frame);
+  void followPoints(const Frame &frame);
   void see(const Frame &frame, const Pose &wMa, Motion &motion);
   PointOdometryResult place(const Frame &frame, const std::optional<GyroRotation> &rotated);
   void chooseUnit();
@@ -55,7 +55,7 @@ private:
   double m_focal_sigma;   ///< of the log of the focal length
   MotionModel m_model;    ///< for the gyro, and for what the images do not show
   PointOdometry m_odometry;
-  SensorMonitor m_monitor; ///< of the gyro, by the points
+  MotionFilter m_filter; ///< of the gyro, by the points
   VerticalFinder m_verticals;
   VerticalFilter m_vertical; ///< in the world of m_odometry
   ScaleFromHeight m_height_scale;

@@ -91,7 +91,7 @@ protected:
   PointMotion m_points;
 };
 
-/// The source for a flight that begins with \p first: images alone where it has no odometry.
+/// The source for a flight that begins with \p first, frame \p number: images alone where it has no odometry.
 std::unique_ptr<MotionSource> makeMotionSource(const Frame &first, const PinholeCamera &camera, const Pose &bMc,
-                                               const StageOptions &options);
+                                               const StageOptions &options, std::size_t number = 0);
 } // namespace bole

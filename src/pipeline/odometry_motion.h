@@ -5,19 +5,20 @@
 
 #include "pipeline/motion_source.h"
 
-#include "motion/inertial_scale.h"
-#include "motion/sensor_monitor.h"
+#include "motion/motion_filter.h"
 
 namespace bole
 {
 /// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames. The
-/// scale of the path comes from the accelerometer where there is one, and so do its steps while the filter is silent. A
-/// sensor that contradicts the others is left out until it agrees with them again.
+/// scale of the path comes from the accelerometer where there is one, and so do its steps while the filter is silent.
+/// What contradicts the others is left out of its frame (MotionFilter).
 class OdometryMotion : public MotionSource
 {
 public:
-  /// \p has_odometry: false where nothing but a constant velocity stands in for the pose filter.
-  OdometryMotion(const PinholeCamera &camera, const Pose &bMc, bool has_odometry, const StageOptions &options);
+  /// \p has_odometry: false where nothing but a constant velocity stands in for the pose filter. \p first: number of
+  /// the first frame.
+  OdometryMotion(const PinholeCamera &camera, const Pose &bMc, bool has_odometry, const StageOptions &options,
+                 std::size_t first = 0);
 
   PosePrior first(const Frame &frame) override;
   Motion step(const Frame &frame, const Pose &wMa, const Vector6d &velocity) override;
@@ -25,22 +26,22 @@ public:
   std::optional<double> groundZ() const override;
   void measureScale(const PathScale::Path &path) override;
   ScaleEstimate scale() const override;
-  std::vector<SensorVerdict> verdicts() const override { return m_monitor.verdicts(); }
+  std::vector<SensorVerdict> verdicts() const override { return m_filter.verdicts(); }
   WorldReference reference() const override;
 
 private:
   std::vector<RelativeMotion> observe(const Frame &frame);
+  FilterSays says(const Frame &frame) const;
   void addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const;
 
   Pose m_bMc;
   bool m_has_odometry, m_use_points, m_odometry_alone;
   double m_scale_sigma;
   MotionModel m_model;
-  PathScale m_path_scale;                      ///< by the accelerometer
-  std::optional<LogScale> m_scale;             ///< of the path or the odometry, when measured last
-  InertialScale m_inertial;                    ///< scale of the odometry; stands in for it
-  std::optional<InertialStep> m_inertial_step; ///< to the frame at hand, where the pose filter is silent
-  SensorMonitor m_monitor;
-  std::int64_t m_last_ns = 0; ///< stamp of the frame before
+  PathScale m_path_scale;          ///< by the accelerometer
+  std::optional<LogScale> m_scale; ///< of the path, when measured last
+  MotionFilter m_filter;
+  std::optional<Pose> m_last_odometry; ///< at the frame before
+  std::size_t m_frame = 0;             ///< number of the frame at hand
 };
 } // namespace bole

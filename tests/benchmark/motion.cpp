@@ -86,7 +86,6 @@ void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
   for (const Frame &frame : flight.frames) {
     const double before = threadTime();
     const auto steps = motion.process(frame);
-    motion.learn(steps);
     time += threadTime() - before;
     for (const RelativeMotion &step : steps) {
       const auto cameraAt = [&](std::size_t index) { return *flight.frames[index].wMb_truth * flight.bMc; };

@@ -17,6 +17,7 @@ struct MadeFlight
 {
   double frame_rate = 10;    ///< [Hz], 5 to 60
   double sway = 1.2;         ///< amplitude of the path from side to side [m]
+  double speed = 1;          ///< by which the path is longer, and flown the faster
   double radius = 0;         ///< of the circle that is flown instead at 1 m/s [m]; 0: none
   double factor = 1;         ///< of the odometry's horizontal lengths
   double odometry_noise = 0; ///< horizontal, a frame [m]
@@ -37,8 +38,11 @@ struct MadeFlight
   }
   Pose truth(double t) const
   {
-    if (radius <= 0)
-      return truth(t, sway);
+    if (radius <= 0) {
+      Pose wMb = truth(t, sway);
+      wMb.t.head<2>() *= speed;
+      return wMb;
+    }
     const double turned = t / radius;
     return {expSo3({0, 0, turned}) * expSo3({0.03 * std::sin(2.6 * t), 0.03 * std::cos(2.1 * t), 0}),
             {radius * std::sin(turned), radius * (1 - std::cos(turned)),

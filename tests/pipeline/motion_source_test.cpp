@@ -120,6 +120,41 @@ TEST(WithOdometry, AWhiteWallFallsBackToThePoseFilterWithinTheFrame)
     filter_before = *frame.wMb_odometry;
   }
 }
+TEST(WithOdometry, OneThatBeginsAfterThePicturesIsUsedFromThereOn)
+{
+  for (const int late : {1, 5}) {
+    Pipeline pipeline(kCamera, kMount);
+    for (int k = 0; k < 24; ++k) {
+      Frame frame = frameAt(k, sideways(k));
+      if (k >= late)
+        frame.wMb_odometry = bodyAt(sideways(k));
+      pipeline.process(frame);
+    }
+    EXPECT_EQ(pipeline.reference().scale, ScaleSource::odometry) << late;
+    const auto path = pipeline.smoothedTrajectory();
+    ASSERT_EQ(path.size(), 24u);
+    for (std::size_t k = static_cast<std::size_t>(late); k < path.size(); ++k)
+      EXPECT_LT((path[k].wMb.t - bodyAt(sideways(static_cast<int>(k))).t).norm(), 0.08) << late << ", " << k;
+    EXPECT_LT((path[0].wMb.t - bodyAt(sideways(0)).t).norm(), 0.15 * late) << late;
+  }
+}
+
+TEST(WithOdometry, AnOddStampMovesNothing)
+{
+  for (const std::int64_t off_ns : {-90000000LL, -99999999LL, 90000000LL}) {
+    Pipeline pipeline(kCamera, kMount);
+    FrameReport last;
+    for (int k = 0; k < 30; ++k) {
+      Frame frame = frameAt(k, sideways(k));
+      frame.stamp_ns += k == 15 ? off_ns : 0;
+      frame.wMb_odometry = bodyAt(sideways(k));
+      last = pipeline.process(frame);
+    }
+    EXPECT_LT((last.wMb.t - bodyAt(sideways(29)).t).norm(), 0.15) << off_ns;
+    EXPECT_TRUE(last.verdicts.empty()) << off_ns << ": " << last.verdicts.front().text;
+  }
+}
+
 TEST(ScenePoints, LieOnTheWallsAsFarAsAsked)
 {
   Pipeline pipeline(kCamera, kMount);

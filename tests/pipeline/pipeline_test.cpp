@@ -96,19 +96,23 @@ TEST(Pipeline, MeasuresTheRateOfItsFrames)
   EXPECT_EQ(measures.smoothedTrajectory().size(), 20U);
 }
 
-TEST(Pipeline, AnOdometryThatBeginsAfterTheImagesIsNamed)
+TEST(Pipeline, AnOdometryThatBeginsLongAfterTheImagesIsNamedAndOneShortlyAfterThemUsed)
 {
-  Pipeline pipeline(kCamera, kMount);
-  FrameReport report;
-  for (int k = 0; k < 8; ++k) {
-    Frame frame = byHand(k);
-    if (k < 5)
-      frame.wMb_odometry.reset();
-    report = pipeline.process(frame);
-    EXPECT_EQ(report.verdicts.size(), k < 5 ? 0U : 1U);
+  for (const int late : {5, 21}) {
+    Pipeline pipeline(kCamera, kMount);
+    FrameReport report;
+    for (int k = 0; k < late + 3; ++k) {
+      Frame frame = byHand(k);
+      if (k < late)
+        frame.wMb_odometry.reset();
+      report = pipeline.process(frame);
+      EXPECT_EQ(report.verdicts.size(), k < late || late == 5 ? 0U : 1U);
+    }
+    EXPECT_EQ(report.is_odometry_used, late == 5);
+    if (late == 21) {
+      EXPECT_EQ(report.verdicts.at(0).text, "odometry: begins at 2.1 s, after the images, and is not used");
+    }
   }
-  ASSERT_EQ(report.verdicts.size(), 1U);
-  EXPECT_EQ(report.verdicts[0].text, "odometry: begins at 0.5 s, after the images, and is not used");
 }
 
 /// Its borders are smeared over upright lines, the only ones that the detector looks along in flight but for servoing.
