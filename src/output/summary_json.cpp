@@ -182,7 +182,8 @@ nlohmann::ordered_json readSummary(const std::string &path)
 std::string faultOf(const std::string &path, const std::exception &error)
 {
   const std::string text = error.what(); // "[json.exception.type_error.302] type must be ..."
-  return fmt::format("{}: {}", path, text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2));
+  return fmt::format("{}: is damaged: {}", path,
+                     text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2));
 }
 
 WorldReference readReference(const std::string &path)
@@ -211,7 +212,7 @@ PinholeCamera readCameraOfRun(const std::string &path)
             camera.at("cy_px"), camera.at("width_px"), camera.at("height_px")};
   }
   catch (const Json::exception &error) {
-    throw badValue("{}", faultOf(path + ": camera", error));
+    throw badValue("{}", faultOf(path, error));
   }
 }
 
@@ -226,7 +227,7 @@ RunInput readInputOfRun(const std::string &path)
     return {(folder / text(input.at("source"))).string(), camera.empty() ? camera : (folder / camera).string()};
   }
   catch (const Json::exception &error) {
-    throw badValue("{}", faultOf(path + ": input", error));
+    throw badValue("{}", faultOf(path, error));
   }
 }
 

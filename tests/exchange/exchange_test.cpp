@@ -235,7 +235,7 @@ TEST_F(Exported, ADamagedSummaryIsNamedInPlainWords)
       FAIL() << text;
     }
     catch (const vpException &error) {
-      EXPECT_THAT(error.what(), HasSubstr("summary.json: ")) << text;
+      EXPECT_THAT(error.what(), HasSubstr("summary.json: is damaged: ")) << text;
       EXPECT_THAT(error.what(), testing::Not(HasSubstr("json.exception")));
     }
   }
