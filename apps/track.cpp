@@ -256,10 +256,10 @@ void track(const TrackArguments &asked_for)
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
   const bool is_shown_again = !is_live && !arguments.is_online && options.map.lag == 0;
+  endAtInterrupt(); // before there is something to keep
   TrackOutput output(arguments.run, made, *source, arguments.has_video, arguments.is_shown, is_shown_again);
   OverlayWindow window(arguments.is_shown, "bole track");
   Flight flight(pipeline, output, window);
-  endAtInterrupt();
   if (fly(arguments, *source, is_live, pipeline, output, flight) == 0) {
     if (interrupted())
       endWith(ExitCode::interrupted);

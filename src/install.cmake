@@ -4,8 +4,6 @@
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bole)
 set(BOLE_DATA_DIR ${CMAKE_INSTALL_DATADIR}/bole)
-set(CMAKE_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS # whatever the umask is of who installs
-  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 
 install(TARGETS bole_library bole_derived EXPORT boleTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
@@ -39,3 +37,15 @@ install(FILES ${documentation}/bole.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/ba
 install(FILES ${documentation}/_bole DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT command)
 
 include(src/package.cmake)
+
+# Folders that everybody may read, whatever the umask of who installs: CMake makes them by the umask.
+install(CODE [[
+  foreach(folder IN LISTS CMAKE_INSTALL_MANIFEST_FILES)
+    while(folder AND NOT folder STREQUAL CMAKE_INSTALL_PREFIX AND NOT folder STREQUAL "/")
+      get_filename_component(folder "${folder}" DIRECTORY)
+      list(APPEND folders "$ENV{DESTDIR}${folder}")
+    endwhile()
+  endforeach()
+  list(REMOVE_DUPLICATES folders)
+  execute_process(COMMAND chmod a+rX ${folders} ERROR_QUIET)
+]])

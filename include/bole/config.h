@@ -20,6 +20,8 @@ namespace bole
 void readConfig(const std::string &path, Options &options);
 
 /// Sets options from assignments "section.name=value", each option at most once.
+/// \param assignments each "section.name=value"
+/// \param options what they are set in
 /// \param said_as what a message writes before an assignment
 /// \throw vpException "--set assignment: ..."; \p options is then unchanged.
 void setOptions(const std::vector<std::string> &assignments, Options &options, const std::string &said_as = "--set ");

@@ -113,13 +113,15 @@ TEST(Marginals, APlaceAsSeenIsAsWellKnownHoweverFarThePathHasDrifted)
     return std::sqrt(replay.smoother.trunkCovariance(id).topLeftCorner<2, 2>().trace());
   };
   double early = 0, late = 0, early_in_world = 0, late_in_world = 0;
-  for (int trunk = 0; trunk < 36; ++trunk) {                                  // passed by the end
-    EXPECT_NEAR(place(window, trunk) / place(whole, trunk), 1, 0.2) << trunk; // one that the lag closed, too
+  for (int trunk = 0; trunk < 36; ++trunk) { // passed by the end
+    if (whole.trunk_id[trunk] < 0)
+      continue;                                                                // never among the nearest
+    EXPECT_NEAR(place(window, trunk) / place(whole, trunk), 1, 0.25) << trunk; // one that the lag closed, too
     (trunk < 18 ? early : late) += place(whole, trunk);
     (trunk < 18 ? early_in_world : late_in_world) += inWorld(whole, trunk);
   }
   EXPECT_GT(late_in_world, 2 * early_in_world);
-  EXPECT_NEAR(late / early, 1, 0.2);
+  EXPECT_NEAR(late / early, 1, 0.3); // each scatters by .3 with its distance: 3 sigma of the ratio of two sums of 18
 }
 
 /// Share of runs whose NEES, summed over trunks (or averaged over poses), lies in its 95 %
