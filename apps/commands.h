@@ -4,11 +4,6 @@
 /// The subcommands of `bole`. Each adds itself to the command line with its options and its callback; a
 /// callback throws vpException for a user's mistake, which main() prints as one line.
 
-#include "geometry/failure.h"
-#include "input/live_video.h"
-#include <bole/ardrone_source.h>
-#include <bole/frame.h>
-
 #include <CLI/CLI.hpp>
 
 #include <string>
@@ -30,20 +25,6 @@ inline CLI::Validator within(double low, double high)
       "", "");
 }
 
-/// Throws where a height of the camera is given [m], and \p source tells the scale itself.
-inline void requireHeightUsed(double camera_height, const FrameSource &source)
-{
-  if (camera_height > 0 && source.hasOdometry())
-    throw badValue("{}: --camera-height has no effect: the odometry tells the scale", source.name());
-}
-
-/// Throws where \p command was told how long a live stream may be silent, and \p input is none.
-inline void requireGiveUpUsed(const CLI::App &command, const std::string &input)
-{
-  if (command.count("--give-up") > 0 && !LiveVideoSource::accepts(input) && !ArDroneSource::accepts(input))
-    throw badValue("{}: --give-up has no effect: a recording ends by itself", input);
-}
-
 /// What the process returns; `bole --help` tells the same.
 enum class ExitCode
 {
@@ -63,20 +44,12 @@ void addTrack(CLI::App &app);
 void addEvaluate(CLI::App &app); ///< a run against the ground truth
 void addReport(CLI::App &app);   ///< the page about a run
 void addExport(CLI::App &app);   ///< maps for other tools
-void addCompare(CLI::App &app);  ///< our tracker against ViSP's
-void addSimulate(CLI::App &app);
-void addServo(CLI::App &app);    ///< tasks in the closed loop
 void addOptions(CLI::App &app);  ///< every option with its range and effect
 void addLocalise(CLI::App &app); ///< a flight on the map of an earlier one
 void addFollow(CLI::App &app);   ///< a video in a known map
 void addRecord(CLI::App &app);   ///< a live flight to disk
-void addReplay(CLI::App &app);   ///< a recorded flight, served again
-void addEmulate(CLI::App &app);  ///< a sequence, served as an AR.Drone would
 void addGraph(CLI::App &app);    ///< the graph of a run
 void addSolve(CLI::App &app);    ///< the optimum of a saved graph
 /// Writes man pages and completions of all other commands; \p version goes into their foot.
 void addDocumentation(CLI::App &app, const std::string &version);
-void addShowSaliency(CLI::App &app); ///< basis flows, saliency beside images
-void addReproduce(CLI::App &app);    ///< the figures of the paper
-void addFitOdds(CLI::App &app);      ///< weights of the final decision
 } // namespace bole::apps

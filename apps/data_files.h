@@ -12,8 +12,8 @@ namespace bole::apps
 std::string dataFolder();
 
 /// \p name itself when it is there or looks like a path of its own; else the file or folder of bole's that it names
-/// ("paper" for config/paper.yaml, "park-forward" or "data/park-forward" for the flight), or \p name when none does.
-/// findPreset() throws vpException that lists the presets where there is none of that name.
+/// ("tabletop" for config/tabletop.yaml, "park-forward" or "data/park-forward" for the flight), or \p name when none
+/// does. findPreset() throws vpException that lists the presets where there is none of that name.
 std::string findPreset(const std::string &name);
 std::string findSequence(const std::string &name);
 std::string findModel(const std::string &name);

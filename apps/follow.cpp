@@ -3,11 +3,11 @@
 #include "commands.h"
 #include "data_files.h"
 #include "geometry/failure.h"
+#include "input_checks.h"
 #include "interrupt.h"
 #include "localiser.h"
 #include "overlay_window.h"
 
-#include "geometry/cylinder.h"
 #include "geometry/so3.h"
 #include "geometry/visp_matrix.h"
 #include "input/atomic_file.h"
@@ -16,12 +16,13 @@
 #include "input/secrets.h"
 #include "mbt/cao_reader.h"
 #include "output/figure.h"
-#include "output/output_folder.h"
-#include "output/progress.h"
 #include "output/trajectory_writer.h"
 #include "output/versions.h"
 #include "output/video_writer.h"
+#include "progress.h"
+#include <bole/cylinder.h>
 #include <bole/open_source.h>
+#include <bole/output_folder.h>
 #include <bole/overlay.h>
 #include <bole/vpMbTrunkTracker.h>
 

@@ -5,6 +5,7 @@
 /// that what is known by then is kept.
 
 #include <csignal>
+#include <initializer_list>
 
 namespace bole::apps
 {

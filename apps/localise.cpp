@@ -2,14 +2,15 @@
 // `bole localise`: where on the map of an earlier flight this one is, without a first pose.
 #include "commands.h"
 #include "data_files.h"
+#include "input_checks.h"
 #include "interrupt.h"
 #include "localiser.h"
 
 #include "input/atomic_file.h"
-#include "output/output_folder.h"
-#include "output/progress.h"
 #include "output/trajectory_writer.h"
+#include "progress.h"
 #include <bole/open_source.h>
+#include <bole/output_folder.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -2,9 +2,9 @@
 #include "localiser.h"
 #include "geometry/failure.h"
 
-#include "geometry/cylinder.h"
 #include "mbt/cao_reader.h"
 #include "output/trunks_csv.h"
+#include <bole/cylinder.h>
 
 #include <filesystem>
 

@@ -39,10 +39,13 @@ void addCommands(CLI::App &app)
   addSolve(app);
 }
 
-/// Those of the module, and the documentation of all.
+/// Those of the modules, and the documentation of all.
 void addMoreCommands(CLI::App &app)
 {
-  fromModule<void(CLI::App &)>("boleAddMoreCommands")(app);
+  fromModule<void(CLI::App &)>("bole_commands.so", "boleAddCommands")(app);
+#ifdef BOLE_LAB
+  fromModule<void(CLI::App &)>("bole_lab.so", "boleAddCommands")(app);
+#endif
   addDocumentation(app, "bole " BOLE_VERSION);
 }
 

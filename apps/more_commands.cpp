@@ -5,21 +5,7 @@
 #include <bole/visp.h>
 #include <visp3/gui/vpDisplayX.h>
 
-extern "C" void boleAddMoreCommands(CLI::App &app)
-{
-  using namespace bole::apps;
-  addFollow(app);
-#ifdef BOLE_LAB
-  addCompare(app);
-  addSimulate(app);
-  addServo(app);
-  addReplay(app);
-  addEmulate(app);
-  addShowSaliency(app);
-  addReproduce(app);
-  addFitOdds(app);
-#endif
-}
+extern "C" void boleAddCommands(CLI::App &app) { bole::apps::addFollow(app); }
 
 extern "C" vpDisplay *boleMakeWindow(vpImage<vpRGBa> &picture, const std::string &title)
 {

@@ -27,8 +27,8 @@ public:
       return;
     m_picture = picture;
     if (!m_display)
-      m_display.reset(
-          fromModule<vpDisplay *(vpImage<vpRGBa> &, const std::string &)>("boleMakeWindow")(m_picture, m_title));
+      m_display.reset(fromModule<vpDisplay *(vpImage<vpRGBa> &, const std::string &)>(
+          "bole_commands.so", "boleMakeWindow")(m_picture, m_title));
     vpDisplay::display(m_picture);
     vpDisplay::flush(m_picture);
   }

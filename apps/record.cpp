@@ -5,7 +5,7 @@
 
 #include "ardrone/flight_folder.h"
 #include "ardrone/recording.h"
-#include "output/progress.h"
+#include "progress.h"
 #include <bole/ardrone_source.h>
 
 #include <fmt/format.h>

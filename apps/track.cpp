@@ -3,6 +3,7 @@
 #include "commands.h"
 #include "data_files.h"
 #include "geometry/failure.h"
+#include "input_checks.h"
 #include "interrupt.h"
 #include "overlay_window.h"
 #include "track_arguments.h"
@@ -11,8 +12,8 @@
 #include "input/live_video.h"
 #include "input/secrets.h"
 #include "motion/sensor_calibration.h"
-#include "output/progress.h"
 #include "pipeline/measured_camera.h"
+#include "progress.h"
 #include "report/report_page.h"
 #include <bole/ardrone_source.h>
 #include <bole/config.h>

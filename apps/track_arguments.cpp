@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "track_arguments.h"
 #include "data_files.h"
+#include "input_checks.h"
 
 namespace bole::apps
 {

@@ -5,8 +5,8 @@
 #include "geometry/so3.h"
 #include "input/asl_source.h"
 #include "input/atomic_file.h"
-#include "input/truth.h"
 #include <bole/graph.h>
+#include <bole/open_source.h>
 #include <bole/overlay.h>
 
 #include <algorithm>

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
-#include "commands.h"
-#include "geometry/failure.h"
 #include "interrupt.h"
+#include "lab_commands.h"
+#include "support/text.h"
 
-#include "input/atomic_file.h"
-#include "lab/baseline/comparison_report.h"
-#include "mbt/cao_reader.h"
-#include "output/output_folder.h"
-#include "output/progress.h"
+#include "baseline/comparison_report.h"
+#include "progress.h"
+#include <bole/cylinder.h>
+#include <bole/output_folder.h>
+#include <bole/vpMbTrunkTracker.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -155,7 +155,7 @@ void measureFaults(const CompareArguments &arguments, const TestFlight &flight, 
 void run(const CompareArguments &arguments)
 {
   const TestFlight flight = readFlight(arguments.sequence);
-  const OutputFolder folder(arguments.out, {"compare.json", "truth.cao", "compare.html", "compare.svg", "compare.mp4"});
+  const OutputFolder folder(arguments.out, {"compare.json", "truth.cao", "compare.mp4"});
   const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
   if (model.empty())
     throw badValue("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m);
@@ -179,9 +179,7 @@ void run(const CompareArguments &arguments)
   }
   if (!arguments.is_quiet)
     std::fputs(toTable(report).c_str(), stdout);
-  writeAtomically(arguments.json.empty() ? arguments.out + "/compare.json" : arguments.json, toJson(report));
-  writeAtomically((fs::path(arguments.out) / "compare.html").string(), toHtml(report));
-  writeAtomically((fs::path(arguments.out) / "compare.svg").string(), toSvg(report));
+  writeFile(arguments.json.empty() ? arguments.out + "/compare.json" : arguments.json, toJson(report));
   if (arguments.has_video && !interrupted())
     writeComparisonVideo((fs::path(arguments.out) / "compare.mp4").string(), flight, cao, report.scores);
   if (interrupted()) {
@@ -217,8 +215,8 @@ void addCompare(CLI::App &app)
       "Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
       "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are "
       "used.\n"
-      "Prints the table and writes OUT/compare.json, compare.html, compare.svg and compare.mp4 (the trackers with a\n"
-      "prior, side by side).\n"
+      "Prints the table and writes OUT/compare.json and compare.mp4 (the trackers with a prior, side by side).\n"
+      "apps/campaign/figures.py OUT draws the curves.\n"
       "Examples:\n"
       "  bole compare data/park-forward -o run/compare --basin --faults\n"
       "  bole compare /usr/share/visp-images-data/ViSP-images/mbt -o run/cube --settings models/cylinder.xml");

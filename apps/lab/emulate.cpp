@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole emulate`: a sequence or video served as an AR.Drone serves its flight.
-#include "commands.h"
 #include "interrupt.h"
+#include "lab_commands.h"
 
-#include "lab/emulator/emulator.h"
-#include "output/progress.h"
+#include "emulator/emulator.h"
+#include "progress.h"
 #include <bole/open_source.h>
 
 #include <fmt/format.h>

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole fit-odds: the weights of the final decision, from flights with known trunks.
-#include "commands.h"
-#include "geometry/failure.h"
+#include "lab_commands.h"
+#include "support/text.h"
 
-#include "evaluation/trajectory_metrics.h"
-#include "input/atomic_file.h"
-#include "input/truth.h"
-#include "output/progress.h"
-#include "pipeline/engine.h"
+#include "progress.h"
 #include <bole/open_source.h>
+#include <bole/pipeline.h>
 
 #include <Eigen/Dense>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -22,13 +20,33 @@ namespace bole::apps
 {
 namespace
 {
+using OddsTerms = Eigen::Matrix<double, Decision::kNames.size(), 1>;
+
 /// A hypothesis that is, or is not, a trunk.
 struct Row
 {
   OddsTerms terms;
+  double told = 0; ///< log-odds by the weights in use
   bool is_trunk = false;
 };
 using Rows = std::vector<Row>;
+
+/// In x, y and yaw, least squares over the poses of both.
+Eigen::Matrix3d alignment(const Trajectory &path, const Trajectory &truth)
+{
+  std::vector<double> from, to;
+  for (std::size_t i = 0, k = 0; i < path.size(); ++i) {
+    while (k < truth.size() && truth[k].stamp_ns < path[i].stamp_ns)
+      ++k;
+    if (k == truth.size() || truth[k].stamp_ns != path[i].stamp_ns)
+      continue;
+    from.insert(from.end(), {path[i].wMb.t.x(), path[i].wMb.t.y()});
+    to.insert(to.end(), {truth[k].wMb.t.x(), truth[k].wMb.t.y()});
+  }
+  const auto count = static_cast<Eigen::Index>(from.size() / 2);
+  return Eigen::umeyama(Eigen::Matrix2Xd::Map(from.data(), 2, count), Eigen::Matrix2Xd::Map(to.data(), 2, count),
+                        false);
+}
 
 /// Hypotheses of one flight. One within 0.35 m and two fifths of the radius is a trunk, one beyond 0.5 m of every trunk
 /// is none; what lies between teaches nothing.
@@ -39,19 +57,20 @@ Rows rowsOf(const std::string &sequence)
   const std::vector<TruthTrunk> truth = readTruthTrunks(sequence);
   if (truth.empty())
     throw badValue("{}: no trees.csv: nothing to learn from", sequence);
-  Engine engine(source->camera(), source->bMc(), stageOptions({}, source->camera()));
+  Pipeline pipeline(source->camera(), source->bMc());
   Frame frame;
   Trajectory poses;
   while (source->next(frame)) {
-    engine.process(frame);
+    pipeline.process(frame);
     if (frame.wMb_truth)
       poses.push_back({frame.stamp_ns, *frame.wMb_truth});
   }
-  engine.finish();
-  const PlanarTransform toTruth = align(pairPoses(engine.smoothedTrajectory(), poses), Alignment::xy_yaw);
+  pipeline.finish();
+  const Eigen::Matrix3d toTruth = alignment(pipeline.smoothedTrajectory(), poses);
   Rows rows;
-  for (const Judged &judged : engine.judged()) {
-    const Eigen::Vector2d at = toTruth * Eigen::Vector2d(judged.trunk.axisAt(kBreastHeight).head<2>());
+  for (const Decision &judged : pipeline.decisions()) {
+    const Eigen::Vector3d axis = judged.trunk.axisAt(kBreastHeight);
+    const Eigen::Vector2d at = (toTruth * Eigen::Vector3d(axis.x(), axis.y(), 1)).head<2>();
     const auto nearest = std::min_element(truth.begin(), truth.end(), [&](const TruthTrunk &a, const TruthTrunk &b) {
       return (a.xy - at).norm() < (b.xy - at).norm();
     });
@@ -59,7 +78,7 @@ Rows rowsOf(const std::string &sequence)
     const bool is_trunk =
         off < kIs && (nearest->radius <= 0 || wrong < std::max(kLeastRadius, kRadius * nearest->radius));
     if (is_trunk || off > kIsNot)
-      rows.push_back({oddsTerms(judged.evidence, judged.online), is_trunk});
+      rows.push_back({OddsTerms::Map(judged.terms.data()), judged.log_odds, is_trunk});
   }
   return rows;
 }
@@ -140,7 +159,7 @@ void run(const std::vector<std::string> &sequences, const std::string &output)
     const OddsTerms weights = fit(others);
     for (const Row &row : flights[i]) {
       scores.emplace_back(weights.dot(row.terms), row.is_trunk);
-      present.emplace_back(oddsWeights().dot(row.terms), row.is_trunk);
+      present.emplace_back(row.told, row.is_trunk);
     }
   }
   std::sort(scores.begin(), scores.end());
@@ -148,14 +167,13 @@ void run(const std::vector<std::string> &sequences, const std::string &output)
   const OddsTerms weights = fit(all);
   std::string text = fmt::format("{} hypotheses of {} flights\n", scores.size(), flights.size());
   for (int i = 0; i < weights.size(); ++i)
-    text += fmt::format("  {:<12} {:7.3f}   now {:7.3f}\n", kOddsNames[static_cast<std::size_t>(i)], weights(i),
-                        oddsWeights()(i));
+    text += fmt::format("  {:<12} {:7.3f}\n", Decision::kNames[static_cast<std::size_t>(i)], weights(i));
   text += fmt::format(
       "area under the ROC curve, each flight by the weights of the others: {:.3f}; by those in use: {:.3f}\n",
       areaUnderCurve(scores), areaUnderCurve(present));
   std::fputs((text + reliability(scores)).c_str(), stdout);
   if (!output.empty())
-    writeAtomically(output, reliability(scores));
+    writeFile(output, reliability(scores));
 }
 } // namespace
 

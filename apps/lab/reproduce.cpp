@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// bole reproduce: the paper's figures 5 to 8 and its method beside ours, on one page.
-#include "commands.h"
+// bole reproduce: the paper's method beside ours, and what its figures 5 to 8 show.
 #include "data_files.h"
 #include "detector_statistics.h"
-#include "geometry/failure.h"
-#include "paper_figures.h"
-
-#include "geometry/median.h"
-#include "input/asl_source.h"
-#include "input/atomic_file.h"
-#include "input/csv_reader.h"
-#include "lab/simulation/simulated_flight.h"
-#include "output/figure.h"
-#include "output/page.h"
-#include "output/progress.h"
-#include "output/svg.h"
-#include "output/trajectory_writer.h"
-#include "output/trunks_csv.h"
+#include "lab_commands.h"
+#include "paper/paper_mapper.h"
+#include "progress.h"
+#include "simulation/simulated_flight.h"
+#include "support/statistics.h"
+#include "support/text.h"
+#include "support/units.h"
 #include <bole/evaluation.h>
 #include <bole/pipeline.h>
 
@@ -25,12 +17,15 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <visp3/io/vpImageIo.h>
 
 namespace bole::apps
 {
 namespace
 {
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 struct ReproduceArguments
 {
@@ -42,18 +37,15 @@ struct ReproduceArguments
 struct Method
 {
   const char *name, *folder;
-  Options options;
+  std::optional<double> alpha; ///< of the paper's method; none: ours
 };
 
 /// \p calibrated_alpha: see DetectorStatistics.
 std::vector<Method> methods(double calibrated_alpha)
 {
-  Options paper, calibrated;
-  paper.map.policy = calibrated.map.policy = MapPolicy::paper;
-  calibrated.paper.alpha = calibrated_alpha;
-  return {{"paper, alpha 1000", "paper-1000", paper},
-          {"paper, calibrated", "paper-calibrated", calibrated},
-          {"default", "default", Options()}};
+  return {{"paper, alpha 1000", "paper-1000", paper::kPrintedAlpha},
+          {"paper, calibrated", "paper-calibrated", calibrated_alpha},
+          {"default", "default", {}}};
 }
 
 /// Section 7: a small forest, flown by hand, 320x240 at 10 Hz through the lens of an AR.Drone 1, its pose filter and
@@ -73,7 +65,6 @@ void simulate(const std::string &folder)
 /// What one method made of one flight.
 struct Result
 {
-  SeenFlight seen;
   Evaluation evaluation;
   double ms = 0; ///< of processor time a frame, median
 };
@@ -86,41 +77,111 @@ double processTime_ms()
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-/// The detector of the paper has its thresholds by inspection of this flight, as the authors had them of theirs.
-StageOptions optionsFor(const Method &method, const LineQuartiles &quartiles, const PinholeCamera &camera)
+/// Place and heading of a camera [m], [rad].
+Json placeOf(const Pose &wMc) { return {wMc.t.x(), wMc.t.y(), std::atan2(wMc.R(1, 2), wMc.R(0, 2))}; }
+
+Json circlesOf(const std::vector<TrunkRecord> &map)
 {
-  StageOptions options = stageOptions(method.options, camera);
-  if (options.flow.as_paper)
-    setByInspection(options.lines, quartiles);
-  return options;
+  Json circles = Json::array();
+  for (const TrunkRecord &tree : map)
+    circles.push_back({tree.xy.x(), tree.xy.y(), tree.radius});
+  return circles;
 }
 
-Result fly(const std::string &sequence, const std::string &name, const Method &method, const LineQuartiles &quartiles,
-           const std::string &run, bool keeps_frames)
+/// Writes the pictures of a frame and returns what is drawn into them.
+Json drawn(const Frame &frame, const FrameReport &report, const std::vector<TrunkRecord> &map,
+           const PinholeCamera &camera, const Pose &bMc, const std::string &folder)
 {
-  AslSource source(sequence);
-  Result result;
-  SeenFlight &seen = result.seen;
-  seen = {name, source.camera(), source.bMc(), {}, {}, {}, source.truth(), readTruthTrunks(sequence), {}};
-  Pipeline pipeline(seen.camera, seen.bMc, optionsFor(method, quartiles, seen.camera));
-  std::vector<double> times_ms;
-  for (Frame frame; source.next(frame);) {
-    const double begin_ms = processTime_ms();
-    FrameReport report = pipeline.process(frame);
-    times_ms.push_back(processTime_ms() - begin_ms);
-    if (keeps_frames && frame.status == FrameStatus::ok)
-      seen.frames.push_back({frame.image, std::move(report), pipeline.map()});
+  const std::string name = fmt::format("{:05d}", report.index);
+  vpImageIo::write(frame.image, folder + "/frame-" + name + ".png");
+  if (report.saliency) { // near things are white
+    vpImage<unsigned char> near(frame.image.getHeight(), frame.image.getWidth());
+    for (unsigned i = 0; i < near.getSize(); ++i)
+      near.bitmap[i] = static_cast<unsigned char>(std::lround(255 * (1 - report.saliency->p_background.bitmap[i])));
+    vpImageIo::write(near, folder + "/saliency-" + name + ".png");
   }
-  pipeline.finish();
-  seen.map = pipeline.map();
-  seen.smoothed = pipeline.smoothedTrajectory();
+  Json trees = Json::array();
+  for (const TrunkInView &tree : report.trunks) {
+    const Eigen::Vector3d axis = report.wMc.R * tree.relative.cRt.col(0);
+    Json borders = Json::array();
+    for (const Border border : {Border::left, Border::right})
+      if (const auto line = paper::borderInImage(camera, tree.relative, border); line.begin < line.end)
+        borders.push_back({line.columnAt(line.begin), line.begin, line.columnAt(line.end - 1), line.end - 1});
+    trees.push_back({{"id", tree.id},
+                     {"tracked", tree.is_tracked},
+                     {"range", tree.distance},
+                     {"bearing", std::atan2(axis.y(), axis.x())},
+                     {"half_angle", std::asin(tree.relative.ratio())},
+                     {"borders", borders}});
+  }
+  return {{"name", name},
+          {"camera", placeOf(report.wMc)},
+          {"truth", placeOf(frame.wMb_truth.value_or(report.wMb) * bMc)},
+          {"trees", trees},
+          {"map", circlesOf(map)}};
+}
+
+/// Flies \p sequence through a Pipeline or a PaperMapper into the folder \p run. \p seen gets each frame where given.
+template <typename Mapper>
+Result fly(const std::string &sequence, Mapper &mapper, const std::string &run, Json *seen = nullptr)
+{
+  const auto source = openSource(sequence);
   fs::create_directories(run);
-  writeTrajectory(run + "/trajectory.tum", seen.smoothed);
-  writeTrunks(run + "/trunks.csv", seen.map);
+  Result result;
+  std::vector<double> times_ms;
+  for (Frame frame; source->next(frame);) {
+    const double begin_ms = processTime_ms();
+    const FrameReport report = mapper.process(frame);
+    times_ms.push_back(processTime_ms() - begin_ms);
+    if (seen && frame.status == FrameStatus::ok)
+      seen->push_back(drawn(frame, report, mapper.map(), source->camera(), source->bMc(), run));
+  }
+  mapper.finish();
+  writeRun(run, mapper.map(), mapper.smoothedTrajectory());
   result.evaluation = evaluate(run, sequence);
-  for (const TrunkMatch &match : result.evaluation.trunks.value_or(TrunkMetrics()).matches)
-    seen.right.push_back(match.estimate.id);
   result.ms = medianOf(times_ms);
+  return result;
+}
+
+/// What figures 5 to 8 are drawn of, by apps/campaign/figures.py: figures.json beside the pictures of each frame.
+void writeFigures(const std::string &run, const std::string &name, const std::string &sequence,
+                  const PinholeCamera &camera, const paper::PaperMapper &mapper, const Evaluation &evaluation,
+                  const Json &frames)
+{
+  Json json = {{"flight", name},
+               {"intrinsics", {camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height}},
+               {"map", circlesOf(mapper.map())},
+               {"right", Json::array()},
+               {"trunks", Json::array()},
+               {"path", Json::array()},
+               {"frames", frames}};
+  for (const TrunkMatch &match : evaluation.trunks.value_or(TrunkMetrics()).matches)
+    json["right"].push_back(match.estimate.id);
+  for (const TruthTrunk &trunk : readTruthTrunks(sequence))
+    json["trunks"].push_back({trunk.xy.x(), trunk.xy.y(), trunk.radius});
+  for (const StampedPose &pose : mapper.smoothedTrajectory())
+    json["path"].push_back({pose.wMb.t.x(), pose.wMb.t.y()});
+  writeFile(run + "/figures.json", json.dump() + "\n");
+}
+
+/// \p quartiles: of this flight, by whose inspection the paper's detector has its thresholds, as the authors had them
+/// of theirs.
+Result fly(const std::string &sequence, const std::string &name, const Method &method,
+           const paper::LineQuartiles &quartiles, const std::string &run)
+{
+  const auto source = openSource(sequence);
+  const PinholeCamera camera = source->camera();
+  const Pose bMc = source->bMc();
+  if (!method.alpha) {
+    Pipeline pipeline(camera, bMc);
+    return fly(sequence, pipeline, run);
+  }
+  paper::PaperMapper mapper(camera, bMc, *method.alpha, quartiles);
+  if (*method.alpha == paper::kPrintedAlpha)
+    return fly(sequence, mapper, run);
+  Json frames = Json::array();
+  const Result result = fly(sequence, mapper, run, &frames);
+  writeFigures(run, name, sequence, camera, mapper, result.evaluation, frames);
   return result;
 }
 
@@ -167,35 +228,6 @@ std::string csvOf(const std::vector<std::vector<std::string>> &rows)
   return text;
 }
 
-std::string htmlOf(const Panel &panel, const std::string &folder)
-{
-  std::string html = "<figure>";
-  for (const Panel::Picture &picture : panel.pictures) {
-    const bool is_svg = picture.name.substr(picture.name.size() - 4) == ".svg";
-    writeAtomically(folder + "/" + picture.name, picture.bytes);
-    html += is_svg ? chartBox(picture.bytes) : htmlImage(picture.bytes, "png", picture.name);
-  }
-  return html + "<figcaption>" + escaped(panel.caption) + "</figcaption></figure>\n";
-}
-
-std::string figuresOf(const SeenFlight &flight, const std::string &folder)
-{
-  std::string html = fmt::format("<h2>Fig. 5: basis flows, {}</h2>\n", escaped(flight.name));
-  html += htmlOf(figure5(flight.camera), folder);
-  html += fmt::format("<h2>Fig. 6: map and truth, {}</h2>\n", escaped(flight.name)) + htmlOf(figure6(flight), folder);
-  const char *panels[] = {"a", "b", "c", "d: no parallax", "d: a far trunk uncovered"};
-  std::size_t number = 0;
-  html += fmt::format("<h2>Fig. 7: success and failure, {}</h2>\n<p>Cyan: trees tracked; red: a tree that ends. In the "
-                      "local map the drone looks up; green: true trunks, red: trees of the map.</p>\n",
-                      escaped(flight.name));
-  for (const Panel &panel : figure7(flight))
-    html += fmt::format("<h3>7 {}</h3>\n", panels[number++]) + htmlOf(panel, folder);
-  html += fmt::format("<h2>Fig. 8: pictures and saliency, {}</h2>\n", escaped(flight.name));
-  for (const Panel &panel : figure8(flight))
-    html += htmlOf(panel, folder);
-  return html;
-}
-
 void reproduce(const ReproduceArguments &arguments)
 {
   if (!arguments.statistics.empty()) {
@@ -212,46 +244,30 @@ void reproduce(const ReproduceArguments &arguments)
     flights = {simulated, findSequence("park-forward")};
   }
   const double calibrated_alpha = detectorStatistics(findSequence("park-forward")).calibratedAlpha();
-  std::string figures;
   std::vector<std::vector<std::string>> rows;
   Progress progress(arguments.is_quiet ? 0 : 3 * flights.size(), stderr);
   std::size_t done = 0;
   for (const std::string &sequence : flights) {
     const fs::path place = (fs::absolute(sequence) / "").lexically_normal().parent_path();
-    const std::string name = place.filename().string(), folder = arguments.output + "/" + name;
-    fs::create_directories(folder);
-    const LineQuartiles quartiles = detectorStatistics(sequence).quartiles();
+    const std::string name = place.filename().string();
+    const paper::LineQuartiles quartiles = detectorStatistics(sequence).quartiles();
     for (const Method &method : methods(calibrated_alpha)) {
-      const bool is_drawn = method.options.map.policy == MapPolicy::paper && method.options.paper.alpha < 1000;
-      const Result result = fly(sequence, name, method, quartiles, folder + "/" + method.folder, is_drawn);
-      rows.push_back(rowOf(name, method.name, result));
-      if (is_drawn)
-        figures += figuresOf(result.seen, folder);
+      const std::string run = arguments.output + "/" + name + "/" + method.folder;
+      rows.push_back(rowOf(name, method.name, fly(sequence, name, method, quartiles, run)));
       progress.update(++done, name + ", " + method.name);
     }
   }
-  const std::string text = fmt::format(
-      "<p>R. Roberts, D.-N. Ta, J. Straub, K. Ok and F. Dellaert, Saliency Detection and Model-based Tracking, SPIE "
-      "2012: its method to the letter (map.policy = paper), on flights whose trunks are known. The thresholds of its "
-      "detector are set by inspection of each flight. alpha is 1000 as printed, and {:.2g}: where the minima of Eq. 3 "
-      "are as far from the true trunks of data/park-forward as their curvature says. The figures are drawn with the "
-      "second.</p>\n",
-      calibrated_alpha);
-  const std::string note = "<p>Milliseconds are of processor time. The paper needed about 300 ms a frame (a third of "
-                           "real time at 10 Hz, on a 2.2 GHz Core "
-                           "i7, with known inefficiencies).</p>\n";
-  writeAtomically(arguments.output + "/table.csv", csvOf(rows));
-  const std::string page = arguments.output + "/index.html";
-  writeAtomically(page, htmlPage("The paper's figures, made again", text + htmlTable(kHead, rows) + note + figures));
-  std::printf("%s\n", page.c_str());
+  const std::string table = arguments.output + "/table.csv";
+  writeFile(table, csvOf(rows));
+  std::printf("%s (alpha calibrated: %.2g)\n", table.c_str(), calibrated_alpha);
 }
 } // namespace
 
 void addReproduce(CLI::App &app)
 {
   const auto arguments = std::make_shared<ReproduceArguments>();
-  CLI::App *command = app.add_subcommand("reproduce", "The paper's figures, and its method beside ours, on one page");
-  CLI::Option *output = command->add_option("-o,--output", arguments->output, "Folder for the page and its figures");
+  CLI::App *command = app.add_subcommand("reproduce", "The paper's method beside ours, and its figures");
+  CLI::Option *output = command->add_option("-o,--output", arguments->output, "Folder for table.csv and the runs");
   command
       ->add_option("FLIGHT", arguments->flights,
                    "ASL folders with truth (default: a simulated flight like the paper's, and park-forward)")
@@ -264,7 +280,8 @@ void addReproduce(CLI::App &app)
           ->transform(findSequence);
   output->excludes(statistics);
   command->add_flag("-q,--quiet", arguments->is_quiet, "No progress");
-  command->footer("Examples:\n  bole reproduce -o figures\n  bole reproduce --statistics data/park-forward");
+  command->footer("apps/campaign/figures.py OUTPUT draws figures 5 to 8.\nExamples:\n  bole reproduce -o figures\n  "
+                  "bole reproduce --statistics data/park-forward");
   command->callback([arguments] { reproduce(*arguments); });
 }
 } // namespace bole::apps

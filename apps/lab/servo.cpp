@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole servo: flying by trunks, closed over rendered images and the tracker.
-#include "commands.h"
 #include "data_files.h"
-#include "geometry/failure.h"
 #include "interrupt.h"
+#include "lab_commands.h"
 #include "overlay_window.h"
+#include "support/text.h"
 
-#include "input/atomic_file.h"
-#include "input/csv_reader.h"
-#include "lab/trials/error_curves.h"
-#include "lab/trials/failure_sheet.h"
-#include "lab/trials/median_interval.h"
-#include "lab/trials/servo_trial.h"
-#include "output/figure.h"
-#include "output/output_folder.h"
-#include "output/progress.h"
-#include "output/video_writer.h"
+#include "progress.h"
+#include "support/statistics.h"
+#include "support/video.h"
+#include "trials/flight_record.h"
+#include "trials/servo_trial.h"
 #include <bole/config.h>
+#include <bole/output_folder.h>
 #include <bole/overlay.h>
 
 #include <algorithm>
@@ -122,12 +118,14 @@ std::map<std::string, int> failures(const std::vector<ServoTrialResult> &results
   return reasons;
 }
 
-MedianInterval medianOf(const Column &column, const std::vector<ServoTrialResult> &results)
+/// Of the runs that have the figure.
+std::vector<double> valuesOf(const Column &column, const std::vector<ServoTrialResult> &results)
 {
   std::vector<double> values;
   for (const ServoTrialResult &result : results)
-    values.push_back(result.*column.value);
-  return bootstrapMedian(values);
+    if (!std::isnan(result.*column.value))
+      values.push_back(result.*column.value);
+  return values;
 }
 
 template <class Is> int count(const std::vector<ServoTrialResult> &results, Is is)
@@ -164,27 +162,20 @@ void writeTables(const ServoArguments &arguments, const std::vector<ServoTrialRe
                       {"fault", arguments.fault},
                       {"perception", arguments.perception},
                       {"version", BOLE_VERSION}};
-  for (const Column &column : kColumns) {
-    const MedianInterval median = medianOf(column, results);
-    if (median.count > 0)
-      json["medians"][column.name] = {
-          {"median", median.median}, {"low", median.low}, {"high", median.high}, {"of", median.count}};
-  }
+  for (const Column &column : kColumns)
+    if (const std::vector<double> values = valuesOf(column, results); !values.empty())
+      json["medians"][column.name] = {{"median", medianOf(values)}, {"of", values.size()}};
   for (const ServoTrialResult &result : results)
     json["each"].push_back(toJson(result));
-  writeAtomically(arguments.folder + "/runs.csv", csvOf(results));
-  writeAtomically(arguments.folder + "/summary.json", json.dump(1) + "\n");
+  writeFile(arguments.folder + "/runs.csv", csvOf(results));
+  writeFile(arguments.folder + "/summary.json", json.dump(1) + "\n");
 }
 
-/// Success, contacts, and medians with their 95 % intervals.
+/// Success, contacts, and medians with their quartiles; apps/campaign tells how far a share or a median can be trusted.
 void print(const ServoArguments &arguments, const std::vector<ServoTrialResult> &results)
 {
-  const int runs = static_cast<int>(results.size()), good = successes(results);
-  const ShareInterval share = wilson(good, runs);
-  const std::string interval =
-      runs < 2 ? "" : fmt::format(" (95 % interval {} to {})", percent(share.low, 0), percent(share.high, 0));
-  fmt::print("{}: {} of {} run{} succeeded{}, {} touched a trunk\n", toString(arguments.trial.scenario.kind), good,
-             runs, runs == 1 ? "" : "s", interval, contacts(results));
+  fmt::print("{}: {} of {} run{} succeeded, {} touched a trunk\n", toString(arguments.trial.scenario.kind),
+             successes(results), results.size(), results.size() == 1 ? "" : "s", contacts(results));
   if (otherGaps(results) > 0)
     fmt::print("  {:3} of them through another gap than the one set up\n", otherGaps(results));
   for (const ServoTrialResult &result : results)
@@ -192,12 +183,10 @@ void print(const ServoArguments &arguments, const std::vector<ServoTrialResult> 
       fmt::print("  seed {}: {}\n", result.seed, verdict.text);
   for (const auto &[reason, number] : failures(results))
     fmt::print("  {:3} {}\n", number, reason);
-  for (const Column &column : kColumns) {
-    const MedianInterval median = medianOf(column, results);
-    if (median.count > 0)
-      fmt::print("  {:22} median {}   [{}, {}]   of {}\n", column.name, figure(median.median, 8, 3),
-                 figure(median.low, 0, 3), figure(median.high, 0, 3), median.count);
-  }
+  for (const Column &column : kColumns)
+    if (const std::vector<double> values = valuesOf(column, results); !values.empty())
+      fmt::print("  {:22} median {}   [{}, {}]   of {}\n", column.name, figure(medianOf(values), 8, 3),
+                 figure(quantileOf(values, 0.25), 0, 3), figure(quantileOf(values, 0.75), 0, 3), values.size());
   if (!arguments.folder.empty())
     fmt::print("{}/runs.csv, summary.json and a folder a run\n", arguments.folder);
 }
@@ -214,21 +203,16 @@ std::string runFolder(const ServoArguments &arguments, std::uint64_t seed)
   return folder;
 }
 
-/// sheet.html, and parting.png where there are images.
-void writeSheet(const std::string &folder, const std::string &title, const ServoTrialResult &result,
-                const std::vector<SeenFrame> &frames, const PinholeCamera &camera)
+/// failure.json, and parting.png where there are images.
+void writeFailure(const std::string &folder, const std::string &title, const ServoTrialResult &result,
+                  const std::vector<SeenFrame> &frames, const PinholeCamera &camera)
 {
   const auto parting = findParting(result.record, result.trunks);
-  std::string picture;
-  if (parting && parting->sample < frames.size()) {
-    picture = "parting.png";
-    AtomicFile file(folder + "/" + picture);
+  if (parting && parting->sample < frames.size())
     vpImageIo::write(pictureOf(frames[parting->sample], result.record.samples[parting->sample], camera),
-                     file.temporaryPath());
-    file.commit();
-  }
-  writeAtomically(folder + "/sheet.html", failureSheet(result.record, result.trunks, title, parting, picture));
-  std::fprintf(stderr, "%s/sheet.html: %s\n", folder.c_str(),
+                     folder + "/parting.png");
+  writeFile(folder + "/failure.json", failureJson(result.record, result.trunks, title, parting));
+  std::fprintf(stderr, "%s/failure.json: %s\n", folder.c_str(),
                parting ? parting->what.c_str() : "belief and truth did not part");
 }
 
@@ -237,11 +221,11 @@ ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, s
 {
   trial.scenario.seed = seed;
   const std::string folder = runFolder(arguments, seed);
-  std::unique_ptr<VideoWriter> video;
+  std::unique_ptr<Video> video;
   const bool has_video = arguments.has_video && !folder.empty();
   trial.robot.has_images = trial.perception != PerceptionKind::truth || has_video || arguments.is_shown;
   if (has_video)
-    video = std::make_unique<VideoWriter>(folder + "/overlay.mp4");
+    video = std::make_unique<Video>(folder + "/overlay.mp4", trial.robot.rate_hz);
   const PinholeCamera camera = trial.robot.renderer.camera.pinhole;
   std::vector<SeenFrame> frames;
   const auto watcher = [&](const Frame &frame, const FrameReport &report, const LoopSample &sample) {
@@ -250,7 +234,7 @@ ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, s
     if (video || arguments.is_shown) {
       const vpImage<vpRGBa> picture = pictureOf({frame.image, report.trunks}, sample, camera);
       if (video)
-        video->write(picture, frame.stamp_ns);
+        video->write(picture);
       window.show(picture);
     }
     return !interrupted();
@@ -261,10 +245,9 @@ ServoTrialResult fly(const ServoArguments &arguments, ServoTrialOptions trial, s
   if (!folder.empty()) {
     const std::string title = fmt::format("{}, seed {}: {}", toString(trial.scenario.kind), seed,
                                           result.is_success ? "succeeded" : result.outcome);
-    writeAtomically(folder + "/errors.svg", errorCurves(result.record, title));
-    writeAtomically(folder + "/samples.csv", samplesCsv(result.record));
+    writeFile(folder + "/samples.csv", samplesCsv(result.record));
     if (!result.is_success)
-      writeSheet(folder, title, result, frames, camera);
+      writeFailure(folder, title, result, frames, camera);
   }
   return result;
 }
@@ -276,9 +259,7 @@ void run(ServoArguments &arguments)
   setOptions(arguments.settings, arguments.trial.pipeline);
   if (arguments.is_ungated)
     arguments.trial.pipeline.stages.saliency = false;
-  const FaultOptions fault = faultFromString(arguments.fault);
-  arguments.trial.loop.fault.kind = fault.kind;
-  arguments.trial.loop.fault.sensor = fault.sensor;
+  arguments.trial.loop.fault.kind = faultFromString(arguments.fault);
   arguments.trial.perception = perceptionFromString(arguments.perception);
   if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
     throw badValue("fault = {} with perception = truth, must be none: no image is looked at", arguments.fault);
@@ -318,7 +299,7 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
   ServoTrialOptions &trial = arguments->trial;
   trial.scenario.kind = kind;
   CLI::App *task = servo.add_subcommand(toString(kind), what);
-  task->add_option("-o,--output", arguments->folder, "Folder for videos, error curves and tables");
+  task->add_option("-o,--output", arguments->folder, "Folder for videos and tables");
   task->add_option("--seed", trial.scenario.seed, "Of the first run")->capture_default_str();
   task->add_option("--runs", arguments->runs, "Random starts, a seed each")
       ->capture_default_str()

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// bole show-saliency: the basis flows (Fig. 5 of the paper) and saliency beside its images (Fig. 8).
-#include "commands.h"
-#include "paper_figures.h"
+// bole show-saliency: saliency beside its images (Fig. 8 of the paper).
+#include "lab_commands.h"
 
-#include "input/atomic_file.h"
+#include "support/text.h"
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 
@@ -41,7 +40,6 @@ void show(const ShowArguments &arguments)
 {
   const auto source = openSource(arguments.sequence);
   std::filesystem::create_directories(arguments.output);
-  writeAtomically(arguments.output + "/basis-flows.svg", basisFlowsSvg(source->camera()));
   Options options;
   options.camera.compressed = source->isCompressed();
   options.stages.final_pass = false;
@@ -52,21 +50,19 @@ void show(const ShowArguments &arguments)
     const int index = static_cast<int>(frame.index);
     if (!report.saliency || index < arguments.first || (index - arguments.first) % arguments.every != 0)
       continue;
-    AtomicFile file(fmt::format("{}/saliency-{:05d}.png", arguments.output, index));
-    vpImageIo::write(beside(frame.image, *report.saliency), file.temporaryPath());
-    file.commit();
-    std::printf("%s\n", file.path().c_str());
+    const std::string path = fmt::format("{}/saliency-{:05d}.png", arguments.output, index);
+    vpImageIo::write(beside(frame.image, *report.saliency), path);
+    std::printf("%s\n", path.c_str());
     ++pictures;
   }
-  std::printf("%d pictures and basis-flows.svg in %s\n", pictures, arguments.output.c_str());
+  std::printf("%d pictures in %s\n", pictures, arguments.output.c_str());
 }
 } // namespace
 
 void addShowSaliency(CLI::App &app)
 {
   auto arguments = std::make_shared<ShowArguments>();
-  CLI::App *command =
-      app.add_subcommand("show-saliency", "Draw the basis flows and saliency beside the images of a sequence");
+  CLI::App *command = app.add_subcommand("show-saliency", "Draw saliency beside the images of a sequence");
   command->add_option("SEQUENCE", arguments->sequence, "ASL folder, video or numbered images")->required();
   command->add_option("-o,--output", arguments->output, "Folder for the pictures")->capture_default_str();
   command->add_option("--first", arguments->first, "First frame that is drawn")

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole simulate`: a flight through a rendered forest, with its truth.
-#include "commands.h"
+#include "lab_commands.h"
 
-#include "lab/simulation/simulated_flight.h"
-#include "lab/simulation/words.h"
-#include "output/progress.h"
+#include "progress.h"
+#include "simulation/simulated_flight.h"
+#include "simulation/words.h"
 
 #include <fmt/format.h>
 #include <memory>

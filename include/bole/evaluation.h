@@ -161,6 +161,10 @@ struct Evaluation
   double online_nees_half = kNotMeasured;
 };
 
+/// Writes trajectory.tum and trunks.csv into the folder \p run: all that evaluate() needs of one. For programs that map
+/// by themselves. \throw vpException naming the file that cannot be written.
+void writeRun(const std::string &run, const std::vector<TrunkRecord> &map, const Trajectory &smoothed);
+
 /// Compares the folder \p run (trajectory.tum, trunks.csv) with the ASL folder \p sequence, or with another run: then
 /// its smoothed trajectory and its trunks stand for the truth, all of them expected, and what is measured is how alike
 /// two runs are. Where the summary of the run says that its scale is not odometry's, trunks are matched after alignment

@@ -99,4 +99,52 @@ struct SourceOptions
 ///   use(frame);
 /// \endcode
 std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOptions &options = {});
+
+/// Gives frames that were filled by hand the status that those of openSource() have: one that was `ok` becomes `stale`,
+/// `resized` or `doubtful` with a message, by its image, gyro and odometry against those of the frames before.
+class FrameJudge
+{
+public:
+  /// \param camera of the images judged; only its focal length is used.
+  FrameJudge(const PinholeCamera &camera, const Pose &bMc);
+  ~FrameJudge();
+  void judge(Frame &frame); ///< in the order of time
+
+private:
+  std::unique_ptr<class FrameHealth> m_health;
+};
+
+/// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground, where forest
+/// inventories measure: in the rendered forests the axes that were fitted to the depth maps pass (x, y) at 1.3 m to
+/// about 6 mm, with this radius to 7 mm, and are up to 0.08 m away from it at the foot.
+struct TruthTrunk
+{
+  int id = 0;                                   ///< as in the file
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero(); ///< [m]
+  double radius = 0;                            ///< [m], 0 when not known (far trunks)
+  double lean = 0;                              ///< from the vertical [rad], direction not known
+};
+
+/// Reads `trees.csv` (id, x, y, radius, lean) and, where it is there, `trees_far.csv` (id, x, y) of
+/// the folder \p sequence; empty when the sequence has no `trees.csv`. Errors: vpException with
+/// file:line for a row that is not what it must be or an id that comes twice.
+std::vector<TruthTrunk> readTruthTrunks(const std::string &sequence);
+
+/// \name Lines of an ASL folder, for those that write one
+///@{
+namespace asl
+{
+constexpr const char *kImagesHead = "#timestamp [ns],filename\n"; ///< first line of cam0/data.csv
+constexpr const char *kImuHead = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+                                 "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n"; ///< of imu0/data.csv
+constexpr const char *kPosesHead = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],"
+                                   "q_RS_y [],q_RS_z []\n"; ///< of odom0 and of the truth
+/// cam0/sensor.yaml; \p comment in one line.
+std::string sensorYaml(const MountedCamera &camera, const std::string &comment, double rate_hz);
+/// A line of imu0/data.csv.
+std::string imuLine(std::int64_t stamp_ns, const Eigen::Vector3d &rate, const Eigen::Vector3d &force);
+/// A line of odom0/data.csv and of the truth.
+std::string poseLine(std::int64_t stamp_ns, const Pose &pose);
+} // namespace asl
+///@}
 } // namespace bole

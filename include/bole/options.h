@@ -9,13 +9,6 @@
 
 namespace bole
 {
-/// Who becomes a trunk of the map, and how the map is made.
-enum class MapPolicy
-{
-  earned, ///< a candidate becomes a trunk once enough speaks for it
-  paper   ///< the method of the paper as printed, all of it: see src/doc/paper.md
-};
-
 /// All options of the pipeline; `bole options` prints them with unit, range and default.
 struct Options
 {
@@ -73,15 +66,14 @@ struct Options
   /// How trunks are kept.
   struct Map
   {
-    MapPolicy policy = MapPolicy::earned; ///< who becomes a trunk
-    double confirm_probability = 0.5;     ///< that a candidate is a trunk, at which it is confirmed
-    double confirm_sigma = 0.8;  ///< of the place from where it was seen: the map leaves out what has more [m];
-                                 ///< 0: nothing
-    double merge_distance = 0.3; ///< trunks with less than this between their bark are one [m]
-    double candidate_memory = 5; ///< a candidate not seen for longer is no longer looked for, a trunk only
-                                 ///< while its bearing is known to its width [s]
-    double lag = 0;              ///< poses older than this are marginalised [s]; 0: all stay open
-  } map;                         ///< how trunks are kept
+    double confirm_probability = 0.5; ///< that a candidate is a trunk, at which it is confirmed
+    double confirm_sigma = 0.8;       ///< of the place from where it was seen: the map leaves out what has more [m];
+                                      ///< 0: nothing
+    double merge_distance = 0.3;      ///< trunks with less than this between their bark are one [m]
+    double candidate_memory = 5;      ///< a candidate not seen for longer is no longer looked for, a trunk only
+                                      ///< while its bearing is known to its width [s]
+    double lag = 0;                   ///< poses older than this are marginalised [s]; 0: all stay open
+  } map;                              ///< how trunks are kept
 
   struct Odometry ///< noise of the pose filter, a step: between two frames
   {
@@ -99,11 +91,6 @@ struct Options
     double noise = 8e-4; ///< white noise of the rate [rad/s/sqrt(Hz)]
     double bias = 0.008; ///< standard deviation of the bias at the start [rad/s]
   } gyro;                ///< of the gyro
-
-  struct Paper ///< of MapPolicy::paper
-  {
-    double alpha = 1000; ///< weight of Eq. 3, for gradients in full scale a pixel
-  } paper;               ///< the paper's own choices
 
   void validate() const; ///< \throw vpException "key = value, must be ..."
 };

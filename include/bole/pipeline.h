@@ -30,6 +30,7 @@
 #include <bole/pose.h>
 #include <bole/report.h>
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -38,6 +39,17 @@
 namespace bole
 {
 struct StageOptions;
+
+/// What the decision on a hypothesis by all frames rested on: `bole fit-odds` fits the weights of it.
+struct Decision
+{
+  /// Of the terms: 1, how much its columns differ at its range, by how much more they do at the best range nearer or
+  /// behind, whether its range is the best, and the log-odds that the frames gave it one by one.
+  static constexpr std::array<const char *, 5> kNames = {"1", "own", "elsewhere", "best_at_own", "online"};
+  Trunk trunk;                 ///< where it stands best [m]
+  std::array<double, 5> terms; ///< as kNames
+  double log_odds = 0;         ///< that it is a trunk
+};
 
 /// From frames to a map and a trajectory: the whole system behind one class.
 class Pipeline
@@ -76,6 +88,8 @@ public:
   Trajectory smoothedTrajectory() const; ///< by all frames
   Trajectory onlineTrajectory() const;   ///< each pose as it was known right after its frame
   Graph graph() const;                   ///< of the smoother
+  /// On every hypothesis that was judged by all frames, after finish(); lengths as the odometry has them.
+  std::vector<Decision> decisions() const;
 
 private:
   class Rate;

@@ -45,7 +45,6 @@
 
 #include <bole/graph.h>
 
-#include <functional>
 #include <memory>
 
 namespace bole
@@ -121,10 +120,6 @@ struct UpdateResult
   std::size_t resolved = 0;               ///< variables whose estimate was computed again
 };
 
-/// What an image that is still at hand says of a trunk (Eq. 3): at any relative trunk its energy, the gradient of it,
-/// and a curvature that is positive semi-definite, whatever the energy's own is. Not finite: nothing is known there.
-using ImageEnergy = std::function<SummaryFactor(const RelativeTrunk &)>;
-
 /// Poses and trunks from odometry, point features and summary factors (Eq. 2), solved incrementally.
 class Smoother
 {
@@ -156,10 +151,7 @@ public:
   std::size_t addTrunk(const Trunk &guess, const TrunkPrior &prior);
   /// Indefinite or non-finite summaries are not added. The energy's constant part is not kept.
   SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
-  /// The image itself in place of its summary (Fig. 2: the current image): expanded again wherever a step leads, and a
-  /// step of optimize() is only taken where the energy itself and all the rest together fall.
-  void addImage(std::size_t pose, std::size_t trunk, ImageEnergy image);
-  /// Takes back what \p pose saw of \p trunk, as a summary or as an image; estimates stay until the next solve.
+  /// Takes back what \p pose saw of \p trunk; estimates stay until the next solve.
   void removeObservation(std::size_t pose, std::size_t trunk);
   /// Not added where the fixed lag has marginalised one of the poses.
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);

@@ -4,24 +4,12 @@
 /// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
 
 #include "ardrone/socket.h"
+#include <bole/ardrone_wire.h>
 
-#include <cstdint>
 #include <mutex>
-#include <string>
-#include <vector>
 
 namespace bole
 {
-struct AtCommand
-{
-  std::string name; ///< "REF", "PCMD", "CONFIG", "COMWDG", ...
-  std::int64_t sequence = 0;
-  std::vector<std::string> arguments; ///< without quotes
-};
-
-/// The commands of a datagram; what is not a command is left out. For the emulator and the tests.
-std::vector<AtCommand> parseAtCommands(const std::string &datagram);
-
 /// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
 std::string atFloat(float value);
 /// The inverse of atFloat().

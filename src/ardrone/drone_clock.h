@@ -3,9 +3,9 @@
 /// \file
 /// The drone's clocks: unwrapped, and fitted to the host's.
 
-#include <cstdint>
+#include <bole/ardrone_wire.h>
+
 #include <deque>
-#include <optional>
 
 namespace bole
 {
@@ -28,10 +28,6 @@ private:
 
 /// Microseconds in the navdata's time word: 11 bits of seconds, 21 bits of microseconds.
 std::int64_t navdataTimeMicroseconds(std::uint32_t time);
-/// The inverse, for the emulator: \p microseconds since any start, reduced to the 2048 s that the word holds.
-std::uint32_t navdataTimeWord(std::int64_t microseconds);
-constexpr std::int64_t kNavdataTimePeriod_us = 2048LL * 1'000'000;
-constexpr std::int64_t kPaveTimePeriod_ms = std::int64_t{1} << 32;
 
 /// Offset between a drone's clock and the host's, from packets that arrive late by an unknown, varying time.
 ///

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/flight_folder.h"
 #include "geometry/failure.h"
-#include "input/asl_text.h"
 #include "input/picture_codec.h"
+#include <bole/open_source.h>
 
 #include <cerrno>
 #include <cstring>

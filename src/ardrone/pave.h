@@ -3,49 +3,12 @@
 /// \file
 /// PaVE, the envelope of the AR.Drone 2's video: a stream of bytes in, whole frames out.
 
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <vector>
+#include <bole/ardrone_wire.h>
 
 namespace bole
 {
-enum class PaveFrameType : std::uint8_t
-{
-  unknown = 0,
-  idr = 1,
-  i = 2,
-  p = 3,
-  headers = 4
-};
-
-/// The fields of a PaVE header that anyone reads. All little-endian on the wire; the header is 64
-/// or 68 bytes long by firmware and says so itself.
-struct PaveHeader
-{
-  std::uint8_t version = 2;
-  std::uint8_t codec = 4; ///< 4 = H.264
-  std::uint16_t header_size = 64;
-  std::uint32_t payload_size = 0;
-  std::uint16_t coded_width = 0, coded_height = 0;     ///< [px], multiples of 16
-  std::uint16_t display_width = 0, display_height = 0; ///< [px]
-  std::uint32_t frame_number = 0;
-  std::uint32_t timestamp_ms = 0; ///< drone's clock, wraps after 49.7 days
-  PaveFrameType frame_type = PaveFrameType::unknown;
-  std::uint32_t stream_position = 0; ///< payload bytes sent before this frame, low word
-  std::uint16_t stream_id = 0;
-  std::uint8_t header1_size = 0, header2_size = 0; ///< [byte] SPS and PPS in front of a key frame
-  std::uint32_t advertised_size = 0;
-
-  /// True when the fields are such as a drone can send: the signature alone appears in payloads by chance.
-  bool isPlausible() const;
-};
-
 /// The header at \p data, or nothing: too short, another signature, or implausible fields.
 std::optional<PaveHeader> parsePaveHeader(const std::uint8_t *data, std::size_t size);
-
-/// The bytes of \p header, header_size long.
-std::vector<std::uint8_t> encodePaveHeader(const PaveHeader &header);
 
 struct PaveFrame
 {

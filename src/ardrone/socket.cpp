@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/socket.h"
-#include "geometry/failure.h"
 
 #include <arpa/inet.h>
 #include <cerrno>
@@ -37,20 +36,6 @@ bool waitFor(int descriptor, short events, Milliseconds timeout)
 }
 
 void setNonBlocking(int descriptor) { fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL, 0) | O_NONBLOCK); }
-
-Socket bindTo(const std::string &host, std::uint16_t port, int type)
-{
-  const auto address = resolve(host, port);
-  const int descriptor = ::socket(AF_INET, type | SOCK_CLOEXEC, 0);
-  Socket owner(descriptor);
-  const int on = 1;
-  setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-  if (!address || descriptor < 0 ||
-      bind(descriptor, reinterpret_cast<const sockaddr *>(&*address), sizeof(*address)) != 0)
-    throw ioError("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port, host, std::strerror(errno));
-  setNonBlocking(descriptor);
-  return owner;
-}
 } // namespace
 
 Socket &Socket::operator=(Socket &&other) noexcept
@@ -96,40 +81,14 @@ Socket Socket::connectUdp(const std::string &host, std::uint16_t port)
   return socket;
 }
 
-Socket Socket::bindUdp(const std::string &host, std::uint16_t port) { return bindTo(host, port, SOCK_DGRAM); }
-
-Socket Socket::listenTcp(const std::string &host, std::uint16_t port)
-{
-  Socket socket = bindTo(host, port, SOCK_STREAM);
-  if (listen(socket.m_descriptor, 4) != 0)
-    throw ioError("TCP port {} of {}: {}", port, host, std::strerror(errno));
-  return socket;
-}
-
-std::uint16_t Socket::localPort() const
-{
-  sockaddr_in address = {};
-  socklen_t length = sizeof(address);
-  getsockname(m_descriptor, reinterpret_cast<sockaddr *>(&address), &length);
-  return ntohs(address.sin_port);
-}
-
 bool Socket::waitReadable(Milliseconds timeout) const { return waitFor(m_descriptor, POLLIN, timeout); }
 
 Socket::Read Socket::receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const
 {
-  sockaddr_in sender = {};
-  return receiveFrom(buffer, capacity, size, sender, timeout);
-}
-
-Socket::Read Socket::receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender,
-                                 Milliseconds timeout) const
-{
   size = 0;
   if (!waitReadable(timeout))
     return Read::timeout;
-  socklen_t length = sizeof(sender);
-  const ssize_t count = recvfrom(m_descriptor, buffer, capacity, 0, reinterpret_cast<sockaddr *>(&sender), &length);
+  const ssize_t count = recv(m_descriptor, buffer, capacity, 0);
   if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
     return Read::timeout;
   if (count <= 0)
@@ -141,29 +100,5 @@ Socket::Read Socket::receiveFrom(std::uint8_t *buffer, std::size_t capacity, std
 bool Socket::send(const void *data, std::size_t size) const
 {
   return ::send(m_descriptor, data, size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
-}
-
-bool Socket::sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const
-{
-  return ::sendto(m_descriptor, data, size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr *>(&peer), sizeof(peer)) ==
-         static_cast<ssize_t>(size);
-}
-
-std::int64_t Socket::sendSome(const std::uint8_t *data, std::size_t size) const
-{
-  const ssize_t count = ::send(m_descriptor, data, size, MSG_NOSIGNAL);
-  if (count < 0)
-    return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
-  return count;
-}
-
-Socket Socket::accept() const
-{
-  Socket socket(::accept4(m_descriptor, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-  if (socket.valid()) {
-    const int on = 1;
-    setsockopt(socket.m_descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-  }
-  return socket;
 }
 } // namespace bole

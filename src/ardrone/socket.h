@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <netinet/in.h>
 #include <string>
 
 namespace bole
@@ -33,12 +32,8 @@ public:
   static Socket connectTcp(const std::string &host, std::uint16_t port, Milliseconds timeout);
   /// A UDP socket that talks to one peer only.
   static Socket connectUdp(const std::string &host, std::uint16_t port);
-  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when the port is taken.
-  static Socket bindUdp(const std::string &host, std::uint16_t port);
-  static Socket listenTcp(const std::string &host, std::uint16_t port);
 
   bool valid() const { return m_descriptor >= 0; }
-  std::uint16_t localPort() const;
   void close();
 
   /// Waits for bytes (or a connection) at most \p timeout.
@@ -51,13 +46,7 @@ public:
   };
   /// One datagram, or what there is of a stream.
   Read receive(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, Milliseconds timeout) const;
-  Read receiveFrom(std::uint8_t *buffer, std::size_t capacity, std::size_t &size, sockaddr_in &sender,
-                   Milliseconds timeout) const;
   bool send(const void *data, std::size_t size) const; ///< false on any failure
-  bool sendTo(const void *data, std::size_t size, const sockaddr_in &peer) const;
-  /// Sends on a stream what fits now: bytes sent, 0 when the peer must read first, -1 when it is gone.
-  std::int64_t sendSome(const std::uint8_t *data, std::size_t size) const;
-  Socket accept() const;
 
 private:
   int m_descriptor = -1;

@@ -77,9 +77,4 @@ struct UvlcResult
 /// Laws (each a test): decodes the guide's worked example; decode(encode(I)) is I within the
 /// quantiser's step; any input terminates.
 UvlcResult decodeUvlc(const std::uint8_t *data, std::size_t size);
-
-/// Encodes a grey picture (colours neutral) as an AR.Drone 1 does, quantiser 31, for the emulator
-/// and the tests. Written from the facts above and from the decoder's mathematics by definition: no
-/// code in common. Sides must be 160x120 or 88x72 times a power of two; throws vpException else.
-std::vector<std::uint8_t> encodeUvlc(const vpImage<unsigned char> &image, std::uint32_t number);
 } // namespace bole

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/body_velocity.h"
 #include <bole/open_source.h>
 #include <bole/pose.h>
 #include <bole/vpRobotArDrone.h>

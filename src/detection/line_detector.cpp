@@ -79,33 +79,30 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
                                        const std::vector<InhibitedRange> &known, const ProfileOptions &profile,
                                        const LineDetectorOptions &options)
 {
-  const bool is_split = gradient.negative.getSize() > 0 && !options.either_polarity;
-  const LevelProfile falling =
-      computeLevelProfile(is_split ? gradient.negative : gradient.signed_x, camera, wRc, profile);
-  const LevelProfile rising = is_split ? computeLevelProfile(gradient.positive, camera, wRc, profile) : falling;
+  const LevelProfile lines = computeLevelProfile(gradient.signed_x, camera, wRc, profile);
   std::optional<LevelProfile> background;
   if (p_background)
     background = computeLevelProfile(*p_background, camera, wRc, profile);
 
-  std::vector<double> p_left(falling.mean.size(), 0.0), p_right = p_left;
-  for (std::size_t i = 0; i < falling.mean.size(); ++i) {
-    const double q = falling.q_first + falling.step * static_cast<double>(i);
+  std::vector<double> p_left(lines.mean.size(), 0.0), p_right = p_left;
+  for (std::size_t i = 0; i < lines.mean.size(); ++i) {
+    const double q = lines.q_first + lines.step * static_cast<double>(i);
     const double foreground = background ? 1 - static_cast<double>(background->mean[i]) : 1;
     const double gate = logistic(foreground, options.foreground_a, options.foreground_b) * // Eq. 20
                         notInhibited(q, known, camera.fx, options.inhibition_px);          // Eq. 21
-    const double fall = -falling.mean[i], rise = rising.mean[i];
+    const double fall = -lines.mean[i], rise = lines.mean[i];
     p_left[i] = gate * logistic(options.either_polarity ? std::abs(fall) : fall, options.border_a, options.border_b);
     p_right[i] = gate * logistic(options.either_polarity ? std::abs(rise) : rise, options.border_a, options.border_b);
   }
 
-  const auto lefts = maxima(p_left, falling, options.threshold, 6);
-  const auto rights = maxima(p_right, rising, options.threshold, 6);
+  const auto lefts = maxima(p_left, lines, options.threshold, 6);
+  const auto rights = maxima(p_right, lines, options.threshold, 6);
   std::vector<std::pair<Line, Line>> pairs;
   for (const Line &left : lefts)
     for (const Line &right : rights) {
       const double width_px = (left.q - right.q) * camera.fx;
       const bool has_width = width_px >= options.width_min_px && width_px <= options.width_max_px;
-      if (has_width && (is_split || !isDivided(falling, left, right)))
+      if (has_width && !isDivided(lines, left, right))
         pairs.emplace_back(left, right);
     }
   const auto score = [](const auto &pair) {
@@ -114,14 +111,14 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
   std::sort(pairs.begin(), pairs.end(), [&](const auto &a, const auto &b) { return score(a) > score(b); });
   std::vector<LineDetection> found;
   std::vector<InhibitedRange> taken;
-  const double margin = is_split ? 0 : 2 / camera.fx;
+  const double margin = 2 / camera.fx;
   for (const auto &[left, right] : pairs) {
     if (std::any_of(taken.begin(), taken.end(), [&, l = left, r = right](const InhibitedRange &range) {
           return l.q > range.q_right - margin && r.q < range.q_left + margin; // a border belongs to one trunk
         }))
       continue;
     taken.push_back({right.q, left.q});
-    found.push_back({relativeOf(falling, left.q, right.q), left.p, right.p});
+    found.push_back({relativeOf(lines, left.q, right.q), left.p, right.p});
   }
   return found;
 }

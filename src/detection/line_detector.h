@@ -8,9 +8,9 @@
 /// paired. It needs no translation, so it is also what finds trunks in a plain video. Its ranges are those of the
 /// prior on the radius.
 ///
-/// Deviations: two borders are neighbours (no stronger line stands between them) and belong to one trunk only, unless
-/// the gradient is split as the paper's. Printed formulas put right: Q rises with x for a < 0 and takes the magnitude
-/// of the gradient (Eq. 19); p(non_inhib) = 1 - min(1, sum exp(-d^2 / (2 sigma_R^2))) (Eq. 21).
+/// Deviations: two borders are neighbours (no stronger line stands between them) and belong to one trunk only. Printed
+/// formulas put right: Q rises with x for a < 0 and takes the magnitude of the gradient (Eq. 19); p(non_inhib) = 1 -
+/// min(1, sum exp(-d^2 / (2 sigma_R^2))) (Eq. 21).
 
 #include "detection/detector.h"
 #include "gradient/gradient.h"
@@ -19,7 +19,7 @@ namespace bole
 {
 struct LineDetectorOptions
 {
-  bool either_polarity = true;                 ///< false: dark trunks on bright background only, the paper's
+  bool either_polarity = true;                 ///< false: dark trunks on bright background only
   double border_a = -200, border_b = 4;        ///< of Q for the mean gradient along a border (Eq. 19)
   double foreground_a = -12, foreground_b = 3; ///< of Q for the mean of 1 - p(background) along it (Eq. 20)
   double inhibition_px = 6;                    ///< sigma_R of Eq. 21, 0.5 to 100

@@ -4,11 +4,12 @@
 #include "evaluation/visibility.h"
 #include "geometry/failure.h"
 #include "input/asl_source.h"
-#include "input/truth.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
+#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
+#include <bole/open_source.h>
 
 #include <filesystem>
 #include <map>
@@ -154,6 +155,12 @@ std::int64_t shiftOf(const std::string &path, const Reference &reference)
   return motionShift(estimate, reference.trajectory, reference.first_stamp_ns - estimate.front().stamp_ns);
 }
 } // namespace
+
+void writeRun(const std::string &run, const std::vector<TrunkRecord> &map, const Trajectory &smoothed)
+{
+  writeTrajectory(run + "/trajectory.tum", smoothed);
+  writeTrunks(run + "/trunks.csv", map);
+}
 
 Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options)
 {

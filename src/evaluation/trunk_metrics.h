@@ -4,7 +4,7 @@
 /// How good a map of trunks is.
 
 #include "evaluation/trajectory_metrics.h"
-#include "input/truth.h"
+#include <bole/open_source.h>
 
 #include <array>
 #include <vector>

@@ -4,9 +4,9 @@
 /// Which trunks of the truth a flight had a fair chance to map.
 
 #include "input/trajectory.h"
-#include "input/truth.h"
 #include <bole/camera.h>
 #include <bole/evaluation.h>
+#include <bole/open_source.h>
 
 #include <vector>
 

@@ -2,7 +2,7 @@
 // Shapes for CAD and for viewers of point clouds and meshes, and the foresters' table.
 #include "exchange/exchange.h"
 
-#include "geometry/cylinder.h"
+#include <bole/cylinder.h>
 
 #include <cmath>
 #include <fmt/format.h>

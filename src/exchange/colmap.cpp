@@ -3,11 +3,11 @@
 #include "exchange/exchange.h"
 
 #include "geometry/constants.h"
-#include "geometry/cylinder.h"
 #include "input/asl_source.h"
 #include "input/video_source.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
+#include <bole/cylinder.h>
 
 #include <Eigen/Geometry>
 

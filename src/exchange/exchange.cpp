@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "exchange/exchange.h"
 
-#include "geometry/cylinder.h"
 #include "geometry/failure.h"
 #include "input/atomic_file.h"
 #include "input/regular_file.h"
@@ -9,6 +8,7 @@
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
+#include <bole/cylinder.h>
 #include <bole/graph.h>
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/cylinder.h"
+#include <bole/cylinder.h>
 
 #include <Eigen/Geometry>
 

@@ -7,8 +7,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kSplitSigma_px = 3; ///< blur of the parts of Eq. 3: the value of the paper
-
 /// A cv::Mat header over the pixels of a vpImage: no copy.
 cv::Mat view(vpImage<float> &I)
 {
@@ -40,16 +38,6 @@ Gradient computeGradient(const vpImage<unsigned char> &I, const GradientOptions 
   const int radius = static_cast<int>(std::ceil(3 * options.sigma_px));
   cv::sepFilter2D(image, signed_x, CV_32F, derivativeKernel(options.sigma_px, radius) / 255.0,
                   cv::getGaussianKernel(2 * radius + 1, options.sigma_px, CV_32F), {-1, -1}, 0, cv::BORDER_REPLICATE);
-
-  if (options.split) { // Eq. 3: split first, then blur each part
-    cv::Mat sobel;
-    cv::Sobel(image, sobel, CV_32F, 1, 0, 3, 1.0 / (8 * 255.0), 0, cv::BORDER_REPLICATE);
-    gradient.negative.resize(I.getRows(), I.getCols());
-    gradient.positive.resize(I.getRows(), I.getCols());
-    cv::Mat negative = view(gradient.negative), positive = view(gradient.positive);
-    cv::GaussianBlur(cv::min(sobel, 0.f), negative, {}, kSplitSigma_px, 0, cv::BORDER_REPLICATE);
-    cv::GaussianBlur(cv::max(sobel, 0.f), positive, {}, kSplitSigma_px, 0, cv::BORDER_REPLICATE);
-  }
   return gradient;
 }
 } // namespace bole

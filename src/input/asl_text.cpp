@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/asl_text.h"
+#include <bole/open_source.h>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>

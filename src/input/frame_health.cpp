@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/frame_health.h"
+#include <bole/open_source.h>
 
 #include "geometry/median.h"
 #include "geometry/so3.h"
@@ -87,4 +88,11 @@ void FrameHealth::judge(Frame &frame)
                                                    : FrameStatus::doubtful;
   frame.message = m_health.reason();
 }
+
+FrameJudge::FrameJudge(const PinholeCamera &camera, const Pose &bMc)
+    : m_health(std::make_unique<FrameHealth>(camera, bMc))
+{
+}
+FrameJudge::~FrameJudge() = default;
+void FrameJudge::judge(Frame &frame) { m_health->judge(frame); }
 } // namespace bole

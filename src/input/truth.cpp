@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/truth.h"
 #include "input/csv_reader.h"
+#include <bole/open_source.h>
 
 #include <cmath>
 #include <filesystem>

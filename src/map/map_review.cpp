@@ -314,8 +314,6 @@ void TrunkMap::keepActive()
 MapUpdate TrunkMap::review(double now_s, bool has_ranges)
 {
   MapUpdate update;
-  if (m_options.at_once)
-    return update;
   reviewEach(update, has_ranges);
   reviewPairs(update, now_s);
   reviewPlaces(update, now_s);
@@ -331,8 +329,6 @@ MapUpdate TrunkMap::review(double now_s, bool has_ranges)
 
 MapUpdate TrunkMap::reviewAll(bool has_ranges)
 {
-  if (m_options.at_once)
-    return {};
   for (MapTrunk &trunk : m_trunks)
     trunk.inactive = false;
   keepActive();

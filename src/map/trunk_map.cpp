@@ -63,10 +63,6 @@ int TrunkMap::add(const NewTrunk &found)
     addView(trunk, view);
   trunk.hits = 0;
   trunk.innovation2 = found.innovation2;
-  if (m_options.at_once) {
-    trunk.status = TrunkStatus::confirmed;
-    trunk.fate = TrunkFate::none;
-  }
   m_active.push_back(m_trunks.size());
   m_trunks.push_back(trunk);
   return trunk.id;
@@ -87,14 +83,6 @@ void TrunkMap::loseSight(int id)
   MapTrunk &trunk = at(id);
   if (trunk.status == TrunkStatus::confirmed)
     trunk.misses_in_a_row = std::max(trunk.misses_in_a_row, m_options.lost_misses);
-}
-
-void TrunkMap::end(int id)
-{
-  MapTrunk &trunk = at(id);
-  trunk.status = TrunkStatus::lost;
-  trunk.inactive = true;
-  m_active.erase(std::remove(m_active.begin(), m_active.end(), place(id)), m_active.end());
 }
 
 void TrunkMap::record(const Sighting &sighting)
@@ -201,7 +189,7 @@ TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk, bool has_ranges) const
   const bool is_out_of_sight = trunk.status == TrunkStatus::lost && !trunk.removed;
   if (trunk.status != TrunkStatus::confirmed && !is_out_of_sight)
     return trunk.status;
-  const bool is_any_placed = !has_ranges || m_options.at_once || m_options.most_place_sigma == 0;
+  const bool is_any_placed = !has_ranges || m_options.most_place_sigma == 0;
   const bool is_placed = is_any_placed || trunk.placeSigma() <= m_options.most_place_sigma;
   return is_placed ? TrunkStatus::confirmed : TrunkStatus::candidate;
 }

@@ -41,9 +41,7 @@ enum class Memory
 struct MapOptions
 {
   Memory memory = Memory::all;
-  double forget_s = 0;  ///< [s] since its last view
-  bool at_once = false; ///< what is found is confirmed and stays, as in the paper: nothing is lost, merged or doubted
-                        ///< until TrunkMap::end()
+  double forget_s = 0;            ///< [s] since its last view
   int confirm_observations = 10;  ///< views before a candidate may be confirmed, 2 to 1000
   int confirm_predicted = 3;      ///< of them after it was found, where its place was predicted, 0 to 1000
   double confirm_parallax = 0.05; ///< angle between lines of sight before it may be confirmed [rad], 0 to 1
@@ -277,8 +275,6 @@ public:
   void refresh(const TrunkEstimate &estimate);
   /// From the next review() on a confirmed trunk counts as lost from sight.
   void loseSight(int id);
-  /// Stops looking for a trunk, which stays in the map as it is.
-  void end(int id);
 
   /// Promotes, loses and merges by what is known at \p now_s. Candidates that were not seen for long become inactive:
   /// they keep their views and their place in records(), but those of which nothing was ever seen are removed, since a

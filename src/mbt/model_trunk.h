@@ -18,10 +18,10 @@
 /// Laws (each a test): L agrees with central differences of the residual; the residual of a point of the
 /// border is zero; L of an upright trunk has no component along the axis, and none about it.
 
-#include "geometry/cylinder.h"
 #include "geometry/silhouette.h"
 #include "tracking/border_profile.h"
 #include "tracking/borders.h"
+#include <bole/cylinder.h>
 
 #include <bole/vpMbTrunkTracker.h>
 

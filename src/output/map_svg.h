@@ -4,7 +4,7 @@
 /// The map seen from above as an SVG picture (the paper's Fig. 6).
 
 #include "input/trajectory.h"
-#include "input/truth.h"
+#include <bole/open_source.h>
 #include <bole/trunk_record.h>
 
 #include <string>

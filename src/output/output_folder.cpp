@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/output_folder.h"
+#include <bole/output_folder.h>
 
 #include "geometry/failure.h"
 #include "input/atomic_file.h"

@@ -4,8 +4,8 @@
 /// The folder of a run: the only place that writes into it.
 
 #include "output/map_svg.h"
-#include "output/output_folder.h"
 #include "output/summary_json.h"
+#include <bole/output_folder.h>
 
 #include <string>
 

@@ -3,7 +3,6 @@
 
 #include "geometry/constants.h"
 #include "geometry/horizontal_view.h"
-#include "pipeline/paper_policy.h"
 #include "pipeline/scene_points.h"
 
 #include <algorithm>
@@ -100,13 +99,6 @@ FrameReport Engine::process(const Frame &frame)
     lap("gradient");
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
-    if (m_units.flow.as_paper) {
-      report.trunks = mapAsPaper(*gradient, background(saliency), view, m_smoother, m_map, m_units);
-      lap("map");
-      report.saliency = fieldOf(std::move(saliency));
-      report.timing_ms = std::move(lap.times_ms);
-      return complete(std::move(report), frame, motion);
-    }
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
     loseUnplaced(predicted, view);
     if (m_units.flow.leave_bark)
@@ -167,10 +159,7 @@ Viewpoint Engine::extend(const Frame &frame, const Motion &motion)
     m_smoother.addOdometry(between.a, between.b, between.odometry);
   for (const DirectionBetween &between : motion.directions)
     m_smoother.addRelativePose(between.a, between.b, between.measurement);
-  if (m_units.flow.as_paper)
-    m_smoother.optimize(kJointlySettled); // full smoothing, and no step that the energies do not bear out
-  else
-    m_smoother.update();
+  m_smoother.update();
   refreshMap(secondsOf(frame.stamp_ns) - kLately_s);
   return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), secondsOf(frame.stamp_ns)};
 }
@@ -182,8 +171,6 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
     return std::nullopt;
   std::optional<RotationPrior> rotation;
   std::optional<TranslationPrior> translation;
-  if (m_units.flow.as_paper)
-    return m_saliency.update(frame.image, gyroTurn(frame, m_online, m_bMc, m_units.points.gyro));
   if (newest() > 0) {
     const Pose pMc = cameraAt(newest() - 1).inverse() * cameraAt(newest());
     if (motion.is_rotation_seen)
@@ -338,8 +325,7 @@ void Engine::refreshWholeMap()
 {
   for (const MapTrunk &trunk : m_map.trunks())
     if (!trunk.removed)
-      m_map.refresh(estimateOf(trunk, !trunk.inactive || m_units.map.at_once ||
-                                          trunk.observations >= m_units.map.confirm_observations));
+      m_map.refresh(estimateOf(trunk, !trunk.inactive || trunk.observations >= m_units.map.confirm_observations));
 }
 
 void Engine::apply(const MapUpdate &update)

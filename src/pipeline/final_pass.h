@@ -10,6 +10,7 @@
 
 #include "detection/column_evidence.h"
 #include "pipeline/adoption.h"
+#include <bole/pipeline.h>
 
 #include <deque>
 #include <limits>
@@ -65,10 +66,8 @@ struct Judged
          last_seen_s = std::numeric_limits<double>::infinity(); ///< when its borders were read
 };
 
-/// What the decision rests on: 1, how much its columns differ at its range, by how much more they do at the best range
-/// nearer or behind, whether its range is the best, and the log-odds that the frames gave it one by one.
-using OddsTerms = Eigen::Matrix<double, 5, 1>;
-constexpr std::array<const char *, 5> kOddsNames = {"1", "own", "elsewhere", "best_at_own", "online"};
+/// What the decision rests on, as Decision::kNames.
+using OddsTerms = Eigen::Matrix<double, Decision::kNames.size(), 1>;
 OddsTerms oddsTerms(const ColumnEvidence &evidence, double online);
 /// Fitted by `bole fit-odds` to the simulated flights of seeds 300 to 323 and three rendered ones.
 OddsTerms oddsWeights();

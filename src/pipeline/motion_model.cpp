@@ -41,8 +41,6 @@ MotionModel::MotionModel(const MotionModelOptions &options, const GyroOptions &g
 PosePrior MotionModel::first(const Frame &frame) const
 {
   PosePrior prior;
-  if (frame.wMb_odometry && m_options.relative_alone)
-    return {*frame.wMb_odometry, 1e-6 * Matrix6d::Identity()}; // p(x1) only anchors
   const double tilt2 = std::pow(frame.wMb_odometry ? m_options.tilt_sigma : 0.05, 2);
   const double height2 = std::pow(frame.wMb_odometry ? m_options.height_sigma : 1e-3, 2);
   if (frame.wMb_odometry)
@@ -64,7 +62,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
   const Pose filter = odometry ? m_odometry->inverse() * *frame.wMb_odometry : Pose();
 
   Matrix3d turn_covariance;
-  if (gyro.complete && !frame.gyro.empty() && !(odometry && m_options.relative_alone)) {
+  if (gyro.complete && !frame.gyro.empty()) {
     step.turn_from_gyro = true;
     step.aMb.R = gyro.R;
     turn_covariance = gyro.covariance() + std::pow(walked * m_options.gyro_turn_sigma, 2) * Matrix3d::Identity();
@@ -85,8 +83,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
     const double along = m_options.step_scale_sigma * filter.t.norm() / walked;
     const double across = std::hypot(walked * m_options.step_sigma, along);
     sigma << across, across, std::hypot(m_options.step_sigma_vertical, along);
-    if (!m_options.relative_alone)
-      step.absolute = levelPrior(*frame.wMb_odometry, wMa.R * step.aMb.R, m_options.height_sigma, m_options.tilt_sigma);
+    step.absolute = levelPrior(*frame.wMb_odometry, wMa.R * step.aMb.R, m_options.height_sigma, m_options.tilt_sigma);
   }
   else if (inertial && inertial->sigma < longer * m_options.free_step_sigma) {
     step.is_step_measured = true;

@@ -30,7 +30,6 @@ struct MotionModelOptions
   double tilt_sigma = 0.005;       ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
   double turn_sigma = 0.006;       ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
   double gyro_turn_sigma = 0.0008; ///< least walk of the gyro's rotation in 0.1 s [rad], 1e-6 to 1
-  bool relative_alone = false;     ///< the filter's relative pose and nothing else: no gyro, no height, roll or pitch
   double free_step_sigma = 0.15;   ///< of 0.1 s that nothing measured (constant velocity) [m], 1e-3 to 10; as the time
   double free_turn_sigma = 0.02;   ///< of a turn of 0.1 s that nothing measured [rad], 1e-4 to 1; as the time
 };

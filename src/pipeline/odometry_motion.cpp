@@ -38,7 +38,6 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_bMc(bMc),
       m_has_odometry(has_odometry),
       m_use_points(options.flow.use_points),
-      m_odometry_alone(options.motion.relative_alone),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
       m_path_scale(options.points.gyro,
@@ -60,8 +59,6 @@ PosePrior OdometryMotion::first(const Frame &frame)
 std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
 {
   std::vector<RelativeMotion> seen;
-  if (m_odometry_alone)
-    return seen;
   Frame room;
   if (m_use_points)
     seen = m_points.process(m_monitor.withoutLiars(frame, room));

@@ -33,7 +33,7 @@ private:
   void addPoints(Motion &motion, const std::vector<RelativeMotion> &seen) const;
 
   Pose m_bMc;
-  bool m_has_odometry, m_use_points, m_odometry_alone;
+  bool m_has_odometry, m_use_points;
   double m_scale_sigma;
   MotionModel m_model;
   PathScale m_path_scale;                      ///< by the accelerometer

@@ -2,7 +2,6 @@
 #include "pipeline/option_table.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
@@ -34,35 +33,26 @@ std::string nameOr(const OptionBound &bound)
 {
   return bound.key != nullptr ? bound.key : fmt::format("{}", bound.value);
 }
-
-/// The two words that an option other than a number may have, in the order of their values 0 and 1.
-std::array<const char *, 2> wordsOf(const OptionEntry &entry)
-{
-  if (std::holds_alternative<MapPolicy *>(entry.value))
-    return {"earned", "paper"};
-  return {"false", "true"};
-}
 } // namespace
 
 std::string OptionEntry::text() const
 {
   if (isNumber())
     return std::visit([](const auto *v) { return fmt::format("{}", static_cast<double>(*v)); }, value);
-  return wordsOf(*this)[std::visit([](const auto *v) { return static_cast<std::size_t>(*v); }, value)];
+  return *std::get<bool *>(value) ? "true" : "false";
 }
 
 std::string OptionEntry::allowed() const
 {
   if (!isNumber())
-    return fmt::format("{1} or {0}", wordsOf(*this)[0], wordsOf(*this)[1]);
+    return "true or false";
   return fmt::format("a {}number in [{}, {}]", std::holds_alternative<int *>(value) ? "whole " : "", named(low),
                      named(high));
 }
 
 std::string OptionEntry::range() const
 {
-  return isNumber() ? fmt::format("{} to {}", nameOr(low), nameOr(high))
-                    : fmt::format("{1}, {0}", wordsOf(*this)[0], wordsOf(*this)[1]);
+  return isNumber() ? fmt::format("{} to {}", nameOr(low), nameOr(high)) : "true, false";
 }
 
 bool OptionEntry::isInRange() const
@@ -76,12 +66,9 @@ bool OptionEntry::isInRange() const
 bool OptionEntry::assign(const std::string &value_text)
 {
   if (!isNumber()) {
-    const auto words = wordsOf(*this);
-    const auto word = std::find(words.begin(), words.end(), value_text);
-    if (word == words.end())
+    if (value_text != "true" && value_text != "false")
       return false;
-    const auto set = [&](auto *v) { *v = static_cast<std::remove_reference_t<decltype(*v)>>(word - words.begin()); };
-    std::visit(set, value);
+    *std::get<bool *>(value) = value_text == "true";
     return true;
   }
   if (auto *const *whole = std::get_if<int *>(&value))
@@ -140,8 +127,6 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"detection.elevation_high", &o.detection.elevation_high,
        OptionBound(o.detection.elevation_low, "detection.elevation_low"), 5, "tan", "upper end of it"},
 
-      {"map.policy", &o.map.policy, 0, 1, "",
-       "earned: a trunk is confirmed once enough speaks for it; paper: the paper's method as printed, all of it"},
       {"map.confirm_probability", &o.map.confirm_probability, 1e-6, 1 - 1e-6, "",
        "that a candidate is a trunk, at which it is confirmed, in flight and at the end; higher: fewer, and fewer "
        "false "
@@ -165,9 +150,6 @@ std::vector<OptionEntry> optionTable(Options &o)
 
       {"gyro.noise", &o.gyro.noise, 1e-7, 1, "rad/s/sqrt(Hz)", "white noise of the rate"},
       {"gyro.bias", &o.gyro.bias, 0, 1, "rad/s", "standard deviation of the bias at the start"},
-
-      {"paper.alpha", &o.paper.alpha, 1e-3, 1e6, "",
-       "weight of the paper's energy, Eq. 3, where map.policy = paper: 1000 as printed"},
   };
 }
 } // namespace bole

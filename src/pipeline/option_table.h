@@ -24,7 +24,7 @@ struct OptionBound
 struct OptionEntry
 {
   const char *key; ///< "section.name"
-  std::variant<double *, int *, bool *, MapPolicy *> value;
+  std::variant<double *, int *, bool *> value;
   OptionBound low, high; ///< both belong to the range; of numbers alone
   const char *unit;      ///< "" where there is none
   const char *effect;    ///< one line

@@ -103,4 +103,15 @@ WorldReference Pipeline::reference() const { return m_engine->reference(); }
 Trajectory Pipeline::smoothedTrajectory() const { return m_engine->smoothedTrajectory(); }
 Trajectory Pipeline::onlineTrajectory() const { return m_engine->onlineTrajectory(); }
 Graph Pipeline::graph() const { return m_engine->graph(); }
+
+std::vector<Decision> Pipeline::decisions() const
+{
+  std::vector<Decision> decisions;
+  for (const Judged &judged : m_engine->judged()) {
+    Decision decision{judged.trunk, {}, judged.log_odds};
+    OddsTerms::Map(decision.terms.data()) = oddsTerms(judged.evidence, judged.online);
+    decisions.push_back(decision);
+  }
+  return decisions;
+}
 } // namespace bole

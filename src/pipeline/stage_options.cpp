@@ -15,8 +15,6 @@ constexpr double kCompressedSigma_px = 0.2;
 /// What the thresholds on the picture are held for.
 constexpr double kFocal_px = 200;
 
-constexpr double kUpright = 1e-4; ///< standard deviation of the lean of what does not lean [tan]
-
 int oddNear(double value, int most) { return std::min(2 * static_cast<int>(std::lround((value - 1) / 2)) + 1, most); }
 
 /// Thresholds on the picture for a camera whose focal length is \p s times 200 px.
@@ -42,9 +40,9 @@ void scaleToCamera(StageOptions &o, double s)
   o.lines.width_max_px *= s;
   o.lines.inhibition_px *= s;
   /// Saliency asks for parts of a trunk, an angle: a picture as fine as twice the usual, or nearly, is halved once
-  /// more. The paper's is not.
+  /// more.
   constexpr double kNearly = 1.1;
-  const int halved = o.flow.as_paper ? 0 : static_cast<int>(std::floor(std::log2(std::max(kNearly * s, 1.0))));
+  const int halved = static_cast<int>(std::floor(std::log2(std::max(kNearly * s, 1.0))));
   o.saliency.finest_level += halved;
   o.saliency.levels += halved;
   o.saliency.window_width_px = oddNear(std::ldexp(o.saliency.window_width_px * s, -halved), 31);
@@ -132,36 +130,7 @@ void setServoing(StageOptions &o)
   o.tracking.border_correlation = 0.8;
 }
 
-constexpr LineQuartiles kParkForward = {0.042, 0.574}; ///< of data/park-forward
-
-/// All that the paper has otherwise; src/doc/paper.md says equation by equation why.
-void setPaper(StageOptions &o, const Options::Paper &paper)
-{
-  o.flow.as_paper = true;
-  o.flow.use_points = false;
-  o.motion.relative_alone = true;
-  o.gradient.split = true;
-  o.saliency = SaliencyOptions::paper();
-  o.lines.either_polarity = false;
-  setByInspection(o.lines, kParkForward);
-  o.tracking.energy.form = EnergyForm::paper;
-  o.tracking.energy.paper_alpha = paper.alpha;
-  o.smoothing.prior_lean_sigma = kUpright;
-  o.smoothing.summary_loss.kind = LossKind::quadratic;
-  o.map.at_once = true;
-}
 } // namespace
-
-void setByInspection(LineDetectorOptions &lines, const LineQuartiles &quartiles)
-{
-  constexpr double kNineTenths = 1.2; // of the quartile: the median of the borders of near trunks, in park-forward
-  const auto set = [](double &a, double &b, double half) {
-    a = -std::log(9.0) / ((kNineTenths - 1) * half);
-    b = -a * half;
-  };
-  set(lines.border_a, lines.border_b, quartiles.gradient);
-  set(lines.foreground_a, lines.foreground_b, quartiles.foreground);
-}
 
 StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
 {
@@ -169,8 +138,7 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   StageOptions o;
   o.flow.use_points = options.stages.points;
   o.flow.use_saliency = options.stages.saliency;
-  o.flow.final_pass = options.stages.final_pass && !options.stages.servoing && options.map.lag == 0 &&
-                      options.map.policy != MapPolicy::paper;
+  o.flow.final_pass = options.stages.final_pass && !options.stages.servoing && options.map.lag == 0;
   if (options.stages.servoing)
     setServoing(o);
   o.camera_height = options.camera.height;
@@ -184,8 +152,6 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   o.detection.profile.range = {options.detection.elevation_low, options.detection.elevation_high};
   setMap(o, options);
   setSensors(o, options);
-  if (options.map.policy == MapPolicy::paper)
-    setPaper(o, options.paper);
   constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
   scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
   if (!o.flow.final_pass)

@@ -40,7 +40,6 @@ struct FlowOptions
   bool use_points = true;       ///< relative poses from point features
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
   bool final_pass = true;       ///< at the end every hypothesis is judged by all frames: see final_pass.h
-  bool as_paper = false;        ///< detection, tracking and map as the paper has them: see paper_policy.h
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
   int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
                                 ///< time and, while it is wrong, pulls on the trajectory
@@ -79,16 +78,6 @@ struct StageOptions
   SmootherOptions smoothing = closeToTheOptimum();
   MapOptions map;
 };
-
-/// Upper quartiles over all lines of all pictures of a flight, as `bole reproduce --statistics` prints them.
-struct LineQuartiles
-{
-  double gradient = 0;   ///< of the mean of the blurred part (Eq. 19) [full scale/px]
-  double foreground = 0; ///< of the mean of 1 - p(background) (Eq. 20)
-};
-/// Eq. 19 and 20 "by inspection of the statistics of the data": Q is one half at the quartile and nine tenths at 1.2
-/// times of it.
-void setByInspection(LineDetectorOptions &lines, const LineQuartiles &quartiles);
 
 /// The stages' options for a user's, with thresholds in the pixels of \p camera.
 /// \throw vpException naming the option, its value and the range.

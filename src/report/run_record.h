@@ -4,10 +4,10 @@
 /// All that the folder of a run holds, read back for the page about it.
 
 #include "input/trajectory.h"
-#include "input/truth.h"
 #include "output/flight_trace.h"
 #include "output/timing_csv.h"
 #include <bole/evaluation.h>
+#include <bole/open_source.h>
 #include <bole/trunk_record.h>
 
 #include <map>

@@ -3,7 +3,6 @@
 
 #include "geometry/median.h"
 #include "saliency/evidence_loops.h"
-#include "saliency/flow_matrix.h"
 #include "saliency/plane_warp.h"
 
 #include <algorithm>
@@ -172,7 +171,10 @@ double medianParallax(const PinholeCamera &camera, const Pose &oMc, double range
   for (int i = 0; i < 8; ++i)
     for (int j = 0; j < 8; ++j) {
       const Eigen::Vector2d u((j + 0.5) * camera.width / 8, (i + 0.5) * camera.height / 8);
-      flows.push_back((translationFlowMatrix(camera, u) * ct).norm() / range);
+      const Eigen::Vector3d ray = camera.ray(u);
+      const Eigen::Vector2d flow(-camera.fx * ct.x() + camera.fx * ray.x() * ct.z(),
+                                 -camera.fy * ct.y() + camera.fy * ray.y() * ct.z()); // times the depth
+      flows.push_back(flow.norm() / range);
     }
   return medianOf(std::move(flows));
 }

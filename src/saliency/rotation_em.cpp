@@ -49,7 +49,7 @@ class LevelPass
 public:
   LevelPass(const PyramidLevel &previous, const PyramidLevel &current, const SaliencyOptions &options, int level,
             bool wide)
-      : m_previous(previous), m_current(current), m_options(options), m_noise(levelNoise(options, level, wide))
+      : m_previous(previous), m_current(current), m_noise(levelNoise(options, level, wide))
   {
   }
 
@@ -65,11 +65,8 @@ public:
     row.fx = static_cast<float>(camera.fx);
     row.fy = static_cast<float>(camera.fy);
     row.cx = static_cast<float>(camera.cx);
-    row.is_linear = m_options.linear_flow;
-    row.is_foreground_mean_zero = m_options.foreground_mean_zero;
     row.noise = m_noise;
     Eigen::Vector3f::Map(row.by_column) = warp.H.col(0);
-    Eigen::Vector3f::Map(row.omega) = logSo3(pRc).cast<float>();
     NormalEquations sums;
     for (row.row = 1; row.row + 1 < row.height; ++row.row) {
       row.current = imagesOf(m_current, row.row);
@@ -92,7 +89,6 @@ private:
   }
 
   const PyramidLevel &m_previous, &m_current;
-  const SaliencyOptions &m_options;
   LevelNoise m_noise;
   mutable std::vector<float> m_scratch;
 };
@@ -109,7 +105,7 @@ RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &cu
   const bool wide = !prior;
   // A blank image leaves this: any rotation up to half a turn a second or so.
   const Eigen::Matrix3d vague = Eigen::Matrix3d::Identity() / (0.3 * 0.3);
-  const Eigen::Matrix3d prior_information = prior && options.use_rotation_prior ? inverseOf(prior->covariance) : vague;
+  const Eigen::Matrix3d prior_information = prior ? inverseOf(prior->covariance) : vague;
   const int finest = std::min(options.finest_level, current.levels() - 1);
   const int coarsest = prior ? std::min(finest + 1, current.levels() - 1) : current.levels() - 1;
   Eigen::Matrix3d information = prior_information;
@@ -118,8 +114,7 @@ RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &cu
     const LevelPass pass(previous[level], current[level], options, level, wide);
     for (int iteration = 0; iteration < options.iterations; ++iteration) {
       sums = pass(result.pRc, nullptr);
-      const Eigen::Vector3d off_prior =
-          prior && options.use_rotation_prior ? logSo3(prior->pRc.transpose() * result.pRc) : Eigen::Vector3d::Zero();
+      const Eigen::Vector3d off_prior = prior ? logSo3(prior->pRc.transpose() * result.pRc) : Eigen::Vector3d::Zero();
       // The images' own step, trusted no further than near things may pull it.
       const Eigen::Matrix3d H = sums.H + 1e-3 * Eigen::Matrix3d::Identity();
       const Eigen::Vector3d image_step = H.ldlt().solve(sums.g);

@@ -15,8 +15,7 @@
 /// - Eq. 10 in the log domain with a logistic; both likelihoods in linear form are 0/0 in double precision.
 /// - Eq. 12 warps I(t-1) and Eq. 15 warps I(t). Here pixel u of I(t-1) moves to u + v in I(t), and the labels belong
 ///   to the pixels of I(t), where the detector wants them: pixel u is compared with I(t-1) at u - v.
-/// - Eq. 13: mean of the foreground's flow V w rather than 0 (SaliencyOptions::foreground_mean_zero).
-/// - Eq. 13: the exact warp of the rotation rather than V w (SaliencyOptions::linear_flow).
+/// - Eq. 13: mean of the foreground's flow V w rather than 0, and the exact warp of the rotation rather than V w.
 /// - Eq. 16: minimises the negative of what is printed.
 
 #include "saliency/image_pyramid.h"

@@ -30,27 +30,17 @@ void placesOfRow(const RotationRow &row, float *__restrict x, float *__restrict 
 {
   constexpr float kNone = -1e9f;
   const int width = row.width;
-  const float v = static_cast<float>(row.row), f = row.fx, fy = row.fy, cx = row.cx, ry = row.y;
   const float bx = row.base[0], by = row.base[1], bz = row.base[2];
   const float step_x = row.by_column[0], step_y = row.by_column[1], step_z = row.by_column[2];
-  const float wx = row.omega[0], wy = row.omega[1], wz = row.omega[2];
-  if (row.is_linear)
 #pragma omp simd
-    for (int j = 0; j < width; ++j) {
-      const float u = static_cast<float>(j), rx = (u - cx) / f;
-      x[j] = u - f * (rx * ry * wx - (1 + rx * rx) * wy + ry * wz);
-      y[j] = v - fy * ((1 + ry * ry) * wx - rx * ry * wy - rx * wz);
-    }
-  else
-#pragma omp simd
-    for (int j = 0; j < width; ++j) {
-      const float u = static_cast<float>(j), z = bz + u * step_z;
-      const bool is_ahead = z > 0;
-      const float inverse_z = 1 / (is_ahead ? z : 1), px = (bx + u * step_x) * inverse_z,
-                  py = (by + u * step_y) * inverse_z;
-      x[j] = is_ahead ? px : kNone;
-      y[j] = is_ahead ? py : kNone;
-    }
+  for (int j = 0; j < width; ++j) {
+    const float u = static_cast<float>(j), z = bz + u * step_z;
+    const bool is_ahead = z > 0;
+    const float inverse_z = 1 / (is_ahead ? z : 1), px = (bx + u * step_x) * inverse_z,
+                py = (by + u * step_y) * inverse_z;
+    x[j] = is_ahead ? px : kNone;
+    y[j] = is_ahead ? py : kNone;
+  }
   const float right = static_cast<float>(width - 1), bottom = static_cast<float>(row.height - 1);
 #pragma omp simd
   for (int j = 0; j < width; ++j)
@@ -82,13 +72,13 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
 {
   const std::ptrdiff_t n = row.width;
   const int end = row.width - 1;
-  const float *px = columns + kX * n, *py = columns + kY * n, *is_inside = columns + kInside * n;
+  const float *is_inside = columns + kInside * n;
   const float *previous = columns + kGrey * n, *previous_x = columns + kGradientX * n,
               *previous_y = columns + kGradientY * n;
   const float *grey = row.current.grey, *gradient_x = row.current.gradient_x, *gradient_y = row.current.gradient_y;
   const LevelNoise noise = row.noise;
-  const float fx = row.fx, fy = row.fy, cx = row.cx, y = row.y, v = static_cast<float>(row.row);
-  const float inverse_fx = 1 / fx, zero_mean = row.is_foreground_mean_zero ? 1.f : 0.f;
+  const float fx = row.fx, fy = row.fy, cx = row.cx, y = row.y;
+  const float inverse_fx = 1 / fx;
   const float texture2 = texture_gradient * texture_gradient;
   float h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0, used = 0, textured = 0;
 #pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2, used, textured)
@@ -103,13 +93,11 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
     const float square = gx * gx + gy * gy;
     const float var_b = noise.intensity + square * noise.background;
     const float var_f = noise.intensity + square * noise.foreground;
-    // of a foreground of mean zero the whole flow is unexplained
-    const float rf = r - zero_mean * inside * (gx * (u - px[j]) + gy * (v - py[j]));
     const float of_b = 1 / var_b, of_f = 1 / var_f;
-    const float ratio = 0.5f * (fastLog(var_f * of_b) - r * r * of_b + rf * rf * of_f);
-    // M-step (Eq. 16): expected negative log-likelihood; a foreground of mean zero does not depend on omega.
+    const float ratio = 0.5f * (fastLog(var_f * of_b) - r * r * of_b + r * r * of_f);
+    // M-step (Eq. 16): expected negative log-likelihood.
     const float p_b = 1.f / (1.f + fastExp(-(ratio + noise.prior_logit)));
-    const float weight = inside * (p_b * of_b + (1 - zero_mean) * (1 - p_b) * of_f);
+    const float weight = inside * (p_b * of_b + (1 - p_b) * of_f);
     ratios[j] = inside * ratio;
     used += inside;
     textured += square > texture2 ? inside : 0.f;

@@ -18,15 +18,13 @@ struct LevelImages
   const float *grey, *gradient_x, *gradient_y;
 };
 
-/// What one pass knows of a row: pixel j comes from base + j by_column of the previous image, homogeneous; with
-/// \p is_linear from the flow V omega instead.
+/// What one pass knows of a row: pixel j comes from base + j by_column of the previous image, homogeneous.
 struct RotationRow
 {
   LevelImages previous, current; ///< current: of this row
   int row, width, height;
   float fx, fy, cx, y; ///< y: of the ray
-  float base[3], by_column[3], omega[3];
-  bool is_linear, is_foreground_mean_zero;
+  float base[3], by_column[3];
   LevelNoise noise;
 };
 

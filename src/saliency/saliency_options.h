@@ -14,14 +14,11 @@ struct SaliencyOptions
   double sigma_foreground_px = 10; ///< the same for the foreground [px]; (sigma_background_px, 200]
   int label_window_px = 7;         ///< log ratios are averaged over this square [px at the working level]; odd, [1, 31]
   double background_prior = 0.7;   ///< p(lambda = 1) before looking; (0, 1). Most of a forest is far
-  bool foreground_mean_zero = false; ///< Eq. 13 as printed: the flow of the foreground has mean 0 instead of V w
-  bool linear_flow = false;          ///< Eq. 13 as printed: flow V w; otherwise the exact warp of the rotation
 
   // --- EM of Eq. 16 and 17
-  int iterations = 5;             ///< EM iterations a level; [1, 50]
-  int levels = 4;                 ///< levels of the pyramid, each half the size of the one before; [1, 8]
-  int finest_level = 1;           ///< 0 works at full resolution, 1 at half; [0, levels - 1]. Half is 4 times as fast
-  bool use_rotation_prior = true; ///< p(w) of Eq. 17; off: the gyro is only the start of the iterations
+  int iterations = 5;   ///< EM iterations a level; [1, 50]
+  int levels = 4;       ///< levels of the pyramid, each half the size of the one before; [1, 8]
+  int finest_level = 1; ///< 0 works at full resolution, 1 at half; [0, levels - 1]. Half is 4 times as fast
   double sigma_rotation_pull =
       0.004; ///< how far near things pull the rotation [rad]; [0, 1]. 0.1 to 0.3 degrees in forests
   double sample_correlation =
@@ -38,9 +35,5 @@ struct SaliencyOptions
   double evidence_decay = 0.8;  ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
   bool relative_evidence =
       true; ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
-
-  /// Eq. 10 to 17 as printed, with the constants of the original form: isotropic Sigma_b and Sigma_f, consecutive
-  /// frames, full resolution, no prior on the rotation beyond its start, no translation.
-  static SaliencyOptions paper();
 };
 } // namespace bole

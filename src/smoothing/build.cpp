@@ -121,7 +121,6 @@ int rowCount(FactorKind kind)
 {
   switch (kind) {
   case FactorKind::observation:
-  case FactorKind::image:
     return 4;
   case FactorKind::relative_pose:
     return 5;
@@ -197,8 +196,6 @@ void Smoother::State::freeDropped()
   for (const int id : dropped_factors) {
     Factor &factor = factors[id];
     free_data[static_cast<std::size_t>(factor.kind)].push_back(factor.data);
-    if (factor.kind == FactorKind::image)
-      images[factor.data].energy = nullptr;
     factor.linear.reset();
     free_factors.push_back(id);
   }

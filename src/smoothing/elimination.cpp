@@ -57,7 +57,6 @@ void Smoother::State::assemble(Factor &factor)
     addBinary<5, 6, 6>(factor.linear.get(), F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::observation:
-  case FactorKind::image:
     addBinary<4, 6, 5>(factor.linear.get(), F, ld, position[factor.a], position[factor.b]);
     break;
   case FactorKind::marginal: {

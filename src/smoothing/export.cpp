@@ -43,7 +43,6 @@ Graph Smoother::State::graph() const
       graph.observations.push_back({a, b, observations[factor.data].factor()});
       break;
     case FactorKind::marginal:
-    case FactorKind::image: // stays with its picture
       break;
     }
   }

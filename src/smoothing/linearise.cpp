@@ -78,18 +78,6 @@ void Smoother::State::linearise(Factor &factor)
     factor.cost = store2<4, 6, 5>(options.summary_loss, J_pose, J_trunk, r, factor.linear.get());
     break;
   }
-  case FactorKind::image: {
-    Matrix46d J_pose;
-    Matrix45d J_trunk;
-    ImageData &data = images[factor.data];
-    const Trunk &trunk = trunks[variables[factor.b].number].point;
-    const SummaryStatus status = squareRoot(data.energy(relativeTrunk(pose(factor.a), options.bMc, trunk)), data.root);
-    if (status == SummaryStatus::indefinite || status == SummaryStatus::not_finite)
-      data.root = SquareRootSummary(); // nothing is known there, and nothing pulls
-    const Vector4d r = residual(data.root, options.bMc, pose(factor.a), trunk, &J_pose, &J_trunk);
-    factor.cost = store2<4, 6, 5>(Loss(), J_pose, J_trunk, r, factor.linear.get()) + data.root.constant;
-    break;
-  }
   case FactorKind::marginal: {
     MarginalData &data = marginals[factor.data];
     Eigen::VectorXd xi(data.g.size());
@@ -135,10 +123,6 @@ double Smoother::State::costAtEstimate(const Factor &factor) const
                                 estimate(trunks[variables[factor.b].number]), nullptr, nullptr);
     return 0.5 * options.summary_loss.rho(r.squaredNorm());
   }
-  case FactorKind::image:
-    return images[factor.data]
-        .energy(relativeTrunk(pose(factor.a), options.bMc, estimate(trunks[variables[factor.b].number])))
-        .energy;
   case FactorKind::marginal: {
     const MarginalData &data = marginals[factor.data];
     Eigen::VectorXd xi(data.g.size());

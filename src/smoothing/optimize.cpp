@@ -65,7 +65,7 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   while (!settled && result.iterations < max_iterations) {
     solveAll(result);
     const double after = costAtEstimate(), fall = before - after;
-    if (std::isfinite(after) && fall >= -1e-13 * std::abs(before)) { // an image's energy is below zero
+    if (std::isfinite(after) && fall >= -1e-13 * std::abs(before)) {
       settled = fall <= tolerance * std::abs(before);
       before = after;
       relineariseAll();

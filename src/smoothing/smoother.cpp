@@ -101,18 +101,6 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, cons
   return status;
 }
 
-void Smoother::addImage(std::size_t pose, std::size_t trunk, ImageEnergy image)
-{
-  m_state->checkPose(pose);
-  m_state->checkTrunk(trunk);
-  const int from = m_state->poses[pose].variable;
-  require(m_state->isOpen(from), "pose, must be inside the lag");
-  require(static_cast<bool>(image), "image energy, must be a function");
-  m_state->see(static_cast<int>(pose), static_cast<int>(trunk));
-  m_state->newFactor(FactorKind::image, m_state->placeData(m_state->images, FactorKind::image, {std::move(image), {}}),
-                     from, m_state->trunks[trunk].variable);
-}
-
 void Smoother::removeObservation(std::size_t pose, std::size_t trunk)
 {
   m_state->checkPose(pose);
@@ -123,7 +111,7 @@ void Smoother::removeObservation(std::size_t pose, std::size_t trunk)
   const std::vector<int> factors = m_state->variables[m_state->poses[pose].variable].factors;
   for (const int id : factors) {
     const Factor &factor = m_state->factors[id];
-    if ((factor.kind == FactorKind::observation || factor.kind == FactorKind::image) && factor.b == seen)
+    if (factor.kind == FactorKind::observation && factor.b == seen)
       m_state->dropFactor(id);
   }
 }

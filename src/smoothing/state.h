@@ -60,8 +60,7 @@ enum class FactorKind : unsigned char
   odometry,
   relative_pose,
   observation,
-  marginal,
-  image
+  marginal
 };
 
 struct Factor
@@ -82,11 +81,6 @@ int rowCount(FactorKind kind);
 /// Doubles of its linearisation (not of a marginal).
 std::size_t blockSize(FactorKind kind);
 
-struct ImageData
-{
-  ImageEnergy energy;
-  SquareRootSummary root; ///< about the point of linearisation
-};
 /// What closed variables leave behind: a quadratic in the tangents at the points where it was made.
 struct MarginalData
 {
@@ -137,7 +131,6 @@ public:
   std::deque<RelativePoseMeasurement> relative_poses;
   std::deque<SquareRootSummary> observations;
   std::deque<MarginalData> marginals;
-  std::deque<ImageData> images;
   std::size_t live_observations = 0;
 
   // build.cpp
@@ -248,7 +241,7 @@ public:
   std::vector<int> dropped_factors, removed_variables; ///< still named by what is to be eliminated again
   std::vector<int> free_factors, free_variables;
   std::vector<int> free_trunks;              ///< under a lag, which has no end
-  std::array<std::vector<int>, 7> free_data; ///< by kind of factor
+  std::array<std::vector<int>, 6> free_data; ///< by kind of factor
   std::vector<int> touched, affected, moved, stale_factors, pool, orphans;
   std::vector<Descent> descents, postponed; ///< of the present back-substitution, and what those before left
   std::vector<double> front, separator_delta;

@@ -229,7 +229,7 @@ void Smoother::State::releaseOld(Variable &v)
   if (is_optimizing || options.propagation_threshold == 0 || v.columns.empty())
     return;
   for (const int id : v.assembled)
-    if (factors[id].alive && factors[id].kind != FactorKind::image)
+    if (factors[id].alive)
       factors[id].linear.reset();
   v.old_columns.assign(v.columns.begin(), v.columns.end());
   std::vector<double>().swap(v.columns);

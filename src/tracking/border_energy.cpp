@@ -14,18 +14,9 @@ TrunkEnergy::TrunkEnergy(const Gradient &gradient, const PinholeCamera &camera, 
 {
 }
 
-const vpImage<float> &TrunkEnergy::image(Border border) const
-{
-  if (m_options.form == EnergyForm::absolute_mean)
-    return m_gradient.signed_x;
-  return border == Border::left ? m_gradient.negative : m_gradient.positive;
-}
-
 /// Factor that turns the mean along a line into energy.
-double TrunkEnergy::weight(Border border, const BorderLine &line, double mean) const
+double TrunkEnergy::weight(Border border, double mean) const
 {
-  if (m_options.form == EnergyForm::paper) // Eq. 3
-    return m_options.paper_alpha * line.rows() * (border == Border::left ? 1 : -1);
   const double contrast = std::max(target(border).contrast, m_options.contrast_floor);
   return (mean >= 0 ? -1 : 1) * m_options.alpha / contrast;
 }
@@ -41,8 +32,8 @@ double TrunkEnergy::evaluate(const RelativeTrunk &relative, Vector4d *f) const
     const BorderLine line = borderLine(m_camera, relative, border, m_range);
     if (line.rows() == 0)
       continue;
-    const MeanGradient g = meanAlong(image(border), line);
-    const double k = weight(border, line, g.mean);
+    const MeanGradient g = meanAlong(m_gradient.signed_x, line);
+    const double k = weight(border, g.mean);
     energy += k * g.mean;
     if (f)
       *f += k * borderJacobian(m_camera, relative, border, line).transpose() * Eigen::Vector2d(g.by_top, g.by_bottom);
@@ -60,8 +51,8 @@ TrunkEnergy::Curvature TrunkEnergy::curvature(const RelativeTrunk &relative) con
     const BorderLine line = borderLine(m_camera, relative, border, m_range);
     if (line.rows() == 0)
       continue;
-    const auto &g = image(border);
-    const double k = weight(border, line, meanAlongOnly(g, line));
+    const auto &g = m_gradient.signed_x;
+    const double k = weight(border, meanAlongOnly(g, line));
     Eigen::Matrix2d H;
     for (int i = 0; i < 2; ++i) {
       const double top = i == 0 ? h : 0, bottom = i == 1 ? h : 0;
@@ -79,19 +70,6 @@ TrunkEnergy::Curvature TrunkEnergy::curvature(const RelativeTrunk &relative) con
     curvature.F += J.transpose() * H_psd * J;
   }
   return curvature;
-}
-
-/// The gradient there belongs to the tangent there; what that differs from the tangent here is antisymmetric.
-Matrix4d TrunkEnergy::hessian(const RelativeTrunk &relative, const Vector4d &step) const
-{
-  Matrix4d H;
-  for (int i = 0; i < 4; ++i) {
-    Vector4d plus, minus;
-    evaluate(relative.plus(step(i) * Vector4d::Unit(i)), &plus);
-    evaluate(relative.plus(-step(i) * Vector4d::Unit(i)), &minus);
-    H.col(i) = (plus - minus) / (2 * step(i));
-  }
-  return 0.5 * (H + H.transpose());
 }
 
 double TrunkEnergy::contrastAt(const RelativeTrunk &relative, Border border) const

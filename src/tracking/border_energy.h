@@ -4,13 +4,12 @@
 /// The image energy of one trunk, its gradient and its Hessian (paper, Eq. 3 and 4).
 ///
 /// Idea: both borders of a trunk are image lines; the energy is low where the gradient along them is strong.
-/// Default form, per border: e = -alpha |mean g| / contrast, with g the signed gradient blurred with 1 px. The
+/// Per border: e = -alpha |mean g| / contrast, with g the signed gradient blurred with 1 px. The
 /// mean makes it independent of the visible length, the contrast (the strength of the border where it was found)
 /// makes its curvature that of a blurred step of 1 px, so that alpha alone sets how the image weighs.
 ///
 /// Deviations from Eq. 3: either polarity (absolute value of the signed sum, as the paper's sentence says),
-/// mean instead of sum, contrast-normalised, alpha calibrated (EnergyOptions::alpha). EnergyForm::paper is Eq. 3
-/// as printed, on the blurred negative and positive parts.
+/// mean instead of sum, contrast-normalised, alpha calibrated (EnergyOptions::alpha).
 ///
 /// Laws (each a test): the gradient agrees with central differences; the Hessian is positive semi-definite;
 /// a step edge at the border is a minimum; brightness scaled by k leaves energy and Hessian unchanged.
@@ -20,19 +19,11 @@
 
 namespace bole
 {
-enum class EnergyForm
-{
-  absolute_mean, ///< abs of the mean of the signed gradient, either polarity
-  paper          ///< Eq. 3: negative part on the left border, positive part on the right, summed
-};
-
 struct EnergyOptions
 {
-  EnergyForm form = EnergyForm::absolute_mean;
-  /// Weight of one border, absolute_mean: 1/alpha is the variance [px^2] of a border's place at contrast. 0.01 to
+  /// Weight of one border: 1/alpha is the variance [px^2] of a border's place at contrast. 0.01 to
   /// 100. Chosen so that the normalised estimation error squared of mapped trunks is near its degrees of freedom.
   double alpha = 0.5;
-  double paper_alpha = 1000;     ///< weight of Eq. 3 in the paper form, 1e-3 to 1e6; the paper's value
   double contrast_floor = 0.02;  ///< contrast below which a border weighs less [full scale/px], 0.001 to 0.5
   double hessian_step_px = 0.75; ///< of the central differences of the Hessian, 0.1 to 3
 };
@@ -62,15 +53,12 @@ public:
   };
   /// Gauss-Newton Hessian J^T H J: H the 2x2 Hessian of each border by the displacement of its ends.
   Curvature curvature(const RelativeTrunk &relative) const;
-  /// The full Hessian by the tangent of theta^r, of any signs (Eq. 9). \p step: of its central differences.
-  Matrix4d hessian(const RelativeTrunk &relative, const Vector4d &step) const;
 
   /// Signed mean gradient along a border at \p relative.
   double contrastAt(const RelativeTrunk &relative, Border border) const;
 
 private:
-  double weight(Border border, const BorderLine &line, double mean) const;
-  const vpImage<float> &image(Border border) const;
+  double weight(Border border, double mean) const;
   const BorderTarget &target(Border border) const { return border == Border::left ? m_left : m_right; }
 
   const Gradient &m_gradient;

@@ -39,15 +39,15 @@ inline std::string textOf(const fs::path &path)
 inline std::vector<Stage> readStages(const fs::path &cmake_file)
 {
   std::vector<Stage> stages;
-  const std::regex call("\nbole_add_stage\\(([^)]*)\\)|\n  bole_add_stage\\(([^)]*)\\)");
+  const std::regex call("\nbole_add_stage\\(([^)]*)\\)");
   const std::string text = textOf(cmake_file);
   for (std::sregex_iterator match(text.begin(), text.end(), call), end; match != end; ++match) {
-    std::istringstream words((*match)[1].matched ? (*match)[1].str() : (*match)[2].str());
+    std::istringstream words((*match)[1].str());
     Stage stage;
     words >> stage.name;
     std::string keyword;
     for (std::string word; words >> word;) {
-      if (word == "DEPENDS" || word == "HEADERS" || word == "INTO" || word == "FILES_A_UNIT")
+      if (word == "DEPENDS" || word == "HEADERS" || word == "FILES_A_UNIT")
         keyword = word;
       else if (keyword == "DEPENDS")
         stage.depends.insert(word);
@@ -67,7 +67,7 @@ public:
   {
     for (const char *folder : {"include/bole", "src"})
       for (const auto &entry : fs::recursive_directory_iterator(root / folder))
-        if (entry.path().extension() == ".h" || entry.path().extension() == ".cpp")
+        if (isSource(entry.path()))
           readFile(fs::relative(entry.path(), root).string());
   }
 
@@ -77,6 +77,8 @@ public:
     std::vector<std::string> faults = orderFaults();
     std::map<std::string, Names> seen; // by stage: the stages that its files see
     for (const auto &[file, included] : m_includes) {
+      if (file.rfind("src/lab/", 0) == 0)
+        continue;
       const std::string stage = stageOf(file);
       if (stage.empty()) {
         faults.push_back(file + " belongs to no stage: name it after HEADERS, or implement it in src/<stage>");
@@ -110,6 +112,40 @@ public:
     return faults;
   }
 
+  /// Includes of the laboratory's files, also by way of others, that are neither its own nor public: it is a program
+  /// outside of bole, and shares with the command the headers of apps.
+  std::vector<std::string> laboratoryFaults() const
+  {
+    std::vector<std::string> faults, open;
+    for (const char *folder : {"src/lab", "apps/lab", "tests/lab"})
+      if (fs::exists(m_root / folder))
+        for (const auto &entry : fs::recursive_directory_iterator(m_root / folder))
+          if (isSource(entry.path()))
+            open.push_back(fs::relative(entry.path(), m_root).string());
+    std::sort(open.begin(), open.end());
+    Names seen(open.begin(), open.end());
+    const std::regex include("^\\s*#\\s*include\\s*\"([^\"]+)\"");
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      const std::string file = open[i];
+      std::ifstream stream(m_root / file);
+      std::smatch match;
+      for (std::string line; std::getline(stream, line);) {
+        if (!std::regex_search(line, match, include))
+          continue;
+        std::vector<fs::path> places = {fs::path(file).parent_path(), "src/lab"};
+        places.emplace_back(file.rfind("tests/", 0) == 0 ? "tests" : "apps");
+        const auto place = std::find_if(places.begin(), places.end(), [&](const fs::path &folder) {
+          return fs::exists(m_root / folder / match[1].str());
+        });
+        if (place == places.end())
+          faults.push_back(file + " includes \"" + match[1].str() + "\"");
+        else if (const std::string found = (*place / match[1].str()).string(); seen.insert(found).second)
+          open.push_back(found);
+      }
+    }
+    return faults;
+  }
+
   /// Files that include a header of ViSP and do not open the namespace that it may have.
   std::vector<std::string> namespaceFaults() const
   {
@@ -131,6 +167,7 @@ public:
   }
 
 private:
+  static bool isSource(const fs::path &path) { return path.extension() == ".h" || path.extension() == ".cpp"; }
   static bool isPublic(const std::string &file) { return file.rfind("include/bole/", 0) == 0; }
 
   void readFile(const std::string &file)
@@ -144,9 +181,10 @@ private:
       if (std::regex_search(line, match, include)) {
         m_lines[file].push_back(match[1].str());
         const std::string name = match[1].str().substr(1, match[1].length() - 2);
-        const std::string path = (match[1].str()[0] == '<' ? "include/" : "src/") + name;
-        if (fs::exists(m_root / path))
-          m_includes[file].insert(path);
+        const Names folders = match[1].str()[0] == '<' ? Names{"include/"} : Names{"src/", "src/lab/"};
+        for (const std::string &folder : folders)
+          if (fs::exists(m_root / (folder + name)))
+            m_includes[file].insert(folder + name);
       }
   }
 

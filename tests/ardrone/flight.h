@@ -4,8 +4,8 @@
 /// A made-up flight with known motion, and an emulator that flies it.
 
 #include "ardrone/drone_link.h"
+#include "emulator/emulator.h"
 #include "geometry/so3.h"
-#include "lab/emulator/emulator.h"
 #include <bole/ardrone_source.h>
 
 #include <chrono>
@@ -83,7 +83,7 @@ inline std::unique_ptr<ArDroneEmulator> emulate(int generation, std::size_t fram
 /// Where the emulator is, with a camera that fits its pictures.
 inline ArDroneAddress addressOf(const ArDroneEmulator &emulator)
 {
-  ArDroneAddress address = emulator.address();
+  ArDroneAddress address = ArDroneAddress::parse(emulator.address());
   address.camera_path = std::string(BOLE_SOURCE_DIR) + "/tests/ardrone/camera160.yaml";
   return address;
 }

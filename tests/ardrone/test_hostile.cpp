@@ -2,9 +2,9 @@
 // Whoever speaks on the drone's ports: the client neither believes it, nor fills its memory, nor ever answers with a
 // flight command. On loopback; every loop is bounded, nothing measures time.
 #include "ardrone/pave.h"
-#include "ardrone/socket.h"
-#include "ardrone/uvlc.h"
-#include "lab/emulator/h264_encoder.h"
+#include "emulator/emulator_packets.h"
+#include "emulator/server_socket.h"
+#include "emulator/uvlc_encoder.h"
 
 #include "flight.h"
 
@@ -19,7 +19,6 @@ using test::eventually;
 namespace
 {
 using Bytes = std::vector<std::uint8_t>;
-constexpr Milliseconds kSoon{20};
 
 /// Bare sockets in the place of a drone. They send what a test wants, and read what the client says.
 class FakeDrone
@@ -28,9 +27,9 @@ public:
   explicit FakeDrone(int generation) : m_generation(generation)
   {
     if (generation == 2)
-      listener = Socket::listenTcp("127.0.0.1", 0);
+      listener = ServerSocket::listenTcp("127.0.0.1", 0);
     else
-      video = Socket::bindUdp("127.0.0.1", 0);
+      video = ServerSocket::bindUdp("127.0.0.1", 0);
   }
 
   ArDroneAddress address() const
@@ -45,24 +44,23 @@ public:
   }
 
   /// The client's end of \p socket, from the first datagram that it sends.
-  static sockaddr_in clientOf(const Socket &socket)
+  static sockaddr_in clientOf(const ServerSocket &socket)
   {
     sockaddr_in client = {};
     EXPECT_TRUE(eventually([&] {
       Bytes buffer(2048);
       std::size_t size = 0;
-      return socket.receiveFrom(buffer.data(), buffer.size(), size, client, kSoon) == Socket::Read::data;
+      return socket.receiveFrom(buffer.data(), buffer.size(), size, client);
     }));
     return client;
   }
 
   /// The client's next connection to the video port.
-  Socket accept() const
+  ServerSocket accept() const
   {
-    Socket client;
+    ServerSocket client;
     EXPECT_TRUE(eventually([&] {
-      if (listener.waitReadable(kSoon))
-        client = listener.accept();
+      client = listener.accept();
       return client.valid();
     }));
     return client;
@@ -73,7 +71,8 @@ public:
   {
     Bytes buffer(1 << 16);
     std::size_t size = 0;
-    while (m_at.receive(buffer.data(), buffer.size(), size, Milliseconds(0)) == Socket::Read::data)
+    sockaddr_in sender = {};
+    while (m_at.receiveFrom(buffer.data(), buffer.size(), size, sender))
       for (const AtCommand &command : parseAtCommands(std::string(buffer.begin(), buffer.begin() + size)))
         m_commands.insert(command.name);
     return m_commands;
@@ -85,11 +84,11 @@ public:
       EXPECT_TRUE(name == "CONFIG" || name == "CTRL" || name == "COMWDG") << name;
   }
 
-  Socket navdata = Socket::bindUdp("127.0.0.1", 0), listener, video;
+  ServerSocket navdata = ServerSocket::bindUdp("127.0.0.1", 0), listener, video;
 
 private:
   int m_generation;
-  Socket m_at = Socket::bindUdp("127.0.0.1", 0);
+  ServerSocket m_at = ServerSocket::bindUdp("127.0.0.1", 0);
   std::set<std::string> m_commands;
 };
 
@@ -105,7 +104,7 @@ Navdata packet(std::uint32_t sequence)
   return navdata;
 }
 
-void send(const Socket &socket, const Bytes &bytes, const sockaddr_in &to)
+void send(const ServerSocket &socket, const Bytes &bytes, const sockaddr_in &to)
 {
   socket.sendTo(bytes.data(), bytes.size(), to);
 }
@@ -122,16 +121,18 @@ vpImage<unsigned char> scene(int shift)
 /// A key frame with its header, of a stream of its own.
 Bytes paveFrame(std::uint32_t number)
 {
-  H264Encoder encoder(160, 120, 20, 1e6, 1);
+  VideoPacketEncoder encoder({160, 128, 20, 1e6, false, 1, ""});
   const auto encoded = encoder.encode(scene(static_cast<int>(number)), true);
   PaveHeader header;
+  header.display_width = 160;
+  header.display_height = 120;
   header.frame_number = number;
   header.timestamp_ms = 50 * number;
-  return encoder.paveFrame(encoded, header);
+  return paveFrame(encoder, encoded, header);
 }
 
 /// All of \p bytes, as long as the client stays; false when it goes.
-bool sendAll(const Socket &socket, const Bytes &bytes)
+bool sendAll(const ServerSocket &socket, const Bytes &bytes)
 {
   std::size_t sent = 0;
   return eventually([&] {
@@ -197,7 +198,7 @@ TEST(Hostile, WhatComesFromAnotherPortIsNotHeard)
   FakeDrone drone(1);
   DroneLink link(drone.address());
   const sockaddr_in of_navdata = FakeDrone::clientOf(drone.navdata), of_video = FakeDrone::clientOf(drone.video);
-  const Socket other = Socket::bindUdp("127.0.0.1", 0);
+  const ServerSocket other = ServerSocket::bindUdp("127.0.0.1", 0);
   for (std::uint32_t k = 1; k <= 50; ++k) {
     send(other, encodeNavdata(packet(1000 + k)), of_navdata);
     send(other, encodeUvlc(scene(static_cast<int>(k)), k), of_video);
@@ -261,18 +262,18 @@ TEST(Hostile, AStreamOfLyingHeadersIsGotThrough)
       Bytes(200'000, 'P'),
   };
   for (const Bytes &stream : streams) {
-    const Socket client = drone.accept();
+    const ServerSocket client = drone.accept();
     sendAll(client, stream);
   } // each connection is closed at its end: a reset where the client has not read it all
   {
-    const Socket client = drone.accept(); // byte by byte
+    const ServerSocket client = drone.accept(); // byte by byte
     for (const std::uint8_t byte : good)
       if (!sendAll(client, {byte}))
         break;
     expectSeesAgain(link, [&](std::uint32_t number) { sendAll(client, paveFrame(number)); });
   }
-  const Socket silent = drone.accept(); // and one that never says anything is given up
-  const Socket next = drone.accept();
+  const ServerSocket silent = drone.accept(); // and one that never says anything is given up
+  const ServerSocket next = drone.accept();
   expectSeesAgain(link, [&](std::uint32_t number) { sendAll(next, paveFrame(number)); });
   drone.expectNoFlightCommand();
 }
@@ -284,7 +285,7 @@ TEST(Hostile, NoTrafficMakesTheClientSendAFlightCommand)
     DroneLink link(drone.address());
     const sockaddr_in of_navdata = FakeDrone::clientOf(drone.navdata);
     const sockaddr_in of_video = generation == 1 ? FakeDrone::clientOf(drone.video) : sockaddr_in{};
-    Socket stream = generation == 2 ? drone.accept() : Socket();
+    ServerSocket stream = generation == 2 ? drone.accept() : ServerSocket();
     std::mt19937 random(static_cast<unsigned>(generation));
     const Bytes picture = generation == 1 ? encodeUvlc(scene(1), 1) : paveFrame(1);
     for (int k = 0; k < 600; ++k) {

@@ -102,7 +102,7 @@ TEST_P(Live, ReadingSendsNoFlightCommand)
 TEST_P(Live, ASlowConsumerGetsTheNewestFrameAndTheOthersAreCounted)
 {
   const auto emulator = emulate(GetParam(), 60);
-  DroneLink link(emulator->address());
+  DroneLink link(ArDroneAddress::parse(emulator->address()));
   LiveFrame frame;
   ASSERT_TRUE(emulator->wait(test::kPatience_s));
   ASSERT_TRUE(eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 50; }));
@@ -149,7 +149,7 @@ TEST_P(Live, SeesAgainSoonAfterTheDroneIsBack)
   options.reboot_at_s = 1;
   options.reboot_for_s = 1; // longer than a link may be silent
   const auto emulator = emulate(GetParam(), 20 * static_cast<std::size_t>(test::kPatience_s), options);
-  DroneLink link(emulator->address());
+  DroneLink link(ArDroneAddress::parse(emulator->address()));
   LiveFrame frame;
   std::int64_t back_ns = -1, seen_ns = -1;
   const auto sees = [&] {
@@ -287,7 +287,7 @@ TEST(LiveSource, SaysWhenNobodyAnswersOrTheCameraDoesNotFit)
   EXPECT_THROW(ArDroneSource(nobody.toString(), options), vpException);
   const auto emulator = emulate(2, 40);
   options.grabber.open_timeout_s = test::kPatience_s;
-  EXPECT_THROW(ArDroneSource(emulator->address().toString(), options),
+  EXPECT_THROW(ArDroneSource(emulator->address(), options),
                vpException); // 160x120 is not the shape of 640x360
 }
 
@@ -295,7 +295,7 @@ TEST(LiveSource, FindsTheGenerationOut)
 {
   for (const int generation : {1, 2}) {
     const auto emulator = emulate(generation, 40);
-    ArDroneAddress address = emulator->address();
+    ArDroneAddress address = ArDroneAddress::parse(emulator->address());
     address.generation = 0;
     vpArDroneGrabber::Options options;
     options.open_timeout_s = test::kPatience_s;

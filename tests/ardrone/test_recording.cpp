@@ -147,7 +147,7 @@ TEST(Recording, ARecordedFlightIsServedAgain)
     {
       RecordingWriter writer(folder.path);
       const auto emulator = test::emulate(generation, 40);
-      DroneLink link(emulator->address(), {},
+      DroneLink link(ArDroneAddress::parse(emulator->address()), {},
                      [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
                        writer.write(channel, arrival_ns, data, size);
                      });
@@ -157,7 +157,7 @@ TEST(Recording, ARecordedFlightIsServedAgain)
     EXPECT_EQ(recordedGeneration(folder.path), generation);
     ArDroneEmulator replay(makeRecordingFeed(folder.path), {});
     replay.start();
-    DroneLink link(replay.address());
+    DroneLink link(ArDroneAddress::parse(replay.address()));
     LiveFrame last;
     double height = 0;
     EXPECT_TRUE(test::eventually([&] {

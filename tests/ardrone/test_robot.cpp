@@ -14,7 +14,7 @@ namespace
 struct Flying
 {
   std::unique_ptr<ArDroneEmulator> emulator = test::emulate(2, 40, {}, true);
-  vpArDroneGrabber grabber{emulator->address().toString()};
+  vpArDroneGrabber grabber{emulator->address()};
   Flying()
   {
     vpImage<unsigned char> image;

@@ -2,7 +2,8 @@
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
 #include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
-#include "lab/emulator/h264_encoder.h"
+#include "emulator/emulator_packets.h"
+#include "emulator/uvlc_encoder.h"
 
 #include "flight.h"
 
@@ -14,13 +15,14 @@ using namespace bole;
 namespace
 {
 using Bytes = std::vector<std::uint8_t>;
-constexpr std::size_t kKeyInterval = 15, kHeader = 64;
+constexpr int kKeyInterval = 15;
+constexpr std::size_t kHeader = 64;
 
 /// PaVE frames of a flight, a key frame every kKeyInterval.
 std::vector<Bytes> encodedFlight(std::size_t count)
 {
   test::MadeUpFlight flight(count);
-  H264Encoder encoder(160, 120, 20, 1.3e6, static_cast<int>(kKeyInterval));
+  VideoPacketEncoder encoder({160, 120, 20, 1.3e6, false, kKeyInterval, "keyint=15:min-keyint=15:scenecut=0"});
   std::vector<Bytes> frames;
   for (Frame frame; flight.next(frame);) {
     const auto packet = encoder.encode(frame.image);
@@ -28,7 +30,7 @@ std::vector<Bytes> encodedFlight(std::size_t count)
     PaveHeader header;
     header.frame_number = static_cast<std::uint32_t>(frames.size() + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * frames.size());
-    frames.push_back(encoder.paveFrame(packet, header));
+    frames.push_back(paveFrame(encoder, packet, header));
   }
   return frames;
 }

@@ -54,11 +54,6 @@ const std::vector<Step> kSteps = {
     {"points behind a trunk not asked", [](StageOptions &o) { o.map.through_range = 0; }},
     {"merging off", [](StageOptions &o) { o.map.merge_distance = 0; }},
     {"scan off: minimised from the prediction", [](StageOptions &o) { o.tracking.scan = false; }},
-    {"blurred minimum and maximum (Eq. 3)",
-     [](StageOptions &o) {
-       o.gradient.split = true;
-       o.tracking.energy.form = EnergyForm::paper;
-     }},
 };
 
 Evaluation fly(const std::string &sequence, const Step &step)

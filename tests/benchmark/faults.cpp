@@ -6,7 +6,7 @@
 //   benchmark_faults [loss]     about six minutes, or the rows that say so; BOLE_FAULT_SECONDS=8
 //   flies only the first 8 s
 #include "ardrone/drone_link.h"
-#include "lab/emulator/emulator.h"
+#include "emulator/emulator.h"
 #include <bole/ardrone_source.h>
 #include <bole/open_source.h>
 
@@ -142,7 +142,7 @@ std::unique_ptr<ArDroneEmulator> startEmulator(int generation, const ArDroneEmul
 Outcome fly(int generation, const Fault &fault, std::size_t frames)
 {
   const auto emulator = startEmulator(generation, fault.options, frames);
-  ArDroneAddress address = emulator->address();
+  ArDroneAddress address = ArDroneAddress::parse(emulator->address());
   address.camera_path = kFlight + "/mav0/cam0/sensor.yaml";
   ArDroneSource::Options options;
   options.give_up_s = kGiveUp_s;
@@ -231,7 +231,7 @@ std::vector<double> reconnections(int generation, int times)
     options.reboot_at_s = 3 + 0.137 * i; // whatever the phase of key frames, wake-ups and retries
     options.reboot_for_s = kReboot_s;
     const auto emulator = startEmulator(generation, options, 0);
-    DroneLink link(emulator->address());
+    DroneLink link(ArDroneAddress::parse(emulator->address()));
     LiveFrame frame;
     const std::int64_t end_ns = nowNs() + 20'000'000'000;
     while (nowNs() < end_ns) {

@@ -7,8 +7,8 @@
 #include "evaluation/visibility.h"
 #include "geometry/median.h"
 #include "input/asl_source.h"
-#include "input/truth.h"
 #include "pipeline/engine.h"
+#include <bole/open_source.h>
 
 #include <algorithm>
 #include <cstdio>

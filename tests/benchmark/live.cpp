@@ -2,7 +2,7 @@
 // Age of the frames of a live drone: an emulator flies there and back at twice real time, a
 // consumer works 15 ms on each frame. BOLE_LIVE_SECONDS (default 10) sets the length of the run, of
 // the host's clock.
-#include "lab/emulator/emulator.h"
+#include "emulator/emulator.h"
 #include <bole/ardrone_source.h>
 #include <bole/open_source.h>
 
@@ -30,9 +30,7 @@ void LiveFrameAge(benchmark::State &state)
     options.speed = 2;
     bole::ArDroneEmulator emulator(bole::makeSequenceFeed(*sequence, feed), options);
     emulator.start();
-    bole::ArDroneAddress address = emulator.address();
-    address.camera_path = flight + "/mav0/cam0/sensor.yaml";
-    bole::ArDroneSource source(address.toString(), {});
+    bole::ArDroneSource source(emulator.address() + "&camera=" + flight + "/mav0/cam0/sensor.yaml", {});
     std::vector<double> ages_ms;
     const std::int64_t end_ns = nowNs() + static_cast<std::int64_t>(seconds * 1e9);
     for (bole::Frame frame; nowNs() < end_ns && source.next(frame);) {

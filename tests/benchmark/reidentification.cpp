@@ -5,7 +5,7 @@
 #include "support/rendered_flights.h"
 
 #include "input/asl_source.h"
-#include "input/truth.h"
+#include <bole/open_source.h>
 #include <bole/pipeline.h>
 #include <bole/trunk.h>
 

@@ -19,8 +19,7 @@ enum Mode
 {
   odometry_and_gyro,
   gyro_alone,
-  images_alone,
-  paper
+  images_alone
 };
 
 /// One whole pass over frames 0 to 110 an iteration; figures are of frames 10 to 110.
@@ -73,12 +72,12 @@ void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOpt
 
 void flySaliency(benchmark::State &state)
 {
-  const char *const modes[] = {"odometry and gyro", "gyro alone", "images alone", "paper preset"};
+  const char *const modes[] = {"odometry and gyro", "gyro alone", "images alone"};
   const auto mode = static_cast<Mode>(state.range(1));
-  fly(state, kFlights[state.range(0)], mode, mode == paper ? SaliencyOptions::paper() : SaliencyOptions(), modes[mode]);
+  fly(state, kFlights[state.range(0)], mode, SaliencyOptions(), modes[mode]);
 }
 BENCHMARK(flySaliency)
-    ->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone, paper}})
+    ->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone}})
     ->Unit(benchmark::kMillisecond)
     ->Iterations(1);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/simulated_flight.h"
+#include "simulation/simulated_flight.h"
 
 #include <benchmark/benchmark.h>
 

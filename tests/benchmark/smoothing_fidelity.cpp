@@ -8,7 +8,6 @@
 #include "support/rendered_flights.h"
 
 #include "evaluation/trajectory_metrics.h"
-#include "input/truth.h"
 #include "pipeline/engine.h"
 #include <bole/open_source.h>
 

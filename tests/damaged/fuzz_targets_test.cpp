@@ -8,7 +8,8 @@
 #include "ardrone/pave.h"
 #include "ardrone/recording.h"
 #include "ardrone/uvlc.h"
-#include "lab/emulator/h264_encoder.h"
+#include "emulator/emulator_packets.h"
+#include "emulator/uvlc_encoder.h"
 #include "output/video_writer.h"
 #include <bole/graph.h>
 
@@ -140,14 +141,16 @@ vpImage<unsigned char> scene(unsigned width, unsigned height, int shift)
 
 Bytes paveStream()
 {
-  H264Encoder encoder(160, 128, 20, 4e5, 4);
+  VideoPacketEncoder encoder({160, 128, 20, 4e5, false, 4, ""});
   Bytes stream = {12}; // the target cuts the rest into pieces of 97 bytes
   for (int i = 0; i < 6; ++i) {
     const auto encoded = encoder.encode(scene(160, 128, i), i == 0);
     PaveHeader header;
     header.frame_number = static_cast<std::uint32_t>(i + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * i);
-    const Bytes frame = encoder.paveFrame(encoded, header);
+    header.display_width = 160;
+    header.display_height = 128;
+    const Bytes frame = paveFrame(encoder, encoded, header);
     stream.insert(stream.end(), frame.begin(), frame.end());
   }
   return stream;

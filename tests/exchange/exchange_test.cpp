@@ -2,7 +2,6 @@
 // Each format is read back by a reader that shares no code with its writer; where Debian's own tools are installed,
 // by those too.
 #include "exchange/exchange.h"
-#include "geometry/cylinder.h"
 #include "geometry/so3.h"
 #include "input/flight_folder.h"
 #include "output/flight_trace.h"
@@ -10,6 +9,7 @@
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include "support/shell.h"
+#include <bole/cylinder.h>
 #include <bole/graph.h>
 
 #include <gmock/gmock.h>

@@ -3,8 +3,8 @@
 #include "file_of.h"
 
 #include "input/trajectory.h"
-#include "input/truth.h"
 #include "output/trunks_csv.h"
+#include <bole/open_source.h>
 
 #include <visp3/core/vpException.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/cylinder.h"
 #include "geometry/so3.h"
+#include <bole/cylinder.h>
 
 #include <gtest/gtest.h>
 

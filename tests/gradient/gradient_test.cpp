@@ -49,7 +49,7 @@ TEST(Gradient, IsTheConvolutionByItsDefinitionUpToTheEdges)
 {
   const auto I = noise(31, 43);
   for (const double sigma : {0.7, 1.0, 2.2}) {
-    const Gradient gradient = computeGradient(I, {sigma, false});
+    const Gradient gradient = computeGradient(I, {sigma});
     for (int v = 0; v < 31; ++v)
       for (int u = 0; u < 43; ++u)
         ASSERT_NEAR(gradient.signed_x[v][u], bruteForce(I, u, v, sigma), 2e-6) << u << "," << v << " sigma " << sigma;
@@ -80,40 +80,5 @@ TEST(Gradient, PeaksAtAStepWithTheSignOfItsBrightness)
     EXPECT_GE(gradient.signed_x[15][u] + 1e-6f, std::min(gradient.signed_x[15][29], gradient.signed_x[15][30]));
   EXPECT_NEAR(gradient.signed_x[15][29], gradient.signed_x[15][30], 1e-6); // the step is between the two
   EXPECT_LT(gradient.signed_x[15][29], -0.1);
-}
-
-TEST(Gradient, SplitPartsAreMadeOnlyWhenAskedForAndNeverChangeSign)
-{
-  const auto I = noise(40, 60);
-  EXPECT_EQ(computeGradient(I).negative.getSize(), 0u);
-  const Gradient gradient = computeGradient(I, {1, true});
-  ASSERT_EQ(gradient.negative.getSize(), I.getSize());
-  for (unsigned i = 0; i < I.getSize(); ++i) {
-    EXPECT_LE(gradient.negative.bitmap[i], 0);
-    EXPECT_GE(gradient.positive.bitmap[i], 0);
-  }
-}
-
-/// Split first, then blur (Eq. 3): with blur first the two would cancel on noise.
-TEST(Gradient, SplitPartsAddUpToTheBlurredSobelDerivative)
-{
-  const auto I = noise(60, 60);
-  const Gradient gradient = computeGradient(I, {1, true});
-  const auto sobel = [&](int u, int v) {
-    double sum = 0;
-    for (int dv = -1; dv <= 1; ++dv)
-      sum += (dv == 0 ? 2 : 1) * (I[v + dv][u + 1] - I[v + dv][u - 1]);
-    return sum / (8 * 255.0);
-  };
-  double sum = 0, negative = 0, weight = 0;
-  for (int dv = -12; dv <= 12; ++dv)
-    for (int du = -12; du <= 12; ++du) {
-      const double w = std::exp(-0.5 * (du * du + dv * dv) / 9.0), s = sobel(30 + du, 30 + dv);
-      sum += w * s;
-      negative += w * std::min(s, 0.0);
-      weight += w;
-    }
-  EXPECT_NEAR(gradient.negative[30][30] + gradient.positive[30][30], sum / weight, 1e-4);
-  EXPECT_NEAR(gradient.negative[30][30], negative / weight, 5e-4);
 }
 } // namespace

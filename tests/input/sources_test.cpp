@@ -5,7 +5,6 @@
 #include "geometry/so3.h"
 #include "input/sequence_source.h"
 #include "input/trajectory.h"
-#include "input/truth.h"
 #include "input/video_source.h"
 #include <bole/open_source.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/atomic_file.h"
-#include "output/output_folder.h"
+#include <bole/output_folder.h>
 
 #include <gmock/gmock.h>
 

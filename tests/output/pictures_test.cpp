@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What people look at: the overlay, the videos, the map, the progress line.
+// What people look at: the overlay, the videos, the map.
 #include "input/video_source.h"
 #include "output/map_svg.h"
-#include "output/progress.h"
 #include "output/video_writer.h"
 #include <bole/overlay.h>
 
@@ -337,27 +336,5 @@ TEST(MapSvg, IsDrawnHoweverFarATrajectoryWentAstray)
 TEST(MapSvg, OfNothingIsAPictureToo)
 {
   EXPECT_THAT(toSvg(MapPicture()), testing::AllOf(testing::StartsWith("<svg"), testing::EndsWith("</svg>\n")));
-}
-
-TEST(Progress, TellsWhereItIsAndHowLongItWillTake)
-{
-  EXPECT_EQ(Progress::text(50, 200, 10, "frame", ""),
-            "[#######.....................] frame 50 of 200  5.0 frames/s  0:30 left");
-  EXPECT_EQ(Progress::text(50, 0, 10, "frame", "stale"), "frame 50  5.0 frames/s  stale");
-  EXPECT_THAT(Progress::text(1, 5000, 2, "flight", ""), HasSubstr("flight 1 of 5000  0.5 flights/s  2:46:38 left"));
-  EXPECT_THAT(Progress::text(300, 200, 1, "frame", ""),
-              testing::AllOf(testing::StartsWith("[############################] "), testing::Not(HasSubstr("left"))));
-}
-
-TEST(Progress, PrintsNothingWhereThereIsNoTerminal)
-{
-  std::FILE *file = std::tmpfile();
-  {
-    Progress progress(20, file);
-    for (std::size_t i = 1; i <= 20; ++i)
-      progress.update(i, "ok");
-  }
-  EXPECT_EQ(std::ftell(file), 0);
-  std::fclose(file);
 }
 } // namespace

@@ -90,7 +90,7 @@ TEST(Config, EveryPresetIsReadAndChangesWhatItNames)
     names.push_back(entry.path().stem().string());
     EXPECT_EQ(toYaml(options) == defaults, names.back() == "default") << names.back();
   }
-  EXPECT_THAT(names, testing::UnorderedElementsAre("default", "paper", "ardrone1", "ardrone2", "tabletop"));
+  EXPECT_THAT(names, testing::UnorderedElementsAre("default", "ardrone1", "ardrone2", "tabletop"));
   EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone1.yaml").model.pinhole.width, 320);
   EXPECT_EQ(readCamera(BOLE_SOURCE_DIR "/config/cameras/ardrone2.yaml").model.pinhole.width, 640);
 }
@@ -101,8 +101,6 @@ TEST(Config, ReadingWhatWasWrittenChangesNothing)
   for (OptionEntry &entry : optionTable(options)) // another value in each than its default
     if (auto *const *flag = std::get_if<bool *>(&entry.value))
       **flag = !**flag;
-    else if (auto *const *policy = std::get_if<MapPolicy *>(&entry.value))
-      **policy = MapPolicy::paper;
     else
       EXPECT_TRUE(entry.assign(std::get_if<int *>(&entry.value) ? "31" : fmt::format("{}", entry.high.value)))
           << entry.key;

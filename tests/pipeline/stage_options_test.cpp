@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/option_table.h"
 #include "pipeline/stage_options.h"
-#include <bole/config.h>
 
 #include <gmock/gmock.h>
 
@@ -26,12 +25,9 @@ std::vector<double> valuesOf(const SaliencyOptions &o)
           o.sigma_foreground_px,
           double(o.label_window_px),
           o.background_prior,
-          double(o.foreground_mean_zero),
-          double(o.linear_flow),
           double(o.iterations),
           double(o.levels),
           double(o.finest_level),
-          double(o.use_rotation_prior),
           o.sigma_rotation_pull,
           o.sample_correlation,
           double(o.use_translation),
@@ -52,21 +48,6 @@ TEST(StageOptions, OfTheDefaultsAreTheStagesDefaultsForACameraOf200Px)
   EXPECT_EQ(valuesOf(made.saliency), valuesOf(defaults.saliency));
 }
 
-TEST(StageOptions, ThePaperPresetHasTheSaliencyAsPrinted)
-{
-  Options options;
-  readConfig(BOLE_SOURCE_DIR "/config/paper.yaml", options);
-  const StageOptions paper = stageOptions(options, cameraWith(200));
-  EXPECT_EQ(valuesOf(paper.saliency), valuesOf(SaliencyOptions::paper()));
-  EXPECT_NE(valuesOf(paper.saliency), valuesOf(SaliencyOptions()));
-  EXPECT_EQ(paper.tracking.energy.form, EnergyForm::paper);
-  EXPECT_EQ(paper.tracking.energy.paper_alpha, 1000);
-  EXPECT_TRUE(paper.gradient.split);
-  EXPECT_FALSE(paper.lines.either_polarity);
-  EXPECT_FALSE(paper.flow.use_points);
-  EXPECT_EQ(paper.smoothing.prior_lean_sigma, 1e-4);
-}
-
 /// What `bole options` allows, the stages take: at both ends of every range, for every camera.
 TEST(StageOptions, TakeEveryValueThatARangeAllows)
 {
@@ -78,8 +59,6 @@ TEST(StageOptions, TakeEveryValueThatARangeAllows)
         OptionEntry entry = optionTable(options)[i];
         if (std::holds_alternative<bool *>(entry.value))
           **std::get_if<bool *>(&entry.value) ^= true;
-        else if (auto *const *policy = std::get_if<MapPolicy *>(&entry.value))
-          **policy = MapPolicy::paper;
         else
           ASSERT_TRUE(entry.assign(fmt::format("{}", is_high ? entry.high.value : entry.low.value)));
         const StageOptions made = stageOptions(options, cameraWith(f));

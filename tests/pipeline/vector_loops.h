@@ -119,8 +119,6 @@ private:
                             {0.4f, 20.3f, 1.f},
                             {1.01f, 0.003f, 1e-4f},
                             {0.01f, -0.02f, 0.005f},
-                            is_paper,
-                            is_paper,
                             {0.3f, 4.f, 4e-4f, 0.8f}};
       const RotationSums sums = sumsOfRow(row, 0.01f, scratch, ratio.data());
       keep(sums.H);

@@ -111,7 +111,6 @@ TEST(Saliency, LabelsANearPostByItsRangeWhereTheTranslationIsGiven)
 TEST(Saliency, NeverLeavesZeroToOneOnExtremeImages)
 {
   SaliencyEstimator estimator(kCamera);
-  SaliencyEstimator paper(kCamera, SaliencyOptions::paper());
   std::mt19937 random(3);
   const auto noise = [&](int, int) { return random() % 2 ? 1.0 : 0.0; };
   const auto black = [](int, int) { return 0.0; };
@@ -122,7 +121,6 @@ TEST(Saliency, NeverLeavesZeroToOneOnExtremeImages)
        std::vector<std::function<double(int, int)>>{black, white, noise, noise, checks, inverted, black}) {
     const auto image = paint(kCamera, value);
     expectSound(estimator.update(image, turned(expSo3({0, 0.05, 0})), moved({0.1, 0, 0.2})));
-    expectSound(paper.update(image, turned(expSo3({0, 0.05, 0}))));
   }
 }
 

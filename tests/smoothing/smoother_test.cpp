@@ -34,48 +34,6 @@ TEST(Smoother, OptimizeReachesTheCostOfADenseBatchSolve)
   }
 }
 
-/// A well about \p centre, as wide as the blur of a border: bent down, and flat farther out.
-ImageEnergy well(const RelativeTrunk &centre, double depth, double width)
-{
-  return [=](const RelativeTrunk &x) {
-    const Vector4d d = x.minus(centre) / width;
-    SummaryFactor there;
-    there.optimum = x;
-    there.energy = -depth * std::exp(-0.5 * d.squaredNorm());
-    there.f = -there.energy / width * d;
-    there.F = -there.energy / (width * width) * Matrix4d::Identity();
-    return there;
-  };
-}
-
-TEST(Smoother, AnImageIsOptimisedItselfAndTheCostNeverRises)
-{
-  constexpr double kWidth = 0.02, kDepth = 500;
-  int arrived = 0;
-  for (int k = 1; k <= 8; ++k) { // widths of the well from its bottom
-    Smoother smoother;
-    smoother.addFirstPose(Pose(), 1e-6 * Matrix6d::Identity());
-    smoother.addPose(Pose(Eigen::Matrix3d::Identity(), {0.1, 0, 0}), 1e-4 * Matrix6d::Identity());
-    Trunk guess;
-    guess.xy = {4, 0.3};
-    guess.log_radius = std::log(0.15);
-    const std::size_t trunk = smoother.addTrunk(guess);
-    const RelativeTrunk bottom = smoother.predictedRelative(trunk).plus({0, 0, kWidth * k, 0});
-    smoother.addImage(1, trunk, well(bottom, kDepth, kWidth));
-    const double before = smoother.cost();
-    const UpdateResult result = smoother.optimize(1e-10);
-    EXPECT_LE(smoother.cost(), before) << k;
-    EXPECT_NEAR(result.cost, smoother.cost(), 1e-6 * kDepth) << k;
-    EXPECT_EQ(result.status, UpdateStatus::ok) << k;
-    EXPECT_LE(result.iterations, 15) << k; // 3 to 11; what rises is damped, and the damping taken off again
-    arrived += smoother.predictedRelative(trunk).minus(bottom).norm() < 0.1 * kWidth;
-    EXPECT_EQ(smoother.observationCount(), 0u);
-    smoother.removeObservation(1, trunk);
-    EXPECT_GE(smoother.cost(), 0) << "without the well there is nothing below zero";
-  }
-  EXPECT_GE(arrived, 3) << "a flank leads down, also where it bends the wrong way";
-}
-
 TEST(Smoother, AStepBeyondItsLinearisationIsTakenInPart)
 {
   constexpr double kThicker = 2, kMost = 0.7; // of log r: what the view asks for, what one step may change

@@ -4,10 +4,10 @@
 /// Images of cylinders drawn flat before sky and ground, borders smooth over a pixel, with sensor noise: what a
 /// tracker sees when nothing but its model is there.
 
-#include "geometry/cylinder.h"
-#include "geometry/so3.h"
 #include <bole/camera.h>
+#include <bole/cylinder.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -22,7 +22,8 @@ inline Pose cameraAt(const Eigen::Vector3d &w_position, double yaw = 0, double p
 {
   Eigen::Matrix3d bRc;
   bRc << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return Pose(expSo3({0, 0, yaw}) * expSo3({0, -pitch, 0}) * bRc, w_position).inverse();
+  const Eigen::AngleAxisd turn(yaw, Eigen::Vector3d::UnitZ()), tip(-pitch, Eigen::Vector3d::UnitY());
+  return Pose((turn * tip).toRotationMatrix() * bRc, w_position).inverse();
 }
 
 inline Cylinder uprightTrunk(double x, double y, double radius, double height = 4)
@@ -85,5 +86,8 @@ inline vpImage<vpRGBa> inColour(const vpImage<unsigned char> &grey)
 
 /// Distance of the camera centres [m] and of the attitudes [rad].
 inline double metresApart(const Pose &a, const Pose &b) { return (a.inverse().t - b.inverse().t).norm(); }
-inline double radiansApart(const Pose &a, const Pose &b) { return logSo3(a.R.transpose() * b.R).norm(); }
+inline double radiansApart(const Pose &a, const Pose &b)
+{
+  return Eigen::Quaterniond(a.R).angularDistance(Eigen::Quaterniond(b.R));
+}
 } // namespace bole::test

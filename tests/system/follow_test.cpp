@@ -3,8 +3,8 @@
 #include "run_bole.h"
 
 #include "input/asl_source.h"
-#include "input/truth.h"
 #include "mbt/cao_reader.h"
+#include <bole/open_source.h>
 
 #include <gmock/gmock.h>
 

@@ -248,13 +248,13 @@ TEST(Command, AloneListsTheCommands)
 TEST(Command, SuggestsTheNearestOfWhatItDoesNotKnow)
 {
   const Outcome command = run("trakc x -o y"), option = run("track x -o y --no-vidoe"),
-                preset = run("track x -o y --config papre");
+                preset = run("track x -o y --config tabeltop");
   EXPECT_EQ(command.status, 2);
   EXPECT_THAT(command.text, HasSubstr("trakc: no such command, did you mean track?"));
   EXPECT_EQ(option.status, 2);
   EXPECT_THAT(option.text, HasSubstr("--no-vidoe: no such option, did you mean --no-video?"));
   EXPECT_EQ(preset.status, 1);
-  EXPECT_THAT(preset.text, HasSubstr("did you mean paper?"));
+  EXPECT_THAT(preset.text, HasSubstr("did you mean tabletop?"));
 }
 
 /// What ViSP's trackers and robots and the decoders of other programs bring takes longer to load than a frame to map.
@@ -272,8 +272,8 @@ TEST(Command, FindsItsPresetsFromAnyFolder)
 {
   const std::string folder = freshFolder("preset");
   const Outcome outcome =
-      run("track " + kFlight + " -o " + folder + " --frames 3 --no-video --config paper", "cd / && ");
-  EXPECT_EQ(outcome.status, 3) << outcome.text; // three frames give the paper no tree
-  EXPECT_EQ(jsonOf(folder + "/summary.json").at("preset"), "paper");
+      run("track " + kFlight + " -o " + folder + " --frames 3 --no-video --config tabletop", "cd / && ");
+  EXPECT_EQ(outcome.status, 3) << outcome.text; // three frames give no trunk
+  EXPECT_EQ(jsonOf(folder + "/summary.json").at("preset"), "tabletop");
 }
 } // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/basin.h"
-#include "geometry/so3.h"
+#include "baseline/basin.h"
+#include "support/units.h"
 
 #include <algorithm>
 #include <cmath>

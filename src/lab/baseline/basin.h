@@ -9,7 +9,7 @@
 /// their own sensor noise. A tracker starts at the true pose of the first, tracks it once (moving edges
 /// learn their contrast there) and is then given the second: success is no complaint and a pose that is right.
 
-#include "lab/baseline/comparison.h"
+#include "baseline/comparison.h"
 
 namespace bole
 {

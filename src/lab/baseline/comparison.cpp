@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/comparison.h"
+#include "baseline/comparison.h"
 
-#include "geometry/median.h"
-#include "geometry/so3.h"
+#include "support/statistics.h"
+#include "support/units.h"
 
 #include <algorithm>
 #include <cmath>

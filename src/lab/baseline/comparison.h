@@ -9,7 +9,7 @@
 ///
 /// Cost: that of the trackers; sweep() runs one over the flight some twenty times.
 
-#include "lab/baseline/contender.h"
+#include "baseline/contender.h"
 
 #include <functional>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/comparison_report.h"
-#include "output/figure.h"
+#include "baseline/comparison_report.h"
+#include "support/text.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

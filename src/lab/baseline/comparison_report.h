@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// A comparison as text for the terminal, as JSON for programs, as one HTML page with its plots, and as a video in
+/// A comparison as text for the terminal, as JSON for programs (apps/campaign/figures.py draws it), and as a video in
 /// which each tracker shows where it believes the model to be.
 
-#include "lab/baseline/basin.h"
-#include "lab/baseline/faults.h"
+#include "baseline/basin.h"
+#include "baseline/faults.h"
 
 #include <string>
 #include <vector>
@@ -26,10 +26,6 @@ struct ComparisonReport
 
 std::string toTable(const ComparisonReport &report);
 std::string toJson(const ComparisonReport &report);
-/// Position error by frame of all trackers: the plot of the page alone.
-std::string toSvg(const ComparisonReport &report);
-/// Self-contained; position error by frame, basins and faults as inline SVG and tables.
-std::string toHtml(const ComparisonReport &report);
 
 /// Writes a video of two columns to \p path (mp4): a picture for each of \p scores that had a prior, with the model
 /// \p cao_path drawn where its pose puts it and its error below: green where it is right, orange where it complained,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/comparison_report.h"
+#include "baseline/comparison_report.h"
 
-#include "output/video_writer.h"
+#include "support/video.h"
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -55,14 +55,13 @@ void writeComparisonVideo(const std::string &path, const TestFlight &flight, con
   const int height = kWidth * flight.camera.height / flight.camera.width + kBar;
   vpImage<vpRGBa> picture(unsigned(height * int((shown.size() + 1) / 2)), 2 * kWidth);
   cv::Mat canvas(int(picture.getHeight()), int(picture.getWidth()), CV_8UC4, picture.bitmap);
-  VideoWriter video(path);
+  Video video(path, 10); // whatever the flight's rate
   for (std::size_t k = 1; k < flight.frames.size(); ++k) {
     canvas.setTo(cv::Scalar(20, 20, 20, 255));
     for (std::size_t i = 0; i < shown.size(); ++i)
       drawTracker(canvas(cv::Rect(int(i % 2) * kWidth, int(i / 2) * height, kWidth, height)), flight, k, *shown[i],
                   model);
-    constexpr std::int64_t kStep_ns = 100'000'000; // shown at 10 frames a second, whatever the flight's rate
-    video.write(picture, std::int64_t(k) * kStep_ns);
+    video.write(picture);
   }
   video.finish();
 }

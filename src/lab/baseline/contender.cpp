@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/contender.h"
-#include "geometry/names.h"
-#include "geometry/visp_matrix.h"
+#include "baseline/contender.h"
+#include "support/text.h"
 #include <bole/vpMbTrunkTracker.h>
 
 #include <ctime>
@@ -12,6 +11,15 @@ namespace bole
 {
 namespace
 {
+Matrix6d toEigen(const vpMatrix &m) { return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.data); }
+
+vpMatrix toVisp(const Matrix6d &e)
+{
+  vpMatrix m(6, 6);
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.data) = e;
+  return m;
+}
+
 /// Time that this thread has computed: what other programs take from the processor does not count.
 double threadTime_ms()
 {

@@ -3,8 +3,8 @@
 /// \file
 /// One tracker in a comparison: which class, with which settings, with how much help.
 
-#include "lab/baseline/model_tracker.h"
-#include "lab/baseline/test_flight.h"
+#include "baseline/model_tracker.h"
+#include "baseline/test_flight.h"
 
 #include <bole/vpMbTrunkTracker.h>
 

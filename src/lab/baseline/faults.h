@@ -7,8 +7,8 @@
 /// failure is silent when the pose is wrong and nothing is said, during the fault or after it. Recovered is the first
 /// frame after the fault that is right without complaint and stays so for two more; nobody helps beyond what Help says.
 
-#include "lab/baseline/comparison.h"
-#include "lab/faults/image_fault.h"
+#include "baseline/comparison.h"
+#include "faults/fault.h"
 
 namespace bole
 {

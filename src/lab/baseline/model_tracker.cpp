@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/model_tracker.h"
+#include "baseline/model_tracker.h"
 
-#include "geometry/names.h"
+#include "support/text.h"
 #include <bole/vpMbTrunkTracker.h>
 
 #include <fmt/format.h>

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/baseline/test_flight.h"
+#include "baseline/test_flight.h"
 
-#include "geometry/failure.h"
-#include "geometry/so3.h"
-#include "geometry/yaw.h"
-#include "input/asl_source.h"
-#include "input/truth.h"
+#include "support/text.h"
+#include "support/units.h"
 #include <bole/open_source.h>
+#include <bole/pose.h>
 
 #include <Eigen/Dense>
 
@@ -89,18 +87,18 @@ Matrix6d TestFlight::predictedCovariance(const Pose &predicted, const Pose &cMo_
 
 TestFlight readAslFlight(const std::string &folder)
 {
-  AslSource source(folder);
+  const auto source = openSource(folder);
   TestFlight flight;
-  flight.name = source.name();
-  flight.camera = source.camera();
+  flight.name = source->name();
+  flight.camera = source->camera();
   flight.trunks = readTrees(folder);
-  const Pose bMc = source.bMc();
+  const Pose bMc = source->bMc();
   // the pose filter of the rendered flights: drifts by 1.2 cm a frame in the plane and slowly in yaw; its height
   // (1.9 cm) and attitude (0.23 degrees) are noisy but do not drift
   flight.step_sigma << 0.013, 0.013, 0.03, 0.006, 0.006, 0.002;
   flight.absolute_sigma << 1e3, 1e3, 0.02, 0.004, 0.004, 1e3;
   Frame frame;
-  while (source.next(frame)) {
+  while (source->next(frame)) {
     if (!frame.wMb_truth)
       throw badValue("{}: frame {} has no true pose", folder, frame.index);
     if (frame.status != FrameStatus::ok)

@@ -4,8 +4,8 @@
 /// A flight with everything that a fair comparison of trackers needs: images, the true pose of each, what odometry
 /// said of the motion between them, and the true model.
 
-#include "geometry/cylinder.h"
 #include <bole/camera.h>
+#include <bole/cylinder.h>
 
 #include <optional>
 #include <string>

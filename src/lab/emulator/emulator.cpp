@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/emulator/emulator.h"
+#include "emulator/emulator.h"
 
-#include "geometry/require_range.h"
+#include "support/text.h"
 
-#include "lab/emulator/emulator_packets.h"
-#include "lab/emulator/emulator_wire.h"
+#include "emulator/emulator_packets.h"
+#include "emulator/emulator_wire.h"
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
+#include <fmt/format.h>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -19,10 +21,17 @@ namespace
 {
 constexpr std::size_t kMostCommands = 100'000;
 constexpr std::int64_t kSecond_ns = 1'000'000'000, kWatchdog_ns = 2 * kSecond_ns;
-constexpr Milliseconds kTick{2};
+constexpr std::chrono::milliseconds kTick{2};
 constexpr std::uint32_t kEmergencyBit = 1u << 8, kTakeOffBit = 1u << 9;
 
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(s * 1e9); }
+
+/// [ns] of the steady clock.
+std::int64_t steadyNowNs()
+{
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
 
 bool within(std::int64_t now_ns, double from_s, double for_s)
 {
@@ -305,15 +314,11 @@ bool ArDroneEmulator::wait(double timeout_s)
   return m_state->ended.wait_for(lock, std::chrono::duration<double>(timeout_s), [this] { return m_state->finished; });
 }
 
-ArDroneAddress ArDroneEmulator::address() const
+std::string ArDroneEmulator::address() const
 {
-  ArDroneAddress address;
-  address.host = m_state->options.host;
-  address.navdata_port = m_state->wire.navdataPort();
-  address.at_port = m_state->wire.atPort();
-  address.video_port = m_state->wire.videoPort();
-  address.generation = m_state->generation;
-  return address;
+  const DroneWire &wire = m_state->wire;
+  return fmt::format("ardrone://{}?navdata={}&video={}&at={}&generation={}", m_state->options.host, wire.navdataPort(),
+                     wire.videoPort(), wire.atPort(), m_state->generation);
 }
 
 ArDroneEmulator::Counters ArDroneEmulator::counters() const

@@ -3,9 +3,7 @@
 /// \file
 /// A drone made of sockets: serves video, navdata and the command port as an AR.Drone does, faults included.
 
-#include "ardrone/address.h"
-#include "ardrone/at_command.h"
-#include "ardrone/navdata.h"
+#include <bole/ardrone_wire.h>
 #include <bole/frame.h>
 
 #include <cstdint>
@@ -106,8 +104,8 @@ public:
   /// Waits for the end of the flight at most \p timeout_s; true at the end.
   bool wait(double timeout_s);
 
-  /// With the ports that were found.
-  ArDroneAddress address() const;
+  /// With the ports that were found: `ardrone://HOST?navdata=...`.
+  std::string address() const;
   Counters counters() const;
   /// The commands received, oldest first (the first 100,000), and how many by name.
   std::vector<AtCommand> commands() const;

@@ -3,16 +3,20 @@
 /// \file
 /// What an emulated drone says: pictures and navdata as bytes, numbered and stamped by its clocks.
 
-#include "ardrone/navdata.h"
-#include "lab/emulator/emulator.h"
-#include "lab/emulator/h264_encoder.h"
+#include "emulator/emulator.h"
+#include "support/h264.h"
+#include <bole/ardrone_wire.h>
 
 #include <bole/visp.h>
-#include <memory>
+#include <optional>
 #include <vector>
 
 namespace bole
 {
+/// \p packet behind its header, \p header, of which number, time, place in the stream and size on display are given.
+std::vector<std::uint8_t> paveFrame(const VideoPacketEncoder &encoder, const VideoPacketEncoder::Packet &packet,
+                                    PaveHeader header);
+
 /// Makes the packets of one drone. Times are of the flight [ns]. Not thread-safe.
 class DronePackets
 {
@@ -44,7 +48,7 @@ private:
   const int m_generation;
   const double m_frame_rate_hz;
   const ArDroneEmulator::Options m_options;
-  std::unique_ptr<H264Encoder> m_encoder;
+  std::optional<VideoPacketEncoder> m_encoder;
   bool m_force_key = true, m_configured = false, m_wants_full = false;
   std::int64_t m_boot_ns = 0, m_last_demo_ns;
   std::int64_t m_clock_ms = 100'000, m_navdata_clock_us = 50'000'000;

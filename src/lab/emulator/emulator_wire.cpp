@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/emulator/emulator_wire.h"
+#include "emulator/emulator_wire.h"
 
 #include <algorithm>
 #include <array>
@@ -17,8 +17,8 @@ DroneWire::DroneWire(const std::string &host, int generation, std::uint16_t navd
     : m_host(host),
       m_generation(generation),
       m_video_port(video_port),
-      m_navdata(Socket::bindUdp(host, navdata_port)),
-      m_at(Socket::bindUdp(host, at_port))
+      m_navdata(ServerSocket::bindUdp(host, navdata_port)),
+      m_at(ServerSocket::bindUdp(host, at_port))
 {
   comeUp();
 }
@@ -27,7 +27,8 @@ void DroneWire::comeUp()
 {
   if (m_video.valid())
     return;
-  m_video = m_generation == 2 ? Socket::listenTcp(m_host, m_video_port) : Socket::bindUdp(m_host, m_video_port);
+  m_video =
+      m_generation == 2 ? ServerSocket::listenTcp(m_host, m_video_port) : ServerSocket::bindUdp(m_host, m_video_port);
   if (m_video_port == 0) // chosen once: other threads ask for it, and it stays over a reboot
     m_video_port = m_video.localPort();
 }
@@ -48,8 +49,8 @@ DroneWire::Received DroneWire::receive(std::int64_t now_ns, bool is_down)
   std::array<std::uint8_t, 2048> buffer{};
   std::size_t size = 0;
   sockaddr_in sender = {};
-  const auto came = [&](const Socket &socket) {
-    return socket.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data;
+  const auto came = [&](const ServerSocket &socket) {
+    return socket.receiveFrom(buffer.data(), buffer.size(), size, sender);
   };
   while (came(m_navdata)) {
     if (is_down)
@@ -74,9 +75,7 @@ DroneWire::Received DroneWire::receive(std::int64_t now_ns, bool is_down)
 void DroneWire::acceptVideo(std::int64_t now_ns)
 {
   if (m_generation == 2) {
-    if (!m_video.waitReadable(Milliseconds(0)))
-      return;
-    if (Socket client = m_video.accept(); client.valid()) {
+    if (ServerSocket client = m_video.accept(); client.valid()) {
       m_video_client = std::move(client);
       m_pending.clear();
       m_video_since_ns = now_ns;
@@ -86,7 +85,7 @@ void DroneWire::acceptVideo(std::int64_t now_ns)
   std::array<std::uint8_t, 64> buffer{};
   std::size_t size = 0;
   sockaddr_in sender = {};
-  while (m_video.receiveFrom(buffer.data(), buffer.size(), size, sender, Milliseconds(0)) == Socket::Read::data) {
+  while (m_video.receiveFrom(buffer.data(), buffer.size(), size, sender)) {
     if (!m_video_peer)
       m_video_since_ns = now_ns;
     m_video_peer = sender;

@@ -3,7 +3,7 @@
 /// \file
 /// The sockets of an emulated drone and who listens on them.
 
-#include "ardrone/socket.h"
+#include "emulator/server_socket.h"
 
 #include <map>
 #include <optional>
@@ -64,7 +64,7 @@ private:
   std::string m_host;
   int m_generation;
   std::uint16_t m_video_port;
-  Socket m_navdata, m_at, m_video, m_video_client;
+  ServerSocket m_navdata, m_at, m_video, m_video_client;
   std::optional<sockaddr_in> m_navdata_client, m_video_peer;
   std::int64_t m_navdata_seen_ns = 0, m_video_seen_ns = 0, m_video_since_ns = 0;
   std::int64_t m_last_video_due_ns = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/recording.h"
-#include "lab/emulator/emulator.h"
+#include "emulator/emulator.h"
+#include <bole/ardrone_wire.h>
 
 #include <algorithm>
 #include <utility>

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/navdata_odometry.h"
-#include "geometry/failure.h"
-#include "geometry/require_range.h"
+#include "support/text.h"
+#include <bole/ardrone_wire.h>
 
-#include "geometry/constants.h"
-#include "geometry/so3.h"
-#include "lab/emulator/emulator.h"
+#include "emulator/emulator.h"
+#include "support/units.h"
+#include <bole/pose.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,16 @@ namespace bole
 namespace
 {
 constexpr float kGravity_mg = 1000;
+
+/// A vector in the drone's axes (y right, z down).
+Eigen::Vector3d flipped(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
+
+/// Roll, pitch, yaw [rad] as the drone counts them: wRb = Rz(-yaw) Ry(-pitch) Rx(roll).
+Eigen::Vector3d droneAngles(const Eigen::Matrix3d &wRb)
+{
+  return {std::atan2(wRb(2, 1), wRb(2, 2)), std::asin(std::clamp(wRb(2, 0), -1.0, 1.0)),
+          -std::atan2(wRb(1, 0), wRb(0, 0))};
+}
 
 struct StoredFrame
 {
@@ -119,15 +128,15 @@ private:
     if (!a.wMb || !b.wMb)
       return navdata;
     const double step_s = b.time_s - a.time_s, share = (time_s - a.time_s) / step_s;
-    const Eigen::Vector3d turn = logSo3(orthonormalized(a.wMb->R.transpose() * b.wMb->R));
+    const Eigen::Vector3d turn = b.wMb->minus(*a.wMb).tail<3>();
     const Eigen::Matrix3d wRb = a.wMb->R * expSo3(share * turn);
     const Eigen::Vector3d velocity = direction / step_s * (wRb.transpose() * (b.wMb->t - a.wMb->t));
     const Eigen::Vector3d rate = direction * rateAt(time_s, turn / step_s);
     const double height = a.wMb->t.z() + share * (b.wMb->t.z() - a.wMb->t.z());
-    navdata.demo->phi_theta_psi_mdeg = (attitudeToDrone(wRb) / kDegree * 1000).cast<float>();
-    navdata.demo->velocity_mm_s = (flipDroneAxes(velocity) * 1000).cast<float>();
+    navdata.demo->phi_theta_psi_mdeg = (droneAngles(wRb) / kDegree * 1000).cast<float>();
+    navdata.demo->velocity_mm_s = (flipped(velocity) * 1000).cast<float>();
     navdata.demo->altitude_mm = static_cast<std::int32_t>(std::lround(std::max(0.0, height) * 1000));
-    navdata.physical->rate_deg_s = (flipDroneAxes(rate) / kDegree).cast<float>();
+    navdata.physical->rate_deg_s = (flipped(rate) / kDegree).cast<float>();
     return navdata;
   }
 

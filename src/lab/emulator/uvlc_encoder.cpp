@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The encoder is written from the published facts alone, by the definitions (direct cosine sums, a
 // walk along the diagonals), so that it can disagree with the decoder.
-#include "ardrone/uvlc.h"
-#include "geometry/failure.h"
+#include "emulator/uvlc_encoder.h"
+
+#include "support/text.h"
 
 #include <algorithm>
 #include <array>
@@ -152,8 +153,7 @@ Size sizeCode(unsigned width, unsigned height)
     if (width == 88u << (resolution - 1) && height == 72u << (resolution - 1))
       return {1, resolution};
   }
-  throw dimensionError("image size = {}x{}, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width,
-                       height);
+  throw badValue("image size = {}x{}, must be 160x120 or 88x72 times a power of two for an AR.Drone 1", width, height);
 }
 
 Block pixelsAt(const vpImage<unsigned char> &image, int left, int top)

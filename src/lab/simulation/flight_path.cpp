@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/flight_path.h"
+#include "simulation/flight_path.h"
 
-#include "geometry/constants.h"
+#include "support/units.h"
 
-#include "geometry/so3.h"
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
+#include <bole/pose.h>
 
 #include <Eigen/Geometry>
 

@@ -3,7 +3,7 @@
 /// \file
 /// Flights whose pose is known at every instant.
 
-#include "lab/simulation/forest.h"
+#include "simulation/forest.h"
 #include <bole/pose.h>
 
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/flight_sensors.h"
+#include "simulation/flight_sensors.h"
 
-#include "geometry/so3.h"
+#include "support/units.h"
 
 #include <algorithm>
 #include <cmath>

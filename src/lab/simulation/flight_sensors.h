@@ -3,7 +3,7 @@
 /// \file
 /// What the drone's own sensors would say: gyro, accelerometer, and the drifting pose filter on board.
 
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
 #include <bole/frame.h>
 
 namespace bole

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/forest.h"
+#include "simulation/forest.h"
 
-#include "geometry/failure.h"
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
+#include "support/text.h"
 
 #include <bole/trunk_record.h>
 

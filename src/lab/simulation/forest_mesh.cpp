@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/forest_mesh.h"
+#include "simulation/forest_mesh.h"
 
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
 
 #include <Eigen/Geometry>
 

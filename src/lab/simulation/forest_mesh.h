@@ -3,7 +3,7 @@
 /// \file
 /// The forest as quadrilaterals for the ray caster.
 
-#include "lab/simulation/forest.h"
+#include "simulation/forest.h"
 
 #include <cstdint>
 #include <vector>

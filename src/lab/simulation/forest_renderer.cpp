@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/forest_renderer.h"
+#include "simulation/forest_renderer.h"
 
-#include "geometry/failure.h"
-#include "geometry/require_range.h"
+#include "support/text.h"
 
-#include "lab/simulation/light_maps.h"
-#include "lab/simulation/noise_texture.h"
-#include "lab/simulation/sensor_image.h"
+#include "simulation/light_maps.h"
+#include "simulation/noise_texture.h"
+#include "simulation/sensor_image.h"
 
 #include <Eigen/Geometry>
 

@@ -8,7 +8,7 @@
 /// costs its primary rays, in coherent packets of 16, and table look-ups. The samples of a pixel are spread over its
 /// area and over the time of exposure: antialiasing and motion blur are one.
 
-#include "lab/simulation/forest.h"
+#include "simulation/forest.h"
 #include <bole/camera.h>
 
 #include <memory>

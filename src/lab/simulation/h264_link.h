@@ -3,12 +3,11 @@
 /// \file
 /// What a drone's video link does to a picture: H.264 at a low bit rate.
 
-#include "input/codec.h"
+#include "support/h264.h"
 
 namespace bole
 {
-/// Encodes each picture as the drone does (baseline profile, no delay, a key frame every 30) and
-/// decodes it again, by libavcodec. Same pictures, same results: one thread.
+/// Encodes each picture as the drone does (a key frame every 30) and decodes it again.
 class H264Link
 {
 public:
@@ -21,10 +20,8 @@ public:
   std::size_t lastBytes() const { return m_bytes; }
 
 private:
-  PictureEncoder m_encoder;
-  PictureDecoder m_decoder = PictureDecoder::h264();
-  double m_rate_hz;
-  std::int64_t m_count = 0;
+  VideoPacketEncoder m_encoder;
+  VideoPacketDecoder m_decoder;
   std::size_t m_bytes = 0;
 };
 } // namespace bole

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/light_maps.h"
+#include "simulation/light_maps.h"
 
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/quadrotor.h"
+#include "simulation/quadrotor.h"
 
-#include "geometry/constants.h"
-#include "geometry/require_range.h"
+#include "support/text.h"
+#include "support/units.h"
 
 #include <Eigen/Geometry>
 

@@ -10,7 +10,7 @@
 ///
 /// Frames: w world (z up), b body (x forward, y left, z up). SI.
 
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
 #include <bole/pose.h>
 
 #include <deque>

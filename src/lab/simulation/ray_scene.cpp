@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/ray_scene.h"
-#include "geometry/failure.h"
+#include "simulation/ray_scene.h"
+#include "support/text.h"
 
 #include <cstring>
 
@@ -11,7 +11,7 @@ RayScene::RayScene(const ForestMesh &mesh)
   // One thread: builds are the same every time and a closed loop keeps to its core.
   m_device = rtcNewDevice("threads=1,set_affinity=0");
   if (!m_device)
-    throw fatalError("Embree could not start on this processor");
+    throw ioError("Embree could not start on this processor");
   m_scene = rtcNewScene(m_device);
   rtcSetSceneBuildQuality(m_scene, RTC_BUILD_QUALITY_MEDIUM);
   attach(mesh.ground, kGround);

@@ -3,8 +3,8 @@
 /// \file
 /// The meshes of a forest in Embree's hands, freed with this object.
 
-#include "lab/simulation/embree.h"
-#include "lab/simulation/forest_mesh.h"
+#include "simulation/embree.h"
+#include "simulation/forest_mesh.h"
 
 namespace bole
 {

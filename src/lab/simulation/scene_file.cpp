@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/failure.h"
-#include "lab/simulation/simulated_flight.h"
+#include "simulation/simulated_flight.h"
+#include "support/text.h"
 
-#include "geometry/require_range.h"
-#include "input/yaml_file.h"
-#include "lab/simulation/words.h"
+#include "simulation/words.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +10,31 @@
 #include <set>
 #include <type_traits>
 #include <visp3/core/vpException.h>
+#include <yaml-cpp/yaml.h>
 
 namespace bole
 {
 namespace
 {
+/// "path:line" of \p mark.
+std::string placeOf(const std::string &path, const YAML::Mark &mark)
+{
+  return fmt::format("{}:{}", path, std::max(mark.line, 0) + 1);
+}
+
+YAML::Node loadYaml(const std::string &path)
+{
+  try {
+    return YAML::LoadFile(path);
+  }
+  catch (const YAML::BadFile &) {
+    throw ioError("{}: no such file", path);
+  }
+  catch (const YAML::Exception &error) {
+    throw ioError("{}: {}", placeOf(path, error.mark), error.msg);
+  }
+}
+
 /// Names every field of a scene to \p visit(section, key, field), a number with its range behind it: for reading,
 /// writing and checking alike.
 template <class Scene, class Visit> void visitFields(Scene &scene, Visit &&visit)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/sensor_image.h"
+#include "simulation/sensor_image.h"
 
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
 
 #include <algorithm>
 #include <cmath>

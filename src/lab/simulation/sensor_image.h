@@ -3,7 +3,7 @@
 /// \file
 /// From light on the sensor to grey levels: automatic exposure, noise, quantisation.
 
-#include "lab/simulation/forest_renderer.h"
+#include "simulation/forest_renderer.h"
 
 #include <vector>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/sequence_writer.h"
-#include "geometry/failure.h"
-#include "input/asl_text.h"
-#include "output/output_folder.h"
+#include "simulation/sequence_writer.h"
+#include "support/text.h"
+#include <bole/open_source.h>
+#include <bole/output_folder.h>
 
 #include <bole/trunk_record.h>
 

@@ -3,7 +3,7 @@
 /// \file
 /// Writes a flight as an ASL folder (the layout of EuRoC), with the truth beside it.
 
-#include "lab/simulation/forest_renderer.h"
+#include "simulation/forest_renderer.h"
 #include <bole/frame.h>
 
 #include <cstdint>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/simulated_flight.h"
+#include "simulation/simulated_flight.h"
 
-#include "geometry/require_range.h"
-#include "lab/simulation/sequence_writer.h"
+#include "simulation/sequence_writer.h"
+#include "support/text.h"
 
 #include <cmath>
 

@@ -3,10 +3,10 @@
 /// \file
 /// A whole recorded flight from a few options: forest, path, camera, sensors; and its file.
 
-#include "lab/simulation/flight_path.h"
-#include "lab/simulation/flight_sensors.h"
-#include "lab/simulation/forest_renderer.h"
-#include "lab/simulation/h264_link.h"
+#include "simulation/flight_path.h"
+#include "simulation/flight_sensors.h"
+#include "simulation/forest_renderer.h"
+#include "simulation/h264_link.h"
 #include <bole/open_source.h>
 
 #include <functional>

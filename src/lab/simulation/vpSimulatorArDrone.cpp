@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/vpSimulatorArDrone.h"
-#include "geometry/body_velocity.h"
-#include "geometry/failure.h"
-#include "geometry/require_range.h"
-#include "geometry/so3.h"
-#include "geometry/yaw.h"
-#include "lab/simulation/h264_link.h"
+#include "simulation/vpSimulatorArDrone.h"
+#include "simulation/h264_link.h"
+#include "support/text.h"
+#include "support/units.h"
+#include <bole/pose.h>
+#include <bole/vpRobotArDrone.h>
 
 #include <Eigen/Geometry>
 

@@ -3,9 +3,9 @@
 /// \file
 /// An AR.Drone in a rendered forest, with ViSP's robot interface.
 
-#include "lab/simulation/flight_sensors.h"
-#include "lab/simulation/forest_renderer.h"
-#include "lab/simulation/quadrotor.h"
+#include "simulation/flight_sensors.h"
+#include "simulation/forest_renderer.h"
+#include "simulation/quadrotor.h"
 #include <bole/flight_laws.h>
 #include <bole/frame.h>
 #include <bole/vpRobotArDrone.h>

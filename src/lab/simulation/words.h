@@ -3,8 +3,8 @@
 /// \file
 /// What scene files and commands call the values of an enumeration.
 
-#include "geometry/names.h"
-#include "lab/simulation/flight_path.h"
+#include "simulation/flight_path.h"
+#include "support/text.h"
 #include <bole/camera.h>
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/feature_filter.h"
+#include "tasks/feature_filter.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,8 +9,8 @@
 /// moves the way, and what was not known when the gap was chosen is kept clear of. When the trunks leave the image on
 /// both sides the map and the points carry the last metre.
 
-#include "lab/tasks/servo_task.h"
-#include "lab/tasks/way_planner.h"
+#include "tasks/servo_task.h"
+#include "tasks/way_planner.h"
 
 #include <optional>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/obstacles.h"
+#include "tasks/obstacles.h"
 
 #include <algorithm>
 #include <cmath>

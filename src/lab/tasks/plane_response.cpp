@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/plane_response.h"
+#include "tasks/plane_response.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 /// \file
 /// Where a drone in a plane is going to be by what it has been sent.
 
-#include "lab/tasks/drone_response.h"
+#include "tasks/drone_response.h"
 #include <bole/pose.h>
 
 namespace bole

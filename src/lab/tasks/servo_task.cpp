@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/servo_task.h"
+#include "tasks/servo_task.h"
 
-#include "geometry/constants.h"
-#include "geometry/names.h"
+#include "support/text.h"
+#include "support/units.h"
 
 #include <Eigen/Geometry>
 

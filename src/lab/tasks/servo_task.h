@@ -12,9 +12,9 @@
 ///
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
-#include "geometry/yaw.h"
-#include "lab/tasks/plane_response.h"
-#include "lab/tasks/surroundings.h"
+#include "support/units.h"
+#include "tasks/plane_response.h"
+#include "tasks/surroundings.h"
 #include <bole/report.h>
 
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/slalom_task.h"
+#include "tasks/slalom_task.h"
 
-#include "geometry/constants.h"
+#include "support/units.h"
 
 #include <Eigen/Geometry>
 

@@ -9,8 +9,8 @@
 /// is not in the map. The line swings on where the drone is held up, since what is no trunk shows itself as such from
 /// another side. The camera looks where the way leads.
 
-#include "lab/tasks/servo_task.h"
-#include "lab/tasks/way_planner.h"
+#include "tasks/servo_task.h"
+#include "tasks/way_planner.h"
 
 namespace bole
 {

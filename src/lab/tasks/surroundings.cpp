@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/surroundings.h"
+#include "tasks/surroundings.h"
 
-#include "geometry/constants.h"
+#include "support/units.h"
 
 #include <algorithm>
 

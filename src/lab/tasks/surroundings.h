@@ -3,7 +3,7 @@
 /// \file
 /// All that a task believes to stand round the drone, and what must not be done near it.
 
-#include "lab/tasks/obstacles.h"
+#include "tasks/obstacles.h"
 
 namespace bole
 {

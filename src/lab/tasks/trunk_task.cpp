@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/trunk_task.h"
+#include "tasks/trunk_task.h"
 
-#include "geometry/constants.h"
-#include "geometry/so3.h"
+#include "support/units.h"
+#include <bole/pose.h>
 
 #include <Eigen/Geometry>
 

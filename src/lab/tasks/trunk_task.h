@@ -24,9 +24,9 @@
 /// Bearing and a ratio that is asked for come from the trunk as tracked in the image of the moment; where it was missed
 /// for a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
 
-#include "lab/tasks/drone_response.h"
-#include "lab/tasks/feature_filter.h"
-#include "lab/tasks/servo_task.h"
+#include "tasks/drone_response.h"
+#include "tasks/feature_filter.h"
+#include "tasks/servo_task.h"
 #include <bole/vpFeatureTrunk.h>
 
 #include <visp3/vs/vpServo.h>

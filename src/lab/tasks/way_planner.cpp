@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/way_planner.h"
+#include "tasks/way_planner.h"
 
 #include <algorithm>
 #include <array>

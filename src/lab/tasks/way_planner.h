@@ -12,7 +12,7 @@
 ///
 /// Coordinates are those of the task: x ahead, y left [m].
 
-#include "lab/tasks/obstacles.h"
+#include "tasks/obstacles.h"
 
 #include <functional>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/trials/closed_loop.h"
+#include "trials/closed_loop.h"
 
-#include "geometry/median.h"
-#include "geometry/require_range.h"
+#include "support/statistics.h"
+#include "support/text.h"
 
 #include <algorithm>
 #include <ctime>

@@ -6,10 +6,10 @@
 /// Idea: the task gets what the perception makes of a frame and nothing else. The truth goes into the record only,
 /// through a judge that is asked after the command has been given.
 
-#include "lab/simulation/vpSimulatorArDrone.h"
-#include "lab/tasks/servo_task.h"
-#include "lab/trials/injected_fault.h"
-#include "lab/trials/perception.h"
+#include "faults/fault.h"
+#include "simulation/vpSimulatorArDrone.h"
+#include "tasks/servo_task.h"
+#include "trials/perception.h"
 
 #include <functional>
 

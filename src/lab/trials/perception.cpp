@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/trials/perception.h"
+#include "trials/perception.h"
 
-#include "geometry/names.h"
-#include "geometry/yaw.h"
-#include "input/frame_health.h"
-#include "mbt/cao_reader.h"
-#include "output/output_folder.h"
+#include "support/text.h"
+#include "support/units.h"
+#include <bole/cylinder.h>
+#include <bole/open_source.h>
+#include <bole/output_folder.h>
 #include <bole/pipeline.h>
 #include <bole/vpMbTrunkTracker.h>
 
@@ -33,7 +33,7 @@ public:
   }
 
 private:
-  FrameHealth m_health;
+  FrameJudge m_health;
   Pipeline m_pipeline;
 };
 
@@ -164,7 +164,7 @@ private:
     return result;
   }
 
-  FrameHealth m_health;
+  FrameJudge m_health;
   TrueSight m_sight;
   Pose m_bMc;
   std::unique_ptr<vpMbTracker> m_tracker;

@@ -4,8 +4,8 @@
 /// What a task is told of a frame: by the pipeline, or by the truth. The same seeds flown by each tell what control,
 /// tracking and mapping cost.
 
-#include "lab/baseline/model_tracker.h"
-#include "lab/simulation/forest.h"
+#include "baseline/model_tracker.h"
+#include "simulation/forest.h"
 #include <bole/options.h>
 #include <bole/report.h>
 

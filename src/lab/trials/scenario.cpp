@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/trials/scenario.h"
+#include "trials/scenario.h"
 
-#include "geometry/constants.h"
-#include "geometry/names.h"
-#include "geometry/require_range.h"
-#include "lab/simulation/random.h"
+#include "simulation/random.h"
+#include "support/text.h"
+#include "support/units.h"
 
 #include <cmath>
 

@@ -3,7 +3,7 @@
 /// \file
 /// Random starts for the servoing tasks: a forest, a place to take off, and what is asked for.
 
-#include "lab/simulation/forest.h"
+#include "simulation/forest.h"
 
 namespace bole
 {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/trials/servo_trial.h"
-#include "lab/tasks/gap_task.h"
-#include "lab/tasks/slalom_task.h"
-#include "lab/tasks/trunk_task.h"
+#include "trials/servo_trial.h"
+#include "tasks/gap_task.h"
+#include "tasks/slalom_task.h"
+#include "tasks/trunk_task.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,10 +3,10 @@
 /// \file
 /// A servoing task from one random start, and what came of it.
 
-#include "lab/trials/closed_loop.h"
-#include "lab/trials/scenario.h"
-#include "pipeline/stage_options.h"
+#include "trials/closed_loop.h"
+#include "trials/scenario.h"
 #include <bole/evaluation.h>
+#include <bole/options.h>
 
 namespace bole
 {

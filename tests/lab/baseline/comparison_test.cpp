@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
 
-#include "lab/baseline/comparison_report.h"
-#include "mbt/cao_reader.h"
+#include "baseline/comparison_report.h"
+#include "support/units.h"
+#include <bole/cylinder.h>
+#include <bole/vpMbTrunkTracker.h>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -243,7 +245,7 @@ TEST_F(Comparison, TheVideoShowsEveryTrackerWithAPriorInTheColourOfItsAnswer)
   EXPECT_EQ(red[1], 0);
 }
 
-TEST_F(Comparison, TheReportTellsTheSameInAllThreeForms)
+TEST_F(Comparison, TheReportTellsTheSameInBothForms)
 {
   ComparisonReport report;
   const TestFlight flight = drawnFlight(4);
@@ -263,11 +265,5 @@ TEST_F(Comparison, TheReportTellsTheSameInAllThreeForms)
   EXPECT_EQ(json["basin"][0]["success"][1], 0.5);
   EXPECT_EQ(json["faults"][0]["recovered"], 1);
   EXPECT_THAT(toTable(report), HasSubstr("vpMbTrunkTracker, prior"));
-  const std::string html = toHtml(report);
-  EXPECT_THAT(html, HasSubstr("a &lt;drawn&gt; flight"));
-  EXPECT_THAT(html, HasSubstr("<td>1 of 2</td><td>"));
-  EXPECT_THAT(html, HasSubstr("<td>100 % (0 %)</td><td>50 % (50 %)</td><td>4"));
-  EXPECT_THAT(html, HasSubstr("<polyline"));
-  EXPECT_THAT(html, HasSubstr(toSvg(report)));
 }
 } // namespace

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The flights of the comparison, and what our tracker must reach on their beginnings.
-#include "lab/baseline/comparison.h"
-#include "mbt/cao_reader.h"
+#include "baseline/comparison.h"
+#include <bole/cylinder.h>
+#include <bole/vpMbTrunkTracker.h>
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/forest_renderer.h"
-#include "lab/simulation/h264_link.h"
-#include "lab/simulation/simulated_flight.h"
+#include "simulation/forest_renderer.h"
+#include "simulation/h264_link.h"
+#include "simulation/simulated_flight.h"
 
-#include "geometry/so3.h"
+#include "support/units.h"
 
 #include <Eigen/Geometry>
 

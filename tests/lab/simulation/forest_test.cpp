@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/forest.h"
-#include "lab/simulation/random.h"
+#include "simulation/forest.h"
+#include "simulation/random.h"
 
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/simulation/quadrotor.h"
+#include "simulation/quadrotor.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

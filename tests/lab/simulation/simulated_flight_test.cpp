@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
-#include "input/truth.h"
-#include "lab/simulation/simulated_flight.h"
-#include "lab/simulation/words.h"
+#include "simulation/simulated_flight.h"
+#include "simulation/words.h"
+#include "support/units.h"
 #include <bole/open_source.h>
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "geometry/so3.h"
-#include "lab/simulation/vpSimulatorArDrone.h"
+#include "simulation/vpSimulatorArDrone.h"
+#include "support/units.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

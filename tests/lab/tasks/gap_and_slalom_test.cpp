@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/gap_task.h"
-#include "lab/tasks/slalom_task.h"
+#include "tasks/gap_task.h"
+#include "tasks/slalom_task.h"
 
 #include <algorithm>
 #include <cmath>

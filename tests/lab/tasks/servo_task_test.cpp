@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/servo_task.h"
+#include "tasks/servo_task.h"
 #include <bole/open_source.h>
 
 #include <Eigen/Geometry>

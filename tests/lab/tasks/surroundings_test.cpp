@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/surroundings.h"
+#include "tasks/surroundings.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -2,8 +2,8 @@
 // The control law on exact features: a camera that moves as it is told, before a trunk.
 #include "support/drawn_trunks.h"
 
-#include "geometry/so3.h"
-#include "lab/tasks/trunk_task.h"
+#include "support/units.h"
+#include "tasks/trunk_task.h"
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/tasks/plane_response.h"
-#include "lab/tasks/way_planner.h"
+#include "tasks/plane_response.h"
+#include "tasks/way_planner.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The margins of the loop that `hold` and `circle` close: the law itself on the simulated drone, with exact features.
-#include "lab/simulation/vpSimulatorArDrone.h"
-#include "lab/tasks/trunk_task.h"
-#include "lab/trials/servo_trial.h"
+#include "simulation/vpSimulatorArDrone.h"
+#include "tasks/trunk_task.h"
+#include "trials/servo_trial.h"
 
 #include <cmath>
 #include <complex>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "lab/trials/perception.h"
-#include "lab/trials/servo_trial.h"
+#include "trials/perception.h"
+#include "trials/servo_trial.h"
 #include <bole/open_source.h>
 #include <bole/vpFeatureTrunk.h>
 
