@@ -22,7 +22,7 @@ constexpr std::size_t kHeader = 64;
 std::vector<Bytes> encodedFlight(std::size_t count)
 {
   test::MadeUpFlight flight(count);
-  VideoPacketEncoder encoder({160, 120, 20, 1.3e6, false, kKeyInterval, "keyint=15:min-keyint=15:scenecut=0"});
+  VideoPacketEncoder encoder({160, 128, 20, 1.3e6, false, kKeyInterval, "keyint=15:min-keyint=15:scenecut=0"});
   std::vector<Bytes> frames;
   for (Frame frame; flight.next(frame);) {
     const auto packet = encoder.encode(frame.image);
@@ -30,6 +30,8 @@ std::vector<Bytes> encodedFlight(std::size_t count)
     PaveHeader header;
     header.frame_number = static_cast<std::uint32_t>(frames.size() + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * frames.size());
+    header.display_width = 160;
+    header.display_height = 120;
     frames.push_back(paveFrame(encoder, packet, header));
   }
   return frames;

@@ -106,26 +106,23 @@ private:
 
     std::vector<float> ratio(kWidth, 0.f);
     const float *image = m_image.data();
-    for (const bool is_paper : {false, true}) {
-      const RotationRow row{{image, image + 1, image + kWidth},
-                            {image + 20 * kWidth, image + 7, image + 90},
-                            20,
-                            kWidth,
-                            kHeight - 2,
-                            50.f,
-                            51.f,
-                            30.f,
-                            -0.06f,
-                            {0.4f, 20.3f, 1.f},
-                            {1.01f, 0.003f, 1e-4f},
-                            {0.01f, -0.02f, 0.005f},
-                            {0.3f, 4.f, 4e-4f, 0.8f}};
-      const RotationSums sums = sumsOfRow(row, 0.01f, scratch, ratio.data());
-      keep(sums.H);
-      keep(sums.g);
-      keep(std::vector<float>{sums.used, sums.textured});
-      keep(ratio);
-    }
+    const RotationRow row{{image, image + 1, image + kWidth},
+                          {image + 20 * kWidth, image + 7, image + 90},
+                          20,
+                          kWidth,
+                          kHeight - 2,
+                          50.f,
+                          51.f,
+                          30.f,
+                          -0.06f,
+                          {0.4f, 20.3f, 1.f},
+                          {1.01f, 0.003f, 1e-4f},
+                          {0.3f, 4.f, 4e-4f, 0.8f}};
+    const RotationSums sums = sumsOfRow(row, 0.01f, scratch, ratio.data());
+    keep(sums.H);
+    keep(sums.g);
+    keep(std::vector<float>{sums.used, sums.textured});
+    keep(ratio);
   }
 
   void front()

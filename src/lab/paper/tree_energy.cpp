@@ -65,7 +65,8 @@ BorderInImage borderInImage(const PinholeCamera &camera, const RelativeTrunk &tr
   double top = 1, bottom = camera.height - 2;
   const double low = kMargin_px, high = camera.width - 1 - kMargin_px;
   if (std::abs(line.slope) > 1e-9) {
-    const auto [first, last] = std::minmax((low - line.x) / line.slope, (high - line.x) / line.slope);
+    const auto [first, last] =
+        std::minmax({(low - line.x) / line.slope, (high - line.x) / line.slope}); // a list: by value
     top = std::max(top, first);
     bottom = std::min(bottom, last);
   }
