@@ -105,8 +105,9 @@ private:
   {
     std::int64_t stamp_ns = 0;
     Pose wMb;
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero(); ///< world [m/s]
-    double scatter = 0;                                 ///< squared change of the horizontal step over what is expected
+    std::optional<Eigen::Vector3d> velocity;     ///< to it, in the world [m/s]; none of the first and of a jump
+    std::optional<Eigen::Vector2d> acceleration; ///< to it, horizontal [m/s^2]
+    double scatter = 0; ///< squared change of the acceleration over what a filter that walks and a flight explain
     double parallax_px = 0;
     bool is_jump = false;
     bool is_held = false; ///< the pose before once more, while the points moved

@@ -41,15 +41,19 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
     step.velocity = (step.wMb.t - before.wMb.t) / dt;
     step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
     is_wrong |= step.is_held || before.is_held; // the step after a pause makes up for it
-    if (m_steps.size() > 1) {
-      const Vector3d change = (step.velocity - before.velocity) * dt;
-      constexpr double kAcceleration = 3; // that flights reach for long [m/s^2]
-      const double expected = 2 * std::pow(m_options.odometry_walk, 2) * dt + std::pow(kAcceleration * dt * dt, 2);
-      step.scatter = 0.5 * change.head<2>().squaredNorm() / expected;
-      const double extent = change.head<2>().norm();
+    if (before.velocity) {
+      const Eigen::Vector2d change = ((*step.velocity - *before.velocity) * dt).head<2>();
+      step.acceleration = change / (dt * dt);
+      if (before.acceleration) {
+        constexpr double kJerk = 20; // that a small drone reaches for long [m/s^3]
+        const double expected = 6 * std::pow(m_options.odometry_walk, 2) * dt + std::pow(kJerk * dt * dt * dt, 2);
+        step.scatter = 0.5 * (change - dt * dt * *before.acceleration).squaredNorm() / expected;
+      }
+      const double extent = change.norm();
       if (extent > m_options.jump + 10 * dt * dt) {
         is_wrong = true;
-        step.velocity = before.velocity;
+        step.velocity.reset(); // neither side of a jump tells it: the next step is not judged, the one after it is
+        step.acceleration.reset();
         step.scatter = 0;
         step.is_jump = true;
         raiseJump(extent, time_s);
@@ -141,51 +145,58 @@ void SensorMonitor::checkDirection()
           fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
 }
 
-/// Gravity of the odometry's roll and pitch against the accelerometer's, accelerations by the odometry's own velocity.
+/// Gravity of the odometry's roll and pitch against the accelerometer's: the mean force between two moments, less the
+/// change of the odometry's own velocity from one to the other.
 void SensorMonitor::checkTilt(const Frame &frame)
 {
-  constexpr double kLeast_s = 1.8, kVelocity_s = 0.3; // of the memory, and that a velocity is taken over
-  if (m_steps.size() < 2 || secondsOf(m_steps.back().stamp_ns - m_steps[1].stamp_ns) < kLeast_s ||
+  constexpr double kLeast_s = 1.8, kVelocity_s = 0.6; // of the memory, and that a velocity is taken over
+  const auto isOdd = [](const Step &step) { return step.is_held || step.is_jump; };
+  if (m_steps.empty() || secondsOf(m_steps.back().stamp_ns - m_steps.front().stamp_ns) < kLeast_s ||
       !frame.wMb_odometry || m_samples.empty() ||
       secondsOf(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
-      secondsOf(m_samples.front().stamp_ns - m_steps[1].stamp_ns) > kMostGap_s ||
-      std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.is_held; }))
+      secondsOf(m_samples.front().stamp_ns - m_steps.front().stamp_ns) > kMostGap_s ||
+      std::any_of(m_steps.begin(), m_steps.end(), isOdd))
     return; // force and velocity would be of different times
+  struct Velocity
+  {
+    std::int64_t at_ns;
+    Vector3d mean;
+  };
+  const auto between = [](const Step &a, const Step &b) {
+    return Velocity{(a.stamp_ns + b.stamp_ns) / 2, (b.wMb.t - a.wMb.t) / secondsOf(b.stamp_ns - a.stamp_ns)};
+  };
+  const auto is_after = [](double time_s) {
+    return [time_s](const Step &step) { return secondsOf(step.stamp_ns) > time_s - 1e-3; };
+  };
+  const Step &first = m_steps.front(), &last = m_steps.back();
+  const auto first_end =
+      std::find_if(m_steps.begin() + 1, m_steps.end(), is_after(secondsOf(first.stamp_ns) + kVelocity_s));
+  const auto last_begin =
+      std::find_if(m_steps.begin(), m_steps.end() - 1, is_after(secondsOf(last.stamp_ns) - kVelocity_s));
+  const Velocity begin = between(first, *first_end), end = between(*last_begin, last);
   Vector3d sum = Vector3d::Zero();
   int count = 0;
   bool varies = false;
-  auto step = m_steps.begin() + 1;
-  const Vector3d *first = nullptr;
+  auto step = m_steps.begin();
+  const Vector3d *first_force = nullptr;
   std::int64_t before_ns = m_samples.front().stamp_ns;
   for (const GyroSample &sample : m_samples) {
     if (secondsOf(sample.stamp_ns - before_ns) > kMostGap_s)
       return;
     before_ns = sample.stamp_ns;
-    while (step != m_steps.end() && step->stamp_ns < sample.stamp_ns)
-      ++step;
-    if (step == m_steps.end())
-      break;
-    if (!sample.force || sample.stamp_ns <= m_steps[1].stamp_ns)
+    while (step + 1 != m_steps.end() && (step->stamp_ns + (step + 1)->stamp_ns) / 2 < sample.stamp_ns)
+      ++step; // the one nearest in time
+    if (!sample.force || sample.stamp_ns <= begin.at_ns || sample.stamp_ns > end.at_ns)
       continue;
-    first = first == nullptr ? &*sample.force : first;
-    varies = varies || *first != *sample.force;
+    first_force = first_force == nullptr ? &*sample.force : first_force;
+    varies = varies || *first_force != *sample.force;
     sum += step->wMb.R * *sample.force;
     ++count;
   }
   if (count < 40 || !varies)
     return;
-  const double dt = secondsOf(m_steps.back().stamp_ns - m_steps[1].stamp_ns);
-  const auto velocity = [this](std::int64_t around_ns) {
-    Vector3d total = Vector3d::Zero();
-    int steps = 0;
-    for (auto one = m_steps.begin() + 1; one != m_steps.end(); ++one)
-      if (std::abs(secondsOf(one->stamp_ns - around_ns)) < kVelocity_s - 0.01) {
-        total += one->velocity;
-        ++steps;
-      }
-    return Vector3d(total / steps);
-  };
-  const Vector3d mean = sum / count - (velocity(m_steps.back().stamp_ns) - velocity(m_steps[1].stamp_ns)) / dt;
+  const double dt = secondsOf(end.at_ns - begin.at_ns);
+  const Vector3d mean = sum / count - (end.mean - begin.mean) / dt;
   const double tilt = std::atan2(mean.head<2>().norm(), mean.z());
   constexpr double kLongest = 0.2; // beyond it the limit does not grow
   const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));
