@@ -33,12 +33,13 @@ constexpr double kSureMatch = 0.75;     // correlation of two images that show t
 constexpr double kSureMargin = 0.05;    // of it over the correlation at the shift that the gyro says
 constexpr double kFlipGain = 0.3;       // correlation that an exchange of sides must add
 constexpr double kFlipLeast = 0.6;      // correlation that it must reach; frames of a flight reach it with each other
-constexpr double kElsewhere = 0.45;     // correlation with the frame before, below which it is another place
-constexpr double kSoon_s = 0.35;        // in which a flight does not leave what it sees
-constexpr double kWhole = 0.75;         // correlation of the half that follows the frame before
-constexpr double kTorn = 0.45;          // and most of the other
-constexpr double kBackGain = 0.1;       // correlation by which an image follows the last good one better
-constexpr double kBackLeast = 0.35;     // and that it must reach
+constexpr double kElsewhere = 0.5;  // of the usual correlation with the frame before, below which it is another place
+constexpr double kNewShare = 0.2;   // of a frame in it
+constexpr double kSoon_s = 0.35;    // in which a flight does not leave what it sees
+constexpr double kWhole = 0.75;     // correlation of the half that follows the frame before
+constexpr double kTorn = 0.45;      // and most of the other
+constexpr double kBackGain = 0.1;   // correlation by which an image follows the last good one better
+constexpr double kBackLeast = 0.35; // and that it must reach
 constexpr double kZooms[] = {1.15, 1.3, 1.5, 1.75, 2};
 constexpr int kLastsMost = 30;   // frames that a fault of the picture is refused before it counts as usual
 constexpr int kJumpsMost = 5;    // frames out of order or torn before they are believed
@@ -135,9 +136,10 @@ struct ImageHealth::State
   double good_repeated = 0;
   std::deque<double> noises, sharpnesses, changes; ///< of accepted images; noise over deviation
   int bad_quality = 0;
-  Suspicion odd;                 ///< how the images have stood to the last accepted one since it
-  int odd_count = 0;             ///< of them
-  int since_torn = kTornSpacing; ///< frames
+  Suspicion odd;                           ///< how the images have stood to the last accepted one since it
+  int odd_count = 0;                       ///< of them
+  int since_torn = kTornSpacing;           ///< frames
+  std::optional<double> usual_correlation; ///< of a frame with the one before: a fast flight leaves much of it
   std::optional<Eigen::Vector3d> gyro = Eigen::Vector3d::Zero(),
                                  odometry = Eigen::Vector3d::Zero();       ///< since `previous`
   std::optional<Eigen::Vector3d> gyro_from_last = Eigen::Vector3d::Zero(); ///< since the last accepted image
@@ -279,10 +281,12 @@ ImageFault ImageHealth::State::judgeOrder(const cv::Mat &picture, const Measured
     return ImageFault::none;
   }
   const GyroAgreement::Interval interval = intervalOf(moved, focal);
-  if (interval.is_seen && moved.correlation < kElsewhere && elapsed_s < kSoon_s) {
+  const double usual = usual_correlation.value_or(moved.correlation);
+  if (interval.is_seen && moved.correlation < kElsewhere * usual && elapsed_s < kSoon_s) {
     agreement.add(interval, false);
     return begin({ImageFault::out_of_order, "out of order: it shows another place than the frame before"});
   }
+  usual_correlation = usual + kNewShare * (moved.correlation - usual);
   const ImageFault fault = named(agreement.add(interval, true));
   if (fault == ImageFault::out_of_order && !movedAsOne(small, interval, focal))
     return ImageFault::none;
