@@ -30,6 +30,23 @@ Recording corrected(Recording recording, const SensorCalibration &calibration)
   return recording;
 }
 
+namespace
+{
+/// A log that begins a hair after the first picture, by its own clock or by the correction of it, begins with it: the
+/// first picture decides what is measured by what.
+Trajectory withFirstPicture(Trajectory odometry, std::int64_t stamp_ns)
+{
+  constexpr std::int64_t kLongest_ns = 150'000'000; // the body goes on as it went: a frame and a half at 10 Hz
+  if (odometry.size() < 2 || odometry.front().stamp_ns <= stamp_ns ||
+      odometry.front().stamp_ns - stamp_ns > kLongest_ns)
+    return odometry;
+  const StampedPose &a = odometry[0], &b = odometry[1];
+  const double part = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
+  odometry.insert(odometry.begin(), {stamp_ns, a.wMb.plus(part * b.wMb.minus(a.wMb))});
+  return odometry;
+}
+} // namespace
+
 FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &options, Recording recording)
     : m_lens(camera.model),
       m_rectifier(camera.model, options.max_width_px),
@@ -48,6 +65,8 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
   frame.status = file.status;
   frame.message = std::move(file.message);
   frame.image = std::move(file.image);
+  if (frame.index == 0)
+    m_recording.odometry = withFirstPicture(std::move(m_recording.odometry), stamp_ns);
   frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns, m_max_gap_ns);
   frame.wMb_truth = interpolate(m_recording.truth, stamp_ns, m_max_gap_ns);
 

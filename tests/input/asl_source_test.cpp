@@ -155,7 +155,7 @@ TEST(AslSource, AFlippedByteInAPngIsCorrupt)
 TEST(AslSource, LeavesOdometryAbsentOutsideItsRangeAndInterpolatesWithin)
 {
   FlightFolder flight(5);
-  flight.write("mav0/odom0/data.csv", "150000000,0.15,0,1,1,0,0,0\n350000000,0.35,0,1,1,0,0,0\n");
+  flight.write("mav0/odom0/data.csv", "160000000,0.16,0,1,1,0,0,0\n350000000,0.35,0,1,1,0,0,0\n");
   AslSource source(flight.path());
   const auto frames = readAll(source);
 
@@ -164,6 +164,18 @@ TEST(AslSource, LeavesOdometryAbsentOutsideItsRangeAndInterpolatesWithin)
   ASSERT_TRUE(frames[2].wMb_odometry);
   EXPECT_NEAR(frames[2].wMb_odometry->t.x(), 0.2, 1e-12);
   EXPECT_FALSE(frames[4].wMb_odometry);
+}
+
+TEST(AslSource, AnOdometryThatBeginsAHairAfterTheFirstPictureBeginsWithIt)
+{
+  FlightFolder flight(5);
+  flight.write("mav0/odom0/data.csv",
+               "30000000,0.03,0,1,1,0,0,0\n130000000,0.13,0,1,1,0,0,0\n400000000,0.4,0,1,1,0,0,0\n");
+  AslSource source(flight.path());
+  for (const Frame &frame : readAll(source)) {
+    ASSERT_TRUE(frame.wMb_odometry) << frame.index;
+    EXPECT_NEAR(frame.wMb_odometry->t.x(), 1e-9 * static_cast<double>(frame.stamp_ns), 1e-9);
+  }
 }
 
 TEST(AslSource, NamesFileAndLineOfAFaultyRow)
