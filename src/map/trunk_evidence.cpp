@@ -30,8 +30,7 @@ constexpr double kLogPlaceSigma = -0.73;
 void TrunkMap::learnRadii()
 {
   constexpr double kOfAWood = 0.5; // standard deviation of the log radius within a wood: 1 sigma is a factor of 1.6
-  constexpr double kOfWoods = 0.7; // of the median of a wood: poles of 5 cm and old trees of 45 cm are within 1.6 sigma
-  double precision = 1 / (kOfWoods * kOfWoods), sum = precision * std::log(m_options.usual_radius);
+  double precision = 1 / (kSigmaOfWoods * kSigmaOfWoods), sum = precision * std::log(m_options.usual_radius);
   for (const MapTrunk &trunk : m_trunks) {
     if (trunk.removed || trunk.status == TrunkStatus::candidate)
       continue;

@@ -27,6 +27,9 @@
 
 namespace bole
 {
+/// Of the logarithm of the median radius of a wood: poles of 5 cm and old trees of 45 cm are within 1.6 sigma.
+constexpr double kSigmaOfWoods = 0.7;
+
 /// Of the axes of two trunks at breast height [m].
 double distanceBetween(const Trunk &a, const Trunk &b);
 

@@ -13,15 +13,22 @@ ScaleEstimate Engine::estimateScale(bool with_radii) const
   ScaleEstimate scale = m_motion->scale();
   if (!with_radii || scale.source != ScaleSource::prior)
     return scale;
-  double information = 1 / (scale.sigma * scale.sigma), sum = information * scale.log_scale;
+  double weights = 0, sum = 0;
   for (const MapTrunk &trunk : m_map.trunks()) {
     if (trunk.removed || trunk.status != TrunkStatus::confirmed)
       continue;
-    const double variance = std::pow(m_options.smoothing.prior_log_radius_sigma, 2) + trunk.covariance(2, 2);
-    sum += (std::log(m_options.smoothing.prior_radius) - trunk.trunk.log_radius) / variance;
-    information += 1 / variance;
+    const double weight = 1 / (std::pow(m_options.smoothing.prior_log_radius_sigma, 2) + trunk.covariance(2, 2));
+    weights += weight;
+    sum += weight * (std::log(m_options.smoothing.prior_radius) - trunk.trunk.log_radius);
   }
-  return {sum / information, 1 / std::sqrt(information), scale.source};
+  if (weights == 0)
+    return scale;
+  const double from_height = 1 / (scale.sigma * scale.sigma);
+  const double from_radii =
+      1 / (kSigmaOfWoods * kSigmaOfWoods + 1 / weights); // which wood it is, no count averages out
+  const double information = from_height + from_radii;
+  return {(from_height * scale.log_scale + from_radii * sum / weights) / information, 1 / std::sqrt(information),
+          scale.source};
 }
 
 /// Measures the scale from time to time and lets the metres follow it. The radii count only at the end: the detector
