@@ -80,7 +80,7 @@ struct Options
     double step = 0.012;         ///< horizontal noise of a step [m]
     double step_vertical = 0.03; ///< vertical noise of a step [m]
     double scale = 0.03;         ///< error in proportion to the path
-    double height = 0.02;        ///< of the height about the truth [m]
+    double height = 0.25;        ///< of the height about the truth [m]
     double tilt = 0.005;         ///< of roll and pitch about the truth [rad]
     double turn = 0.006;         ///< of the rotation of a step, used where there is no gyro [rad]
   } odometry;                    ///< of the pose filter
