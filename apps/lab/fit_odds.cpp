@@ -68,17 +68,17 @@ Rows rowsOf(const std::string &sequence)
   pipeline.finish();
   const Eigen::Matrix3d toTruth = alignment(pipeline.smoothedTrajectory(), poses);
   Rows rows;
-  for (const Decision &judged : pipeline.decisions()) {
-    const Eigen::Vector3d axis = judged.trunk.axisAt(kBreastHeight);
+  for (const Decision &scored : pipeline.decisions()) {
+    const Eigen::Vector3d axis = scored.trunk.axisAt(kBreastHeight);
     const Eigen::Vector2d at = (toTruth * Eigen::Vector3d(axis.x(), axis.y(), 1)).head<2>();
     const auto nearest = std::min_element(truth.begin(), truth.end(), [&](const TruthTrunk &a, const TruthTrunk &b) {
       return (a.xy - at).norm() < (b.xy - at).norm();
     });
-    const double off = (nearest->xy - at).norm(), wrong = std::abs(nearest->radius - judged.trunk.radius());
+    const double off = (nearest->xy - at).norm(), wrong = std::abs(nearest->radius - scored.trunk.radius());
     const bool is_trunk =
         off < kIs && (nearest->radius <= 0 || wrong < std::max(kLeastRadius, kRadius * nearest->radius));
     if (is_trunk || off > kIsNot)
-      rows.push_back({OddsTerms::Map(judged.terms.data()), judged.log_odds, is_trunk});
+      rows.push_back({OddsTerms::Map(scored.terms.data()), scored.log_odds, is_trunk});
   }
   return rows;
 }

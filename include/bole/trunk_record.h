@@ -18,15 +18,15 @@ enum class TrunkStatus
 {
   candidate, ///< seen too little to be relied on
   confirmed, ///< part of the map
-  lost,      ///< given up: see TrunkFate
+  lost,      ///< given up: see RejectReason
   merged     ///< a duplicate, now part of another trunk
 };
 
 /// As trunks.csv writes it.
 const char *toString(TrunkStatus status);
 
-/// Why what was found is no trunk of the map.
-enum class TrunkFate
+/// Why a hypothesis is no trunk of the map.
+enum class RejectReason
 {
   none,      ///< it is one
   undecided, ///< the flight ended before enough was seen of it
@@ -39,7 +39,7 @@ enum class TrunkFate
 };
 
 /// As hypotheses.csv writes it.
-const char *toString(TrunkFate fate);
+const char *toString(RejectReason reason);
 
 /// A trunk in the world frame. Position and radius are those at breast height, where forest inventories measure (and
 /// the ground truth of the rendered flights is given): the axis at kBreastHeight above the ground. For an upright trunk
@@ -51,18 +51,18 @@ struct TrunkRecord
 {
   using Covariance = Eigen::Matrix<double, 5, 5>; ///< of x, y, radius [m], lean x, lean y
 
-  int id = 0;                                     ///< in the map; never given twice
-  Eigen::Vector2d xy = Eigen::Vector2d::Zero();   ///< [m]
-  double radius = 0;                              ///< [m]
-  Eigen::Vector2d lean = Eigen::Vector2d::Zero(); ///< tan of the lean towards x and y
-  double ground_z = 0;                            ///< height of the ground in the world [m]
-  double probability = 0;                         ///< that it is a trunk and not a chance pair of lines, 0 to 1
-  Covariance covariance = Covariance::Identity(); ///< of x, y, radius, lean x, lean y
-  int observations = 0;                           ///< views: frames with a summary factor
-  double first_seen_s = 0;                        ///< [s], from the first frame
-  double last_seen_s = 0;                         ///< [s], from the first frame
-  TrunkStatus status = TrunkStatus::candidate;    ///< in its life cycle
-  TrunkFate fate = TrunkFate::none;               ///< of what is not confirmed
+  int id = 0;                                      ///< in the map; never given twice
+  Eigen::Vector2d xy = Eigen::Vector2d::Zero();    ///< [m]
+  double radius = 0;                               ///< [m]
+  Eigen::Vector2d lean = Eigen::Vector2d::Zero();  ///< tan of the lean towards x and y
+  double ground_z = 0;                             ///< height of the ground in the world [m]
+  double probability = 0;                          ///< that it is a trunk and not a chance pair of lines, 0 to 1
+  Covariance covariance = Covariance::Identity();  ///< of x, y, radius, lean x, lean y
+  int observations = 0;                            ///< views: frames with a summary factor
+  double first_seen_s = 0;                         ///< [s], from the first frame
+  double last_seen_s = 0;                          ///< [s], from the first frame
+  TrunkStatus status = TrunkStatus::candidate;     ///< in its life cycle
+  RejectReason reject_reason = RejectReason::none; ///< of what is not confirmed
 
   Eigen::Matrix2d covarianceXy() const { return covariance.topLeftCorner<2, 2>(); }         ///< [m^2]
   double positionSigma() const { return std::sqrt(std::max(0.0, covarianceXy().trace())); } ///< [m]

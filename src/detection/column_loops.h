@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// The comparison of a column of one level image with another image, over the ranges that are tried.
+/// The loop that compares a column of one rectified column image with another image, over the ranges tried.
 
 #include <array>
 

@@ -27,7 +27,7 @@ struct PlaneView
   Vector2d position, forward, left; ///< of the level camera in the world
 };
 
-/// Places from that of the last view.
+/// The views for the loops; places are relative to that of the last view.
 ViewColumns columnsOf(const std::vector<PlaneView> &views)
 {
   ViewColumns columns;
@@ -120,7 +120,7 @@ private:
   double far, step; // of the inverse depth
 };
 
-/// Adds to \p curve, which is zero.
+/// Adds the agreement of every view with \p peak, by range, to \p curve, which is zero before.
 void sweep(const std::vector<PlaneView> &views, const ProfilePeak &peak, const SweptRanges &ranges,
            const RangeCurve &curve)
 {
@@ -149,8 +149,9 @@ struct SweepResult
 
 /// The ranges at which the window agrees with the pair and with neither neighbour more, best first. \p scores keeps its
 /// memory.
-std::vector<SweepResult> focus(const PairHypothesis &pair, const RangeCurve &left, const RangeCurve &right,
-                               const SweptRanges &ranges, const DetectorOptions &options, std::vector<float> &scores)
+std::vector<SweepResult> bestRanges(const PairHypothesis &pair, const RangeCurve &left, const RangeCurve &right,
+                                    const SweptRanges &ranges, const DetectorOptions &options,
+                                    std::vector<float> &scores)
 {
   constexpr std::size_t kMost = 2;
   const std::size_t first = ranges.firstWithin(pair.s, options.radius_max);
@@ -238,8 +239,8 @@ bool hasParallax(const std::vector<PlaneView> &views, const Vector2d &xy, double
 
 bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_right && b.q_left > a.q_right; }
 
-/// Small residuals tell a trunk from chance; of two readings of the same place the wider is the silhouette, the
-/// narrower a shadow's edge on the bark, unless it is wider than the trunks here: then it is a gap.
+/// Small residuals tell a trunk from chance. Of two hypotheses for one place the wider is the silhouette and the
+/// narrower a shadow's edge on the bark, unless the wider is wider than the trunks here: then it is a gap.
 double quality(const Detection &detection, const LogNormal &radii)
 {
   return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) *
@@ -281,8 +282,8 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewC
   return detection;
 }
 
-/// A pair that overlaps a known trunk is another reading of it, unless it holds all of it: then the known one may be an
-/// edge on the bark of this.
+/// Whether a pair overlaps a known trunk, of which it is another hypothesis. A pair that holds all of a known trunk is
+/// not inhibited, as the known one may be an edge on its bark.
 bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double q_left)
 {
   return std::any_of(known.begin(), known.end(), [&](const InhibitedRange &range) {
@@ -348,7 +349,7 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         break;
       if (pair.s * options.range_max < options.radius_min || inhibited(known, peaks[i].q, peaks[j].q))
         continue;
-      for (const SweepResult &at : focus(pair, curves[j], curves[i], ranges, options, scores)) {
+      for (const SweepResult &at : bestRanges(pair, curves[j], curves[i], ranges, options, scores)) {
         auto detection = verify(plane, columns, pair, at, camera.fx, options);
         if (!detection)
           continue;
@@ -369,7 +370,7 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
   return found;
 }
 
-std::vector<Detection> bestReadings(const std::vector<Detection> &found)
+std::vector<Detection> suppressNonMaxima(const std::vector<Detection> &found)
 {
   std::vector<Detection> best;
   for (const Detection &one : found)

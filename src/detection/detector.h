@@ -47,7 +47,7 @@ struct DetectorView
   Pose wMc;
 };
 
-/// A trunk found.
+/// A detected trunk.
 struct Detection
 {
   Trunk trunk; ///< leans across the line of sight as the lines of the profile do
@@ -56,7 +56,7 @@ struct Detection
   double agreement = 0;                                     ///< 0 to 1
   double rms_px = 0;
   double foreground = 0; ///< mean of 1 - p(background) between the borders, where known
-  double quality = 0;    ///< of two readings of the same lines the better has more
+  double quality = 0;    ///< higher for the better of two hypotheses for the same lines
   int views = 0, inliers = 0;
   double q_left = 0, q_right = 0;               ///< in the current profile
   double left_contrast = 0, right_contrast = 0; ///< signed
@@ -73,13 +73,14 @@ struct InhibitedRange
 double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
                          const ElevationRange &range);
 
-/// Trunks seen in views.back() (the current frame) and agreed on by the others, best first, with every reading of the
-/// same lines. \p p_background: of the current frame, or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 18.
+/// Trunks seen in views.back() (the current frame) and agreed on by the others, best first, with every hypothesis for
+/// the same lines. \p p_background: of the current frame, or nullptr. Cost: 5 to 10 ms at 320x240 with a window of 18.
 /// Thread-safe.
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
                                     const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
                                     const DetectorOptions &options);
 
-/// Of those that overlap in the current frame the first: readings of the same lines, of which one at most is a trunk.
-std::vector<Detection> bestReadings(const std::vector<Detection> &found);
+/// Non-maximum suppression: keeps the first of those that overlap in the current frame, since at most one hypothesis
+/// for the same lines is a trunk. \p found: best first.
+std::vector<Detection> suppressNonMaxima(const std::vector<Detection> &found);
 } // namespace bole

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// One frame reduced to what a vertical line says at each bearing.
+/// One frame reduced to the mean gradient along a vertical line at each bearing.
 ///
 /// Idea: turn the camera level. Every vertical plane through the camera centre is then a column q = tan(bearing),
 /// and the mean signed gradient along its part that any trunk within range must fill is one number. A frame is a

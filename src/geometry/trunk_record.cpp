@@ -7,8 +7,8 @@ namespace bole
 {
 const char *toString(TrunkStatus status) { return nameOf(status, {"candidate", "confirmed", "lost", "merged"}); }
 
-const char *toString(TrunkFate fate)
+const char *toString(RejectReason reason)
 {
-  return nameOf(fate, {"none", "undecided", "unseen", "missed", "doubted", "outdone", "duplicate", "unranged"});
+  return nameOf(reason, {"none", "undecided", "unseen", "missed", "doubted", "outdone", "duplicate", "unranged"});
 }
 } // namespace bole

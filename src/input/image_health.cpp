@@ -148,7 +148,7 @@ struct ImageHealth::State
   GyroAgreement agreement;
   std::string reason;
 
-  ImageFault say(ImageFault fault, std::string text)
+  ImageFault report(ImageFault fault, std::string text)
   {
     reason = std::move(text);
     return fault;
@@ -167,7 +167,7 @@ struct ImageHealth::State
   {
     odd = std::move(suspicion);
     odd_count = 1;
-    return say(odd.fault, odd.text);
+    return report(odd.fault, odd.text);
   }
   void accept(const cv::Mat &image, const cv::Mat &small, const ImageNumbers &numbers);
 };
@@ -191,13 +191,13 @@ void ImageHealth::State::addMotion(const MeasuredRotation &motion)
 ImageFault ImageHealth::State::judgeAlone(const ImageNumbers &numbers)
 {
   if (numbers.bright_share > kBrightShare)
-    return say(ImageFault::saturated, fmt::format("saturated: {:.0f} % of the pixels", 100 * numbers.bright_share));
+    return report(ImageFault::saturated, fmt::format("saturated: {:.0f} % of the pixels", 100 * numbers.bright_share));
   if (numbers.deviation < kMinDeviation)
-    return say(ImageFault::black, fmt::format("no contrast: deviation of {:.1f} grey levels", numbers.deviation));
+    return report(ImageFault::black, fmt::format("no contrast: deviation of {:.1f} grey levels", numbers.deviation));
   if (numbers.level_99 < kDarkLevel)
-    return say(ImageFault::black, fmt::format("dark: 99 % of the pixels below grey level {}", numbers.level_99));
+    return report(ImageFault::black, fmt::format("dark: 99 % of the pixels below grey level {}", numbers.level_99));
   if (numbers.roughness > kMaxRoughness)
-    return say(ImageFault::noise, "nothing but noise");
+    return report(ImageFault::noise, "nothing but noise");
   return ImageFault::none;
 }
 
@@ -206,15 +206,15 @@ ImageFault ImageHealth::State::judgeQuality(const ImageNumbers &numbers)
 {
   ImageFault fault = ImageFault::none;
   if (numbers.repeated > good_repeated + kRepeatedShare)
-    fault = say(ImageFault::smeared,
-                fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
+    fault = report(ImageFault::smeared,
+                   fmt::format("smeared: {:.0f} % of the rows or columns repeat each other", 100 * numbers.repeated));
   else if (noises.size() >= 2) {
     const double usual = middleOf(noises) * numbers.deviation, usual_sharpness = middleOf(sharpnesses);
     if (numbers.noise > kNoiseFactor * usual && numbers.noise > usual + kNoiseAdded)
-      fault = say(ImageFault::noise, fmt::format("noise of {:.0f} grey levels after {:.0f}", numbers.noise, usual));
+      fault = report(ImageFault::noise, fmt::format("noise of {:.0f} grey levels after {:.0f}", numbers.noise, usual));
     else if (numbers.sharpness < kBlurFactor * usual_sharpness)
-      fault = say(ImageFault::blurred,
-                  fmt::format("blurred: {:.0f} % of the usual sharpness", 100 * numbers.sharpness / usual_sharpness));
+      fault = report(ImageFault::blurred, fmt::format("blurred: {:.0f} % of the usual sharpness",
+                                                      100 * numbers.sharpness / usual_sharpness));
   }
   bad_quality = fault == ImageFault::none ? 0 : bad_quality + 1;
   if (bad_quality <= kLastsMost)
@@ -233,15 +233,16 @@ ImageFault ImageHealth::State::judgeFrozen(const cv::Mat &image, const cv::Mat &
     return ImageFault::none;
   const int changed = cv::countNonZero(image != last);
   if (changed <= (1 - kSamePixels) * static_cast<double>(image.total()))
-    return say(ImageFault::frozen, changed == 0 ? "the same image as before"
-                                                : fmt::format("the same image as before but for {} pixels", changed));
+    return report(ImageFault::frozen, changed == 0
+                                          ? "the same image as before"
+                                          : fmt::format("the same image as before but for {} pixels", changed));
   if (changes.size() < 3)
     return ImageFault::none;
   const double least = *std::min_element(changes.end() - 3, changes.end());
   const double change = changeBetween(thumb, small);
   const bool may_stand = gyro_since_good >= 0 && gyro_since_good < kStillRotation;
   if (change < kFrozenChange && change < kFrozenShare * least && !may_stand)
-    return say(ImageFault::frozen, "the image before under fresh noise");
+    return report(ImageFault::frozen, "the image before under fresh noise");
   return ImageFault::none;
 }
 
@@ -310,7 +311,7 @@ ImageFault ImageHealth::State::judgeOdd(const cv::Mat &picture, const cv::Mat &s
   }
   const bool is_short = is_out_of_order || odd.fault == ImageFault::torn;
   if (!is_back && ++odd_count <= (is_short ? kJumpsMost : kLastsMost))
-    return say(odd.fault, odd.text);
+    return report(odd.fault, odd.text);
   odd = {};
   return ImageFault::none;
 }
@@ -362,12 +363,12 @@ ImageFault ImageHealth::State::named(GyroAgreement::Verdict verdict)
   case GyroAgreement::Verdict::jumped:
     return ImageFault::out_of_order;
   case GyroAgreement::Verdict::late:
-    return say(ImageFault::late, fmt::format("{} by {} frames against the gyro", agreement.lag() > 0 ? "late" : "early",
-                                             std::abs(agreement.lag())));
+    return report(ImageFault::late, fmt::format("{} by {} frames against the gyro",
+                                                agreement.lag() > 0 ? "late" : "early", std::abs(agreement.lag())));
   case GyroAgreement::Verdict::mirrored:
-    return say(ImageFault::mirrored, "mirrored against the gyro");
+    return report(ImageFault::mirrored, "mirrored against the gyro");
   case GyroAgreement::Verdict::upside_down:
-    return say(ImageFault::upside_down, "upside down against the gyro");
+    return report(ImageFault::upside_down, "upside down against the gyro");
   }
   return ImageFault::none;
 }
@@ -416,8 +417,8 @@ ImageFault ImageHealth::check(const vpImage<unsigned char> &I, const MeasuredRot
   s.addMotion(motion);
   const cv::Mat image(static_cast<int>(I.getHeight()), static_cast<int>(I.getWidth()), CV_8UC1, I.bitmap);
   if (!s.last.empty() && image.size() != s.last.size())
-    return s.say(ImageFault::wrong_size,
-                 fmt::format("image of {}x{} px, must be {}x{}", image.cols, image.rows, s.last.cols, s.last.rows));
+    return s.report(ImageFault::wrong_size,
+                    fmt::format("image of {}x{} px, must be {}x{}", image.cols, image.rows, s.last.cols, s.last.rows));
   if (I.getWidth() < kSmallest_px || I.getHeight() < kSmallest_px)
     return ImageFault::none;
   const ImageNumbers numbers = measureImage(image);

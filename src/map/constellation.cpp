@@ -20,8 +20,8 @@ double normal(double x, double sigma)
   return std::exp(-0.5 * x * x / (sigma * sigma)) / (sigma * std::sqrt(2 * M_PI));
 }
 
-/// Place and log radius of what is compared.
-struct Star
+/// Place and log radius of a trunk that is compared.
+struct Landmark
 {
   int id;
   Eigen::Vector2d xy;
@@ -29,32 +29,32 @@ struct Star
   double log_radius, log_radius_sigma;
 };
 
-std::vector<Star> starsOf(const std::vector<TrunkRecord> &trunks)
+std::vector<Landmark> landmarksOf(const std::vector<TrunkRecord> &trunks)
 {
-  std::vector<Star> stars;
+  std::vector<Landmark> landmarks;
   for (const TrunkRecord &trunk : trunks) {
     if (trunk.radius > 0)
-      stars.push_back({trunk.id, trunk.xy,
-                       trunk.covarianceXy() + kPlaceFloor * kPlaceFloor * Eigen::Matrix2d::Identity(),
-                       std::log(trunk.radius), std::hypot(trunk.radiusSigma() / trunk.radius, kLogRadiusFloor)});
+      landmarks.push_back({trunk.id, trunk.xy,
+                           trunk.covarianceXy() + kPlaceFloor * kPlaceFloor * Eigen::Matrix2d::Identity(),
+                           std::log(trunk.radius), std::hypot(trunk.radiusSigma() / trunk.radius, kLogRadiusFloor)});
   }
-  return stars;
+  return landmarks;
 }
 
-/// What a map says of itself: how crowded it is and how thick its trunks are.
-struct Crowd
+/// Density and radii of the trunks of a map: what chance would match.
+struct MapStatistics
 {
   double area = 0, density = 0, log_radius_mean = 0, log_radius_sigma = 0.2;
 
-  explicit Crowd(const std::vector<Star> &map)
+  explicit MapStatistics(const std::vector<Landmark> &map)
   {
     Eigen::Vector2d low = map.front().xy, high = low;
     double sum = 0, squares = 0;
-    for (const Star &star : map) {
-      low = low.cwiseMin(star.xy);
-      high = high.cwiseMax(star.xy);
-      sum += star.log_radius;
-      squares += star.log_radius * star.log_radius;
+    for (const Landmark &landmark : map) {
+      low = low.cwiseMin(landmark.xy);
+      high = high.cwiseMax(landmark.xy);
+      sum += landmark.log_radius;
+      squares += landmark.log_radius * landmark.log_radius;
     }
     const auto n = static_cast<double>(map.size());
     area = (high.x() - low.x() + 2 * kReach) * (high.y() - low.y() + 2 * kReach);
@@ -64,16 +64,17 @@ struct Crowd
   }
 };
 
-/// How likely a trunk seen at \p at is one of the map and not any.
-double oddsOf(const Star &seen, const Eigen::Vector2d &at, const Eigen::Matrix2d &R, const Star &star,
-              const Crowd &crowd)
+/// Likelihood ratio that a trunk seen at \p at is that one of the map and not any trunk.
+double likelihoodRatio(const Landmark &seen, const Eigen::Vector2d &at, const Eigen::Matrix2d &R,
+                       const Landmark &landmark, const MapStatistics &statistics)
 {
-  const Eigen::Matrix2d S = R * seen.covariance * R.transpose() + star.covariance;
-  const Eigen::Vector2d d = at - star.xy;
+  const Eigen::Matrix2d S = R * seen.covariance * R.transpose() + landmark.covariance;
+  const Eigen::Vector2d d = at - landmark.xy;
   const double place = std::exp(-0.5 * d.dot(S.inverse() * d)) / (2 * M_PI * std::sqrt(S.determinant()));
   const double width =
-      normal(seen.log_radius - star.log_radius, std::hypot(seen.log_radius_sigma, star.log_radius_sigma));
-  const double any = crowd.density * normal(seen.log_radius - crowd.log_radius_mean, crowd.log_radius_sigma);
+      normal(seen.log_radius - landmark.log_radius, std::hypot(seen.log_radius_sigma, landmark.log_radius_sigma));
+  const double any =
+      statistics.density * normal(seen.log_radius - statistics.log_radius_mean, statistics.log_radius_sigma);
   return place * width / std::max(any, 1e-12);
 }
 
@@ -83,9 +84,9 @@ struct Mode
   double log_mass = 0; ///< likelihood ratio times the volume of the mode
 };
 
-/// Moves a pose to the nearest mode of the likelihood and weighs it.
-std::optional<Mode> settle(Placement pose, const std::vector<Star> &seen, const std::vector<Star> &map,
-                           const Crowd &crowd)
+/// Refines a pose to the nearest mode of the likelihood and computes the mass of the mode.
+std::optional<Mode> refineMode(Placement pose, const std::vector<Landmark> &seen, const std::vector<Landmark> &map,
+                               const MapStatistics &statistics)
 {
   Mode mode;
   for (int iteration = 0; iteration < 4; ++iteration) {
@@ -95,14 +96,14 @@ std::optional<Mode> settle(Placement pose, const std::vector<Star> &seen, const 
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     pose.matches.clear();
     mode.log_mass = 0;
-    for (const Star &a : seen) {
+    for (const Landmark &a : seen) {
       const Eigen::Vector2d at = R * a.xy + pose.t;
-      const Star *best = nullptr;
+      const Landmark *best = nullptr;
       double odds = 0;
-      for (const Star &b : map) {
+      for (const Landmark &b : map) {
         if ((at - b.xy).squaredNorm() > 4) // [m^2], beyond any covariance that is of use
           continue;
-        const double o = oddsOf(a, at, R, b, crowd);
+        const double o = likelihoodRatio(a, at, R, b, statistics);
         if (o > odds)
           odds = o, best = &b;
       }
@@ -139,16 +140,16 @@ bool isSame(const Placement &a, const Placement &b, const Eigen::Vector2d &centr
 std::optional<Placement> placeOnMap(const std::vector<TrunkRecord> &seen_trunks,
                                     const std::vector<TrunkRecord> &map_trunks, double certain)
 {
-  std::vector<Star> seen = starsOf(seen_trunks);
-  const std::vector<Star> map = starsOf(map_trunks);
+  std::vector<Landmark> seen = landmarksOf(seen_trunks);
+  const std::vector<Landmark> map = landmarksOf(map_trunks);
   if (seen.size() < 3 || map.size() < 3)
     return std::nullopt;
   std::sort(seen.begin(), seen.end(),
-            [](const Star &a, const Star &b) { return a.covariance.trace() < b.covariance.trace(); });
+            [](const Landmark &a, const Landmark &b) { return a.covariance.trace() < b.covariance.trace(); });
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
-  for (const Star &a : seen)
+  for (const Landmark &a : seen)
     centre += a.xy / static_cast<double>(seen.size());
-  const Crowd crowd(map);
+  const MapStatistics statistics(map);
   std::vector<Mode> modes;
   const std::size_t proposers = std::min(seen.size(), kProposers);
   for (std::size_t i = 0; i < proposers; ++i) {
@@ -156,10 +157,10 @@ std::optional<Placement> placeOnMap(const std::vector<TrunkRecord> &seen_trunks,
       const Eigen::Vector2d ab = seen[j].xy - seen[i].xy;
       if (ab.norm() < 1)
         continue;
-      for (const Star &k : map) {
+      for (const Landmark &k : map) {
         if (std::abs(k.log_radius - seen[i].log_radius) > 3 * std::hypot(k.log_radius_sigma, seen[i].log_radius_sigma))
           continue;
-        for (const Star &l : map) {
+        for (const Landmark &l : map) {
           const Eigen::Vector2d kl = l.xy - k.xy;
           const double variance = (seen[i].covariance + seen[j].covariance + k.covariance + l.covariance).trace() / 2 +
                                   std::pow(kRelativeScale * ab.norm(), 2);
@@ -170,7 +171,7 @@ std::optional<Placement> placeOnMap(const std::vector<TrunkRecord> &seen_trunks,
           Placement pose;
           pose.yaw = std::atan2(kl.y(), kl.x()) - std::atan2(ab.y(), ab.x());
           pose.t = 0.5 * (k.xy + l.xy) - Eigen::Rotation2Dd(pose.yaw) * (0.5 * (seen[i].xy + seen[j].xy));
-          const std::optional<Mode> mode = settle(pose, seen, map, crowd);
+          const std::optional<Mode> mode = refineMode(pose, seen, map, statistics);
           if (!mode)
             continue;
           const auto known = std::find_if(modes.begin(), modes.end(), [&](const Mode &other) {
@@ -189,7 +190,7 @@ std::optional<Placement> placeOnMap(const std::vector<TrunkRecord> &seen_trunks,
   auto best = std::max_element(modes.begin(), modes.end(),
                                [](const Mode &a, const Mode &b) { return a.log_mass < b.log_mass; });
   // masses relative to the best, and that of a flight that is anywhere else
-  double sum = std::exp(std::log(crowd.area * 2 * M_PI * (1 - kOnMap) / kOnMap) - best->log_mass);
+  double sum = std::exp(std::log(statistics.area * 2 * M_PI * (1 - kOnMap) / kOnMap) - best->log_mass);
   for (const Mode &mode : modes)
     sum += std::exp(mode.log_mass - best->log_mass);
   best->placement.probability = 1 / sum;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What becomes of a trunk: confirmed, lost, merged with another.
+// The life cycle of trunks: which are confirmed, lost, or merged with another.
 #include "map/trunk_map.h"
 
 #include "map/constellation.h"
@@ -15,22 +15,22 @@ namespace bole
 namespace
 {
 constexpr double kMostLean = 5;   ///< standard deviations of the lean of trunks: two lines that are none bend to it
-constexpr double kHysteresis = 1; ///< log-odds between being good enough for the map and being given up
+constexpr double kHysteresis = 1; ///< log-odds between confirmation and rejection
 } // namespace
 
-bool TrunkMap::isDisproved(const MapTrunk &trunk, bool has_ranges) const
+bool TrunkMap::isRejected(const MapTrunk &trunk, bool has_ranges) const
 {
-  if (trunk.observations < m_options.doubt_observations)
+  if (trunk.observations < m_options.reject_observations)
     return false;
   if (!has_ranges)
     return trunk.evenness < 0.75 * m_options.turning_evenness || trunk.contrast < 0.75 * m_options.turning_contrast;
   if (trunk.trunk.lean.norm() > kMostLean * m_options.lean_sigma)
     return true;
-  if (trunk.column_views >= kColumnViews && trunk.column_odds < m_options.confirm_odds - kHysteresis)
+  if (trunk.consistency_views >= kConsistencyViews && trunk.consistency_odds < m_options.confirm_odds - kHysteresis)
     return true;
   if (trunk.status == TrunkStatus::confirmed)
-    return evidence(trunk) < m_options.doubt_confirmed;
-  return evidence(trunk) < m_options.doubt_candidate || hasBetterRival(trunk, m_options.doubt_rival);
+    return evidence(trunk) < m_options.reject_confirmed;
+  return evidence(trunk) < m_options.reject_candidate || hasBetterRival(trunk, m_options.reject_rival);
 }
 
 bool TrunkMap::mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const
@@ -64,7 +64,8 @@ bool isInside(const Trunk &narrow, const Trunk &wide)
          distanceBetween(narrow, wide) + narrow.radius() < wide.radius() + 0.05;
 }
 
-/// What shows the background beside it is no edge on the bark of \p wide.
+/// Whether \p known may be an edge on the bark of \p wide: it lies within it, and the background was not seen beside
+/// its borders.
 bool mayBeEdgeOf(const MapTrunk &known, const Trunk &wide)
 {
   return !known.is_silhouette && isInside(known.trunk, wide);
@@ -77,8 +78,9 @@ double secondsApart(const MapTrunk &a, const MapTrunk &b)
   return std::max(a.first_seen_s - b.last_seen_s, b.first_seen_s - a.last_seen_s);
 }
 
-/// Alike in place and radius within what both are known to: what ties two visits moves all that was seen since.
-bool mayBeTheSame(const MapTrunk &a, const MapTrunk &b)
+/// Whether the Mahalanobis distance of two trunks in place and radius is inside the gate. Merging two visits moves all
+/// poses between them.
+bool isWithinMergeGate(const MapTrunk &a, const MapTrunk &b)
 {
   constexpr double kFromItself = 0.05; // by which one trunk differs from another side, [m] and [1]
   constexpr double kGate = 14.2;       // chi square (3), three sigma
@@ -90,8 +92,8 @@ bool mayBeTheSame(const MapTrunk &a, const MapTrunk &b)
   return apart.dot(S.inverse() * apart) < kGate;
 }
 
-/// What was seen of \p gone was seen of \p keep.
-void absorb(MapTrunk &keep, const MapTrunk &gone)
+/// Adds the history of \p gone to that of \p keep.
+void mergeHistory(MapTrunk &keep, const MapTrunk &gone)
 {
   keep.left.add(gone.left);
   keep.right.add(gone.right);
@@ -109,7 +111,7 @@ void absorb(MapTrunk &keep, const MapTrunk &gone)
 }
 } // namespace
 
-bool TrunkMap::recognise(const Trunk &found)
+bool TrunkMap::associate(const Trunk &found)
 {
   bool is_known = false;
   for (const std::size_t i : m_active) {
@@ -117,7 +119,7 @@ bool TrunkMap::recognise(const Trunk &found)
     if (known.status == TrunkStatus::lost)
       continue;
     if (isSameHypothesis(known.trunk, found)) {
-      ++known.found_again;
+      ++known.redetections;
       is_known = true;
     }
     else if (known.status == TrunkStatus::confirmed && !mayBeEdgeOf(known, found))
@@ -126,14 +128,15 @@ bool TrunkMap::recognise(const Trunk &found)
   return is_known;
 }
 
-/// Two trunks cannot stand in one place.
+/// Whether there is less than MapOptions::merge_distance between the bark of two trunks: one of them is none.
 bool TrunkMap::areTooNear(const Trunk &a, const Trunk &b) const
 {
   return distanceBetween(a, b) < a.radius() + b.radius() + m_options.merge_distance;
 }
 
-/// By how much the log-odds speak for \p trunk against another hypothesis for the same place.
-double TrunkMap::advantage(const MapTrunk &trunk, const MapTrunk &rival) const
+/// Log-odds of \p trunk less those of \p rival, another hypothesis for the same place, with a bonus for the wider of
+/// two that lie one within the other.
+double TrunkMap::logOddsGain(const MapTrunk &trunk, const MapTrunk &rival) const
 {
   constexpr double kSilhouette = 1; // log-odds that go to the wider of two sound hypotheses
   double gain = evidence(trunk) - evidence(rival);
@@ -144,14 +147,14 @@ double TrunkMap::advantage(const MapTrunk &trunk, const MapTrunk &rival) const
   return gain;
 }
 
-/// Another candidate for the same place has log-odds better by more than \p margin.
+/// Whether the log-odds of another candidate for the same place are better by more than \p margin.
 bool TrunkMap::hasBetterRival(const MapTrunk &trunk, double margin) const
 {
   return std::any_of(m_active.begin(), m_active.end(), [&](std::size_t i) {
     const MapTrunk &rival = m_trunks[i];
     return rival.id != trunk.id && !rival.removed && rival.status == TrunkStatus::candidate &&
-           rival.observations >= m_options.doubt_observations && areTooNear(trunk.trunk, rival.trunk) &&
-           (margin > 0 || logOdds(rival) >= m_options.confirm_odds) && advantage(rival, trunk) > margin;
+           rival.observations >= m_options.reject_observations && areTooNear(trunk.trunk, rival.trunk) &&
+           (margin > 0 || logOdds(rival) >= m_options.confirm_odds) && logOddsGain(rival, trunk) > margin;
   });
 }
 
@@ -163,55 +166,55 @@ MapTrunk *TrunkMap::chooseRedundant(MapTrunk &a, MapTrunk &b) const
   const bool is_a_candidate = a.status == TrunkStatus::candidate, is_b_candidate = b.status == TrunkStatus::candidate;
   if (is_a_candidate != is_b_candidate) {
     MapTrunk &candidate = is_a_candidate ? a : b, &known = is_a_candidate ? b : a;
-    return mayBeEdgeOf(known, candidate.trunk) ? nullptr : &candidate; // what holds it may still turn out to be it
+    return mayBeEdgeOf(known, candidate.trunk) ? nullptr : &candidate; // known may be an edge on the candidate's bark
   }
   if (!is_a_candidate || isSameHypothesis(a.trunk, b.trunk))
-    return advantage(a, b) >= 0 ? &b : &a;
+    return logOddsGain(a, b) >= 0 ? &b : &a;
   return nullptr;
 }
 
 namespace
 {
-void change(MapUpdate &update, MapTrunk &trunk, TrunkStatus to, TrunkFate fate, int into = -1)
+void change(MapUpdate &update, MapTrunk &trunk, TrunkStatus to, RejectReason reason, int into = -1)
 {
   update.changes.push_back({trunk.id, into, trunk.status, to});
   trunk.status = to;
-  trunk.fate = fate;
+  trunk.reject_reason = reason;
 }
 
-/// Out of the map and of the smoother.
-void remove(MapUpdate &update, MapTrunk &trunk, TrunkFate fate)
+/// Removes a trunk from the map and has the smoother remove it.
+void remove(MapUpdate &update, MapTrunk &trunk, RejectReason reason)
 {
   trunk.removed = true;
   update.removed.push_back(trunk.smoother_id);
-  change(update, trunk, TrunkStatus::lost, fate);
+  change(update, trunk, TrunkStatus::lost, reason);
 }
 } // namespace
 
-void TrunkMap::reviewEach(MapUpdate &update, bool has_ranges)
+void TrunkMap::updateStatuses(MapUpdate &update, bool has_ranges)
 {
   for (const std::size_t i : m_active) {
     MapTrunk &trunk = m_trunks[i];
     const bool is_candidate = trunk.status == TrunkStatus::candidate;
     if (is_candidate && mayBeConfirmed(trunk, has_ranges) && !hasBetterRival(trunk, 0))
-      change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
+      change(update, trunk, TrunkStatus::confirmed, RejectReason::none);
     else if (trunk.status == TrunkStatus::lost && trunk.misses_in_a_row == 0)
-      change(update, trunk, TrunkStatus::confirmed, TrunkFate::none);
+      change(update, trunk, TrunkStatus::confirmed, RejectReason::none);
     else if (trunk.status == TrunkStatus::lost)
       continue;
-    else if (isDisproved(trunk, has_ranges)) {
-      const bool is_outdone = has_ranges && is_candidate && evidence(trunk) >= m_options.doubt_candidate &&
-                              hasBetterRival(trunk, m_options.doubt_rival);
-      remove(update, trunk, is_outdone ? TrunkFate::outdone : TrunkFate::doubted);
+    else if (isRejected(trunk, has_ranges)) {
+      const bool is_outdone = has_ranges && is_candidate && evidence(trunk) >= m_options.reject_candidate &&
+                              hasBetterRival(trunk, m_options.reject_rival);
+      remove(update, trunk, is_outdone ? RejectReason::outdone : RejectReason::doubted);
     }
     else if (trunk.misses_in_a_row >= m_options.lost_misses && is_candidate)
-      remove(update, trunk, TrunkFate::missed);
+      remove(update, trunk, RejectReason::missed);
     else if (trunk.misses_in_a_row >= m_options.lost_misses) // out of sight, and still a trunk of the map
-      change(update, trunk, TrunkStatus::lost, TrunkFate::none);
+      change(update, trunk, TrunkStatus::lost, RejectReason::none);
   }
 }
 
-void TrunkMap::reviewPairs(MapUpdate &update, double now_s)
+void TrunkMap::mergeDuplicates(MapUpdate &update, double now_s)
 {
   const bool is_over = std::isinf(now_s);
   for (const std::size_t i : m_active)
@@ -224,32 +227,33 @@ void TrunkMap::reviewPairs(MapUpdate &update, double now_s)
         continue;
       MapTrunk &keep = gone == &a ? b : a;
       const double apart_s = secondsApart(a, b), memory_s = m_options.candidate_memory_s;
-      const bool is_another_visit = apart_s > 0 && mayBeTheSame(a, b);
+      const bool is_another_visit = apart_s > 0 && isWithinMergeGate(a, b);
       const bool is_candidate = gone->status == TrunkStatus::candidate;
       if (is_another_visit && !is_candidate) {
-        joinVisits(update, keep, *gone);
+        mergeVisits(update, keep, *gone);
         continue;
       }
       const bool may_be_another = is_another_visit || apart_s > memory_s; // the path may have drifted since
       if (may_be_another && (is_candidate ? now_s - gone->last_seen_s <= memory_s : !is_over))
-        continue; // it may still earn its place, or its tie
+        continue; // it may still be confirmed or pass the gate of a merge
       gone->removed = true;
-      change(update, *gone, TrunkStatus::merged, TrunkFate::outdone, keep.id);
+      change(update, *gone, TrunkStatus::merged, RejectReason::outdone, keep.id);
       update.removed.push_back(gone->smoother_id);
     }
 }
 
-void TrunkMap::joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone)
+void TrunkMap::mergeVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone)
 {
   gone.removed = true;
-  change(update, gone, TrunkStatus::merged, TrunkFate::duplicate, keep.id);
-  absorb(keep, gone);
+  change(update, gone, TrunkStatus::merged, RejectReason::duplicate, keep.id);
+  mergeHistory(keep, gone);
   update.merged.push_back({keep.smoother_id, gone.smoother_id});
 }
 
-/// Are the trunks in sight those of an earlier visit, all of them shifted by the drift of the path since? Asked when
-/// one of them is confirmed. Those in sight from one moment on are laid on those that were out of sight by then.
-void TrunkMap::reviewPlaces(MapUpdate &update, double now_s)
+/// Closes loops: matches the constellation of the trunks in sight with that of trunks that were out of sight before,
+/// and merges the pairs. All trunks in sight may be shifted by the drift of the path since. Runs when a trunk is
+/// confirmed.
+void TrunkMap::closeLoops(MapUpdate &update, double now_s)
 {
   constexpr double kSight_s = 5;     // seen within them, a trunk is in sight
   constexpr double kMostTurn = 0.35; // the drift of a heading, at most [rad]
@@ -286,10 +290,10 @@ void TrunkMap::reviewPlaces(MapUpdate &update, double now_s)
     return;
   for (const auto &[gone, keep] : placement->matches)
     if (!at(gone).removed)
-      joinVisits(update, at(keep), at(gone));
+      mergeVisits(update, at(keep), at(gone));
 }
 
-/// Candidates that were not seen for long are not looked for any more.
+/// Deactivates candidates that were not seen for MapOptions::candidate_memory_s: they are predicted no longer.
 void TrunkMap::deactivate(MapUpdate &update, double now_s)
 {
   for (const std::size_t i : m_active) {
@@ -299,11 +303,11 @@ void TrunkMap::deactivate(MapUpdate &update, double now_s)
       continue;
     trunk.inactive = true;
     if (trunk.observations == 0)
-      remove(update, trunk, TrunkFate::unseen);
+      remove(update, trunk, RejectReason::unseen);
   }
 }
 
-void TrunkMap::keepActive()
+void TrunkMap::indexActive()
 {
   m_active.clear();
   for (std::size_t i = 0; i < m_trunks.size(); ++i)
@@ -314,16 +318,16 @@ void TrunkMap::keepActive()
 MapUpdate TrunkMap::review(double now_s, bool has_ranges)
 {
   MapUpdate update;
-  reviewEach(update, has_ranges);
-  reviewPairs(update, now_s);
-  reviewPlaces(update, now_s);
+  updateStatuses(update, has_ranges);
+  mergeDuplicates(update, now_s);
+  closeLoops(update, now_s);
   deactivate(update, now_s);
   m_active.erase(std::remove_if(m_active.begin(), m_active.end(),
                                 [this](std::size_t i) { return m_trunks[i].removed || m_trunks[i].inactive; }),
                  m_active.end());
-  bury(update, now_s);
+  archive(update, now_s);
   if (!update.changes.empty())
-    learnRadii();
+    estimateRadii();
   return update;
 }
 
@@ -331,12 +335,12 @@ MapUpdate TrunkMap::reviewAll(bool has_ranges)
 {
   for (MapTrunk &trunk : m_trunks)
     trunk.inactive = false;
-  keepActive();
+  indexActive();
   MapUpdate update;
-  learnRadii();
-  reviewEach(update, has_ranges);
-  reviewPairs(update, std::numeric_limits<double>::infinity()); // nothing earns its place any more
-  keepActive();
+  estimateRadii();
+  updateStatuses(update, has_ranges);
+  mergeDuplicates(update, std::numeric_limits<double>::infinity()); // nothing earns its place any more
+  indexActive();
   return update;
 }
 
@@ -351,7 +355,7 @@ TrunkMap TrunkMap::withTrunks(const std::vector<int> &ids) const
   return {m_options, std::move(trunks)};
 }
 
-std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &decisions)
+std::vector<std::size_t> TrunkMap::applyDecisions(const std::vector<TrunkDecision> &decisions)
 {
   std::vector<std::size_t> forgotten;
   std::vector<bool> stays(m_trunks.size(), false);
@@ -365,7 +369,7 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
     trunk.removed = true;
     if (trunk.status == TrunkStatus::confirmed) {
       trunk.status = TrunkStatus::lost;
-      trunk.fate = TrunkFate::doubted;
+      trunk.reject_reason = RejectReason::doubted;
     }
   }
   for (const TrunkDecision &decision : decisions) {
@@ -373,7 +377,7 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
     trunk.final_odds = decision.log_odds;
     if (!decision.is_trunk) {
       if (trunk.status == TrunkStatus::lost && decision.log_odds >= m_options.confirm_odds)
-        trunk.fate = TrunkFate::outdone;
+        trunk.reject_reason = RejectReason::outdone;
       continue;
     }
     if (decision.found) {
@@ -386,18 +390,18 @@ std::vector<std::size_t> TrunkMap::decide(const std::vector<TrunkDecision> &deci
         addView(trunk, view);
     }
     trunk.status = TrunkStatus::confirmed;
-    trunk.fate = TrunkFate::none;
+    trunk.reject_reason = RejectReason::none;
     trunk.removed = trunk.inactive = false;
   }
-  keepActive();
+  indexActive();
   return forgotten;
 }
 
-MapUpdate TrunkMap::forgetUnranged()
+MapUpdate TrunkMap::removeUnranged()
 {
   MapUpdate update;
   for (const std::size_t i : m_active)
-    remove(update, m_trunks[i], TrunkFate::unranged);
+    remove(update, m_trunks[i], RejectReason::unranged);
   m_active.clear();
   return update;
 }

@@ -22,13 +22,13 @@ TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
   for (std::size_t i = 0; i < m_trunks.size(); ++i)
     if (!m_trunks[i].removed && !m_trunks[i].inactive)
       m_active.push_back(i);
-  learnRadii();
+  estimateRadii();
 }
 
 void TrunkMap::setOptions(const MapOptions &options)
 {
   m_options = options;
-  learnRadii();
+  estimateRadii();
 }
 
 std::size_t TrunkMap::place(int id) const
@@ -78,27 +78,27 @@ void TrunkMap::refresh(const TrunkEstimate &estimate)
     trunk.place_covariance = *estimate.place_covariance;
 }
 
-void TrunkMap::loseSight(int id)
+void TrunkMap::markOutOfSight(int id)
 {
   MapTrunk &trunk = at(id);
   if (trunk.status == TrunkStatus::confirmed)
     trunk.misses_in_a_row = std::max(trunk.misses_in_a_row, m_options.lost_misses);
 }
 
-void TrunkMap::record(const Sighting &sighting)
+void TrunkMap::record(const TrunkMeasurement &measurement)
 {
-  MapTrunk &trunk = at(sighting.id);
-  trunk.flipped_in_a_row = sighting.is_flipped ? trunk.flipped_in_a_row + 1 : 0;
-  if (sighting.kind == Sighting::Kind::missed) {
+  MapTrunk &trunk = at(measurement.id);
+  trunk.flipped_in_a_row = measurement.is_flipped ? trunk.flipped_in_a_row + 1 : 0;
+  if (measurement.kind == TrunkMeasurement::Kind::missed) {
     if (trunk.status != TrunkStatus::lost) // what hides a trunk lost from sight does not count against it
       ++trunk.misses;
     ++trunk.misses_in_a_row;
   }
-  if (sighting.kind != Sighting::Kind::seen)
+  if (measurement.kind != TrunkMeasurement::Kind::seen)
     return;
-  addView(trunk, sighting.view);
-  if (sighting.foreground && sighting.range <= m_options.near_range)
-    trunk.foreground += (*sighting.foreground - trunk.foreground) / ++trunk.foreground_count;
+  addView(trunk, measurement.view);
+  if (measurement.foreground && measurement.range <= m_options.near_range)
+    trunk.foreground += (*measurement.foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
 void TrunkMap::record(const PointCount &points)
@@ -108,32 +108,32 @@ void TrunkMap::record(const PointCount &points)
   trunk.points_behind += points.behind;
 }
 
-void TrunkMap::record(const ColumnOdds &odds)
+void TrunkMap::record(const ConsistencyScore &odds)
 {
   constexpr double kBackground = 0.25; // beside a border: as much as tells that the trunk goes on, the other way
   MapTrunk &trunk = at(odds.id);
-  trunk.column_odds = odds.log_odds;
-  trunk.column_views = odds.views;
-  trunk.is_silhouette |= odds.views >= kColumnViews && odds.least_beside > kBackground;
+  trunk.consistency_odds = odds.log_odds;
+  trunk.consistency_views = odds.views;
+  trunk.is_silhouette |= odds.views >= kConsistencyViews && odds.weakest_outside > kBackground;
 }
 
-std::size_t TrunkMap::readAgain(int id, const NewTrunk &reading)
+std::size_t TrunkMap::replaceHypothesis(int id, const NewTrunk &hypothesis)
 {
   MapTrunk &trunk = at(id);
   const std::size_t before = trunk.smoother_id;
-  trunk.smoother_id = reading.smoother_id;
-  trunk.trunk = reading.trunk;
-  trunk.covariance = reading.covariance;
-  trunk.place_covariance = reading.covariance.topLeftCorner<2, 2>();
-  trunk.observations = trunk.column_views = 0;
+  trunk.smoother_id = hypothesis.smoother_id;
+  trunk.trunk = hypothesis.trunk;
+  trunk.covariance = hypothesis.covariance;
+  trunk.place_covariance = hypothesis.covariance.topLeftCorner<2, 2>();
+  trunk.observations = trunk.consistency_views = 0;
   trunk.is_silhouette = false;
   trunk.left_contrast.reset();
   trunk.right_contrast.reset();
   const double first_seen_s = trunk.first_seen_s;
   const int hits = trunk.hits;
-  for (const TrunkView &view : reading.views)
+  for (const TrunkView &view : hypothesis.views)
     addView(trunk, view);
-  trunk.innovation2 = reading.innovation2;
+  trunk.innovation2 = hypothesis.innovation2;
   trunk.hits = hits; // frames in which it was looked for
   trunk.first_seen_s = first_seen_s;
   return before;
@@ -153,7 +153,7 @@ void BearingSpread::add(const BearingSpread &other)
   high = std::max(high, apart + other.high);
 }
 
-void blendContrast(std::optional<double> &mean, double now)
+void updateMeanContrast(std::optional<double> &mean, double now)
 {
   if (now != 0)
     mean = mean && *mean * now > 0 ? 0.7 * *mean + 0.3 * now : now;
@@ -180,8 +180,8 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
   const double weaker = std::min(std::abs(view.left_contrast), std::abs(view.right_contrast));
   if (weaker > 0)
     trunk.contrast = trunk.contrast > 0 ? 0.9 * trunk.contrast + 0.1 * weaker : weaker;
-  blendContrast(trunk.left_contrast, view.left_contrast);
-  blendContrast(trunk.right_contrast, view.right_contrast);
+  updateMeanContrast(trunk.left_contrast, view.left_contrast);
+  updateMeanContrast(trunk.right_contrast, view.right_contrast);
 }
 
 TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk, bool has_ranges) const
@@ -209,7 +209,7 @@ TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double br
   record.first_seen_s = trunk.first_seen_s;
   record.last_seen_s = trunk.last_seen_s;
   record.status = statusOf(trunk, has_ranges);
-  record.fate = record.status == TrunkStatus::candidate ? TrunkFate::undecided : trunk.fate;
+  record.reject_reason = record.status == TrunkStatus::candidate ? RejectReason::undecided : trunk.reject_reason;
   return record;
 }
 
@@ -218,12 +218,12 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z, bool has_ranges) con
   std::vector<TrunkRecord> records;
   for (const MapTrunk &trunk : m_trunks)
     records.push_back(recordOf(trunk, logOdds(trunk), breast_z, has_ranges));
-  for (const GivenUp &gone : m_given_up) {
+  for (const ArchivedTrunk &gone : m_archive) {
     MapTrunk trunk;
     trunk.id = gone.id;
     trunk.observations = gone.observations;
     trunk.status = gone.status;
-    trunk.fate = gone.fate;
+    trunk.reject_reason = gone.reject_reason;
     trunk.trunk.xy = {gone.trunk[0], gone.trunk[1]};
     trunk.trunk.log_radius = gone.trunk[2];
     trunk.trunk.lean = {gone.trunk[3], gone.trunk[4]};
@@ -240,8 +240,8 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z, bool has_ranges) con
   return records;
 }
 
-/// Of what is given up for good, a record remains.
-void TrunkMap::bury(MapUpdate &update, double now_s)
+/// Moves the trunks that are removed for good to the archive, which keeps a record of each.
+void TrunkMap::archive(MapUpdate &update, double now_s)
 {
   const auto isGone = [&](const MapTrunk &trunk) {
     return m_options.memory != Memory::all &&
@@ -253,11 +253,11 @@ void TrunkMap::bury(MapUpdate &update, double now_s)
   for (const MapTrunk &trunk : m_trunks) {
     if (!isGone(trunk))
       continue;
-    GivenUp gone;
+    ArchivedTrunk gone;
     gone.id = trunk.id;
     gone.observations = trunk.observations;
     gone.status = trunk.status;
-    gone.fate = trunk.fate;
+    gone.reject_reason = trunk.reject_reason;
     gone.log_odds = static_cast<float>(logOdds(trunk));
     gone.trunk = {static_cast<float>(trunk.trunk.xy.x()), static_cast<float>(trunk.trunk.xy.y()),
                   static_cast<float>(trunk.trunk.log_radius), static_cast<float>(trunk.trunk.lean.x()),
@@ -270,10 +270,10 @@ void TrunkMap::bury(MapUpdate &update, double now_s)
     gone.last_seen_s = trunk.last_seen_s;
     if (!trunk.removed)
       update.removed.push_back(trunk.smoother_id);
-    update.buried.push_back(trunk.id);
-    m_given_up.push_back(gone);
+    update.archived.push_back(trunk.id);
+    m_archive.push_back(gone);
   }
   m_trunks.erase(std::remove_if(m_trunks.begin(), m_trunks.end(), isGone), m_trunks.end());
-  keepActive();
+  indexActive();
 }
 } // namespace bole

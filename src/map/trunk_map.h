@@ -33,7 +33,7 @@ constexpr double kSigmaOfWoods = 0.7;
 /// Of the axes of two trunks at breast height [m].
 double distanceBetween(const Trunk &a, const Trunk &b);
 
-/// What a map keeps of its hypotheses; of the rest it keeps a record.
+/// Which hypotheses the map keeps whole; of the others it keeps a record.
 enum class Memory
 {
   all,       ///< they are judged again at the end of the flight
@@ -55,11 +55,11 @@ struct MapOptions
   double turning_evenness = 0.35;  ///< what must speak for a trunk where the camera has only turned and no parallax
                                    ///< does: how evenly its borders run along their length, 0 to 1,
   double turning_contrast = 0.008; ///< and the mean of the weaker one [full scale/px], 0 to 0.5
-  int doubt_observations = 8;      ///< views before a trunk may be given up for its evidence, 3 to 1000
-  double doubt_candidate = -3;     ///< log odds below which a candidate is given up, -50 to 0
-  double doubt_confirmed = -1.5;   ///< log odds below which a confirmed trunk is, -50 to 0
-  double doubt_rival = 1.5;        ///< log odds by which another candidate for the same place must be better for one
-                                   ///< to be given up, 0 to 50
+  int reject_observations = 8;     ///< views before a trunk may be rejected for its log-odds, 3 to 1000
+  double reject_candidate = -3;    ///< log-odds below which a candidate is rejected, -50 to 0
+  double reject_confirmed = -1.5;  ///< log-odds below which a confirmed trunk is rejected, -50 to 0
+  double reject_rival = 1.5;       ///< log odds by which another candidate for the same place must be better for one
+                                   ///< to be rejected, 0 to 50
   double near_range = 5.5;         ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
   double through_range = 9;        ///< whether points behind a trunk are seen through it is asked nearer than this
                                    ///< [m], 0 (never) to 100
@@ -91,7 +91,7 @@ struct MapTrunk
   int id = 0;
   std::size_t smoother_id = 0;
   TrunkStatus status = TrunkStatus::candidate;
-  TrunkFate fate = TrunkFate::undecided;
+  RejectReason reject_reason = RejectReason::undecided;
   Trunk trunk; ///< as the smoother has it now
   Matrix5d covariance = Matrix5d::Identity();
   Eigen::Matrix2d place_covariance = Eigen::Matrix2d::Identity(); ///< as the pose that saw it last has it [m^2]
@@ -99,7 +99,7 @@ struct MapTrunk
   std::optional<Eigen::Vector3d> seen_from;                       ///< the camera's place at its last view [m]
   int flipped_in_a_row = 0; ///< frames in which its borders had the other sign where they were expected
   int hits = 0, misses = 0, misses_in_a_row = 0; ///< in frames after the one in which it was found
-  int found_again = 0;                           ///< times the detector came to the same hypothesis later
+  int redetections = 0;                          ///< times the detector came to the same hypothesis later
   double contrast = 0;                           ///< running mean of the weaker border's
   double evenness = 0;                           ///< running mean of TrunkView::evenness
   double first_seen_s = 0, last_seen_s = 0;
@@ -109,27 +109,27 @@ struct MapTrunk
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
   int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
-  double column_odds = 0;               ///< log-odds by the columns of the last frames,
-  int column_views = 0;                 ///< and in how many of them it was compared
+  double consistency_odds = 0;          ///< log-odds by the columns of the last frames,
+  int consistency_views = 0;            ///< and in how many of them it was compared
   bool is_silhouette = false;           ///< the background was seen beside both its borders
-  std::optional<double> final_odds;     ///< log-odds by all frames, where they were judged: see TrunkMap::decide()
-  bool removed = false;                 ///< out of the smoother
-  bool inactive = false;                ///< a candidate that is not looked for any more
+  std::optional<double> final_odds; ///< log-odds by all frames, where they were judged: see TrunkMap::applyDecisions()
+  bool removed = false;             ///< out of the smoother
+  bool inactive = false;            ///< a candidate that is not looked for any more
 
   /// By how much the bearing of a border changed [rad]: sideways motion moves both, approach moves them apart.
   double parallax() const { return std::max(left.high - left.low, right.high - right.low); }
   double placeSigma() const { return std::sqrt(place_covariance.trace()); } ///< [m]
-  /// Of the axis at the height \p z [m], the log radius and the lean.
+  /// Covariance of the axis at the height \p z [m], the log radius and the lean.
   Matrix5d covarianceAt(double z) const;
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
-  double lookedThrough() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
+  double seeThroughRatio() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
   /// Whether points are seen through it in every second frame, as between two trunks: a track that slipped from the
   /// border of a dark trunk is seen behind it for some frames only.
   bool isGap() const { return 2 * points_behind > hits + misses; }
 };
 
 /// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.
-void blendContrast(std::optional<double> &mean, double now);
+void updateMeanContrast(std::optional<double> &mean, double now);
 
 /// What one view of a trunk adds to its history.
 struct TrunkView
@@ -145,7 +145,7 @@ struct TrunkView
 };
 
 /// What one frame shows of a known trunk that was looked for.
-struct Sighting
+struct TrunkMeasurement
 {
   enum class Kind
   {
@@ -169,15 +169,15 @@ struct PointCount
 };
 
 /// Views compared before columns decide.
-inline constexpr int kColumnViews = 12;
+inline constexpr int kConsistencyViews = 12;
 
-/// What the columns of the frames since a trunk was found say of it.
-struct ColumnOdds
+/// The score of a trunk by photo-consistency over the frames since it was detected.
+struct ConsistencyScore
 {
   int id = 0;
-  double log_odds = 0;     ///< that it is a trunk
-  int views = 0;           ///< of both
-  double least_beside = 0; ///< ColumnEvidence::leastBeside(): above 0 the background stands beside both borders
+  double log_odds = 0;        ///< that it is a trunk
+  int views = 0;              ///< of both
+  double weakest_outside = 0; ///< PhotoConsistency::weakestOutside(): above 0 the background stands beside both borders
 };
 
 /// What the detector found, with the views that it was seen in.
@@ -200,7 +200,7 @@ struct TrunkEstimate
   std::optional<Eigen::Matrix2d> place_covariance = std::nullopt; ///< and as the pose that saw it last has it
 };
 
-/// A hypothesis in the light of the whole flight.
+/// The decision of the final pass on one hypothesis.
 struct TrunkDecision
 {
   int id = 0;
@@ -227,22 +227,23 @@ struct MapUpdate
   std::vector<MapChange> changes;
   std::vector<Merge> merged;        ///< ids of the smoother: the views of the one become the other's
   std::vector<std::size_t> removed; ///< ids of the smoother: to be forgotten with all their views
-  std::vector<int> buried;          ///< ids of which the map keeps a record alone from now on
+  std::vector<int> archived;        ///< ids of the archived ones, of which the map keeps a record alone
 };
 
-/// What the map keeps of a hypothesis that it has given up: its line in hypotheses.csv, in single precision.
-struct GivenUp
+/// The record of an archived hypothesis: its line in hypotheses.csv, in single precision.
+struct ArchivedTrunk
 {
   int id = 0, observations = 0;
   TrunkStatus status = TrunkStatus::lost;
-  TrunkFate fate = TrunkFate::none;
+  RejectReason reject_reason = RejectReason::none;
   float log_odds = 0;
   std::array<float, 5> trunk{};       ///< x, y, log r, lean x, lean y
   std::array<float, 15> covariance{}; ///< lower triangle, column by column
   double first_seen_s = 0, last_seen_s = 0;
 };
 
-/// Writes every field of its trunks; sightings, points and estimates come in, a MapUpdate goes out.
+/// The map: the only one to write the fields of its trunks. Measurements, point counts and estimates come in, a
+/// MapUpdate goes out.
 class TrunkMap
 {
 public:
@@ -253,7 +254,7 @@ public:
   /// Options with lengths in another unit.
   void setOptions(const MapOptions &options);
 
-  /// By their ids, without those of which the map keeps a record alone.
+  /// All hypotheses by their ids, without the archived ones.
   const std::vector<MapTrunk> &trunks() const { return m_trunks; }
   /// One of trunks().
   const MapTrunk &trunk(int id) const { return m_trunks[place(id)]; }
@@ -268,16 +269,16 @@ public:
   int add(const NewTrunk &found);
   /// Whether a candidate or a confirmed trunk stands where \p found does, so that it is not to be added; one of the
   /// same place and radius counts as found again.
-  bool recognise(const Trunk &found);
-  void record(const Sighting &sighting);
+  bool associate(const Trunk &found);
+  void record(const TrunkMeasurement &measurement);
   void record(const PointCount &points);
-  void record(const ColumnOdds &odds);
-  /// Another reading of the lines of \p id takes its place: what was seen between the former borders is forgotten.
-  /// Returns what the smoother is to forget.
-  std::size_t readAgain(int id, const NewTrunk &reading);
+  void record(const ConsistencyScore &odds);
+  /// Replaces the trunk \p id by another hypothesis for its lines and forgets what was measured between the former
+  /// borders. Returns the id of the former one in the smoother, to be removed there.
+  std::size_t replaceHypothesis(int id, const NewTrunk &hypothesis);
   void refresh(const TrunkEstimate &estimate);
-  /// From the next review() on a confirmed trunk counts as lost from sight.
-  void loseSight(int id);
+  /// Marks a confirmed trunk as missed for long, so that the next review() counts it as lost from sight.
+  void markOutOfSight(int id);
 
   /// Promotes, loses and merges by what is known at \p now_s. Candidates that were not seen for long become inactive:
   /// they keep their views and their place in records(), but those of which nothing was ever seen are removed, since a
@@ -288,11 +289,11 @@ public:
   MapUpdate reviewAll(bool has_ranges = true);
   /// The same map in which \p ids are the confirmed trunks, and what else was is none.
   TrunkMap withTrunks(const std::vector<int> &ids) const;
-  /// The last word: those decided on are the trunks of the map, with their new views. Returns what the smoother is to
-  /// forget: nothing else stays in it.
-  std::vector<std::size_t> decide(const std::vector<TrunkDecision> &decisions);
-  /// Gives up all that is active: their ranges were guesses.
-  MapUpdate forgetUnranged();
+  /// Makes the trunks of \p decisions those of the map, with their new views, and removes all others. Returns the ids
+  /// that the smoother is to remove.
+  std::vector<std::size_t> applyDecisions(const std::vector<TrunkDecision> &decisions);
+  /// Removes all active trunks: their ranges were guesses, made before the camera had moved.
+  MapUpdate removeUnranged();
 
   /// Log-odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
   /// often it was missed, how it moved against the background, whether points behind it were seen through it, its
@@ -314,26 +315,26 @@ public:
 private:
   std::size_t place(int id) const;
   MapTrunk &at(int id) { return m_trunks[place(id)]; }
-  void bury(MapUpdate &update, double now_s);
+  void archive(MapUpdate &update, double now_s);
   TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double breast_z, bool has_ranges = true) const;
-  bool isDisproved(const MapTrunk &trunk, bool has_ranges) const;
+  bool isRejected(const MapTrunk &trunk, bool has_ranges) const;
   bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;
-  double advantage(const MapTrunk &trunk, const MapTrunk &rival) const;
+  double logOddsGain(const MapTrunk &trunk, const MapTrunk &rival) const;
   bool hasBetterRival(const MapTrunk &trunk, double margin) const;
   MapTrunk *chooseRedundant(MapTrunk &a, MapTrunk &b) const;
   void addView(MapTrunk &trunk, const TrunkView &view) const;
-  void reviewEach(MapUpdate &update, bool has_ranges);
-  void reviewPairs(MapUpdate &update, double now_s);
-  void reviewPlaces(MapUpdate &update, double now_s);
-  void joinVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone);
+  void updateStatuses(MapUpdate &update, bool has_ranges);
+  void mergeDuplicates(MapUpdate &update, double now_s);
+  void closeLoops(MapUpdate &update, double now_s);
+  void mergeVisits(MapUpdate &update, MapTrunk &keep, MapTrunk &gone);
   void deactivate(MapUpdate &update, double now_s);
-  void keepActive();
-  void learnRadii();
+  void indexActive();
+  void estimateRadii();
 
   MapOptions m_options;
   std::vector<MapTrunk> m_trunks; ///< by id
-  std::deque<GivenUp> m_given_up;
+  std::deque<ArchivedTrunk> m_archive;
   int m_next_id = 0;
   std::vector<std::size_t> m_active;
   LogNormal m_radii;

@@ -44,7 +44,8 @@ std::vector<RowOf<kShares>> rowsOfShares(const GyroPath &path, const std::vector
   return rows;
 }
 
-/// The bias and what \p open holds, the others as they are stated; the cost counts what each is off that.
+/// Fits the bias and the relations in \p open, the others being as they are stated; the cost counts how far each is
+/// from that.
 FittedOf<kShares> fitShares(const std::vector<RowOf<kShares>> &rows, const std::vector<Relation> &open, double scatter)
 {
   Eigen::Matrix<double, kShares, 1> prior;

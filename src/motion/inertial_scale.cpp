@@ -84,7 +84,7 @@ bool InertialScale::collect(const Frame &frame)
   return !m_samples.empty();
 }
 
-/// What moves is forgotten; what is constant stays.
+/// Resets the states of motion and keeps the constants.
 void InertialScale::restart(const Frame &frame)
 {
   m_started = false;
@@ -196,7 +196,7 @@ void InertialScale::update(const Eigen::MatrixXd &H, const Eigen::VectorXd &resi
   m_log_scale += change(kScale);
 }
 
-/// Where is up, by the odometry's roll and pitch?
+/// Kalman update by the odometry's roll and pitch: where up is.
 void InertialScale::compareTilt(const Pose &wMb)
 {
   const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ(), measured = wMb.R.transpose() * Vector3d::UnitZ();
@@ -206,7 +206,7 @@ void InertialScale::compareTilt(const Pose &wMb)
   update(H, rows * (measured - up), std::pow(accelerometer::kTiltSigma, 2) * Eigen::Matrix2d::Identity());
 }
 
-/// The displacement by the odometry, in the heading of this filter: its horizontal part has the scale.
+/// Kalman update by the displacement of the odometry in the heading of this filter: its horizontal part has the scale.
 void InertialScale::compareOdometry(const Pose &wMb, double duration)
 {
   const Vector3d in_body = wMb.R.transpose() * (wMb.t - m_anchor->wMb->t);

@@ -99,7 +99,7 @@ public:
   double logLikelihood() const { return m_log_likelihood; }
   int compared() const { return m_compared; }
 
-  /// What moves is forgotten; what is constant stays. The velocity is that of the path from \p before, loosely.
+  /// Resets the states of motion and keeps the constants. The velocity is that of the path from \p before, loosely.
   void start(const Pose &before, const Pose &now, const Step &step)
   {
     constexpr double kTilt = 0.02; // of the path [rad]
@@ -150,7 +150,7 @@ public:
     m_wRb = orthonormalized(m_wRb * turn);
   }
 
-  /// Where is up, by the pose filter?
+  /// Kalman update by the pose filter's roll and pitch: where up is.
   void compareTilt(const Vector3d &measured)
   {
     const Vector3d up = m_wRb.transpose() * Vector3d::UnitZ(), left = up.unitOrthogonal();
@@ -161,7 +161,7 @@ public:
     }
   }
 
-  /// The place on the path, and its heading.
+  /// Kalman update by the place on the path and its heading.
   void comparePath(const Pose &wMb)
   {
     for (int axis = 0; axis < 3; ++axis) {
@@ -209,7 +209,7 @@ private:
   States m_covariance = States::Zero();
 };
 
-/// Of a path of this scale; nothing where it was compared nowhere.
+/// Log-likelihood of the path at one scale; nothing where it was compared nowhere.
 std::optional<double> PathScale::logLikelihood(const std::vector<Pose> &path, double log_scale) const
 {
   Filter filter(m_gyro, m_walk, log_scale);

@@ -42,7 +42,7 @@ struct Landmark
   int misses = 0; ///< windows in which most of its observations were rejected
 };
 
-/// A frame as it hangs on its key frame.
+/// The pose of a frame relative to its key frame.
 struct Record
 {
   std::size_t key = 0; ///< frame index of the key frame
@@ -204,7 +204,8 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
   return result;
 }
 
-/// A turn that the last motion does not announce: from too far off the robust adjustment takes all for outliers.
+/// Predicts a turn that the last motion does not announce: started too far off, the robust adjustment would take all
+/// points for outliers.
 void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
 {
   constexpr double kSurprise = 2 * kDegree;
@@ -409,8 +410,7 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     common += seen.count(id) > 0;
   result.points = known();
   if (common < kPlacingPoints) {
-    // Nothing to hold on to: the map ends here and a new one begins, its unit the old one by the
-    // held velocity.
+    // No point of known depth is left: the map ends here and a new one begins, whose unit comes from the last velocity.
     result.status = PointOdometryStatus::lost;
     result.covariance.diagonal() << Eigen::Vector3d::Constant(kHeldSigma * kHeldSigma),
         Eigen::Vector3d::Constant(turned_known ? 1e-6 : 1e-2);

@@ -49,7 +49,7 @@ Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late
   return solve(rows, kWideBias * kWideBias, scatter);
 }
 
-/// What is left of the frames once the constants are taken out.
+/// The frames with the constants taken out.
 std::vector<Frame> corrected(const std::vector<Frame> &frames, const SensorCalibration &calibration)
 {
   constexpr std::int64_t kMostOdometryGap_ns = 1'000'000'000;
@@ -83,7 +83,7 @@ std::vector<GyroSample> samplesOf(const std::vector<Frame> &frames)
   return samples;
 }
 
-/// The estimation itself.
+/// Estimates the constants, one after the other.
 class Estimation
 {
 public:
@@ -139,7 +139,7 @@ private:
   void addGravity(const std::vector<Frame> &frames, std::vector<Row> &rows) const;
   void addTurns(const std::vector<Frame> &frames, const GyroPath &path, double late_s, std::vector<Row> &rows) const;
 
-  void tell(const char *name, double value, double sigma, bool used, std::string text)
+  void addConstant(const char *name, double value, double sigma, bool used, std::string text)
   {
     m_result.constants.push_back({name, value, sigma, used, std::move(text)});
   }
@@ -192,16 +192,16 @@ void Estimation::calibrateGyro()
     return;
   const bool is_late = late.is_inside && late.gain > kBetter && std::abs(late.late_s) > kLeastLate_s;
   if (late.is_inside)
-    tell("gyro_late_s", late.late_s, late.sigma_s, is_late,
-         fmt::format("gyro: clock {:.0f} +- {:.0f} ms {}", 1e3 * std::abs(late.late_s), std::ceil(1e3 * late.sigma_s),
-                     late.late_s > 0 ? "late" : "early"));
+    addConstant("gyro_late_s", late.late_s, late.sigma_s, is_late,
+                fmt::format("gyro: clock {:.0f} +- {:.0f} ms {}", 1e3 * std::abs(late.late_s),
+                            std::ceil(1e3 * late.sigma_s), late.late_s > 0 ? "late" : "early"));
   if (is_late)
     m_result.gyro_late_s = late.late_s;
   const Matrix3d expected = fit.covariance + std::pow(m_gyro.bias_sigma, 2) * Matrix3d::Identity();
   const bool is_biased = bias.dot(expected.ldlt().solve(bias)) > kBetter;
   const double sigma = std::sqrt(fit.covariance.trace() / 3);
-  tell("gyro_bias", bias.norm(), sigma, is_biased,
-       fmt::format("gyro: bias {:.3f} +- {:.3f} rad/s", bias.norm(), sigma));
+  addConstant("gyro_bias", bias.norm(), sigma, is_biased,
+              fmt::format("gyro: bias {:.3f} +- {:.3f} rad/s", bias.norm(), sigma));
   if (is_biased)
     m_result.gyro_bias = bias;
 }
@@ -328,10 +328,10 @@ void Estimation::calibrateRotation()
   const Matrix3d expected = fit.covariance + kMount * kMount * Matrix3d::Identity();
   const bool is_turned = rotation.dot(expected.ldlt().solve(rotation)) > kBetter;
   const double sigma = std::sqrt(fit.covariance.trace() / 3);
-  tell("odometry_rotation", rotation.norm(), sigma, is_turned,
-       fmt::format("odometry: body turned by {:.1f} +- {:.1f} degrees (roll {:.1f}, pitch {:.1f}, yaw {:.1f})",
-                   rotation.norm() / kDegree, sigma / kDegree, rotation.x() / kDegree, rotation.y() / kDegree,
-                   rotation.z() / kDegree));
+  addConstant("odometry_rotation", rotation.norm(), sigma, is_turned,
+              fmt::format("odometry: body turned by {:.1f} +- {:.1f} degrees (roll {:.1f}, pitch {:.1f}, yaw {:.1f})",
+                          rotation.norm() / kDegree, sigma / kDegree, rotation.x() / kDegree, rotation.y() / kDegree,
+                          rotation.z() / kDegree));
   if (!is_turned)
     return;
   m_result.bRo = bRo;
@@ -373,9 +373,10 @@ void Estimation::calibrateOdometryClock()
       m_result.gyro_late_s != 0 && cost(0) - with_gyro > kSameClock && with_gyro - least < kNoWorse;
   const double late_s = shares_clock ? m_result.gyro_late_s : late.late_s;
   const bool is_late = shares_clock || (late.gain > kBetter && std::abs(late.late_s) > kLeastLate_s);
-  tell("odometry_late_s", late_s, late.sigma_s, is_late,
-       fmt::format("odometry: clock {:.0f} +- {:.0f} ms {}{}", 1e3 * std::abs(late_s), std::ceil(1e3 * late.sigma_s),
-                   late_s > 0 ? "late" : "early", shares_clock ? ", as the gyro's" : ""));
+  addConstant("odometry_late_s", late_s, late.sigma_s, is_late,
+              fmt::format("odometry: clock {:.0f} +- {:.0f} ms {}{}", 1e3 * std::abs(late_s),
+                          std::ceil(1e3 * late.sigma_s), late_s > 0 ? "late" : "early",
+                          shares_clock ? ", as the gyro's" : ""));
   if (is_late)
     m_result.odometry_late_s = late_s;
 }
@@ -393,7 +394,7 @@ template <typename Take> void Estimation::replay(const Take &take) const
   }
 }
 
-/// A sensor that contradicts the others from the start on, and for which no constant helps.
+/// Reports a sensor that contradicts the others from the start on and that no constant explains.
 void Estimation::judge()
 {
   constexpr double kAtOnce_s = 1.5;
@@ -419,8 +420,8 @@ void Estimation::calibrateScale()
     return std::exp(-0.5 * measured->mean * measured->mean / variance) / std::sqrt(variance);
   };
   const bool is_scaled = kWidePart * density(kWideScale) > (1 - kWidePart) * density(kScale);
-  tell("odometry_scale", std::exp(measured->mean), measured->sigma, is_scaled,
-       fmt::format("odometry: scale {:.3f} +- {:.3f}", std::exp(measured->mean), measured->sigma));
+  addConstant("odometry_scale", std::exp(measured->mean), measured->sigma, is_scaled,
+              fmt::format("odometry: scale {:.3f} +- {:.3f}", std::exp(measured->mean), measured->sigma));
   if (!is_scaled)
     return;
   m_result.odometry_scale = std::exp(measured->mean);

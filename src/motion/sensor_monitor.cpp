@@ -26,17 +26,17 @@ double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &c
   const Vector3d error = logSo3(orthonormalized(aRb.transpose() * aRb_other));
   return error.dot(covariance.ldlt().solve(error));
 }
-/// \p frame with what is believed of it: itself, or \p room.
-const Frame &only(const Frame &frame, bool gyro, bool odometry, Frame &room)
+/// \p frame without its rejected sensors: itself, or a copy in \p scratch.
+const Frame &withSensors(const Frame &frame, bool gyro, bool odometry, Frame &scratch)
 {
   if (gyro && odometry)
     return frame;
-  room = frame;
+  scratch = frame;
   if (!gyro)
-    room.gyro.clear();
+    scratch.gyro.clear();
   if (!odometry)
-    room.wMb_odometry.reset();
-  return room;
+    scratch.wMb_odometry.reset();
+  return scratch;
 }
 } // namespace
 
@@ -52,7 +52,7 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
 {
   std::fill(std::begin(m_wrong_now), std::end(m_wrong_now), false);
   const Turns turns = turnsTo(frame);
-  if (const auto wrong = impossible(turns))
+  if (const auto wrong = implausibleSensor(turns))
     m_wrong_now[static_cast<int>(*wrong)] = true;
   collect(frame);
   checkGyroSamples(frame);
@@ -60,11 +60,11 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
   for (const RelativeMotion &motion : motions)
     if (motion.points.hasRotation())
       compare(frame, motion);
-  judgeFrame(frame);
+  rejectOutvoted(frame);
   checkRotations();
   checkStamps();
-  checkReturn(Sensor::gyro);
-  checkReturn(Sensor::odometry);
+  checkRecovery(Sensor::gyro);
+  checkRecovery(Sensor::odometry);
   checkDirection();
   checkTilt(frame);
   if (turns.gyro && trustsNow(Sensor::gyro))
@@ -88,9 +88,10 @@ SensorMonitor::Turns SensorMonitor::turnsTo(const Frame &frame) const
   return turns;
 }
 
-/// Of gyro and odometry the one whose turn is the farther from how the body turned until then, where they differ so
-/// much that one of them would put all points elsewhere. A gyro alone is wrong where no body begins to turn so fast.
-std::optional<Sensor> SensorMonitor::impossible(const Turns &turns) const
+/// The sensor whose rotation is implausible. Where gyro and odometry differ so much that one of them would predict all
+/// points elsewhere, it is the one farther from how the body turned until then; a gyro alone is implausible where no
+/// body begins to turn so fast.
+std::optional<Sensor> SensorMonitor::implausibleSensor(const Turns &turns) const
 {
   constexpr double kApart = 0.3, kDrift = 0.1; // [rad], forty times what they err by; [rad/s]
   constexpr double kAcceleration = 100;        // [rad/s^2]: of a racing drone
@@ -105,16 +106,16 @@ std::optional<Sensor> SensorMonitor::impossible(const Turns &turns) const
   return off > (*turns.odometry - expected).norm() ? Sensor::gyro : Sensor::odometry;
 }
 
-const Frame &SensorMonitor::withoutLiars(const Frame &frame, Frame &room) const
+const Frame &SensorMonitor::withoutRejectedSensors(const Frame &frame, Frame &scratch) const
 {
-  const std::optional<Sensor> wrong = impossible(turnsTo(frame));
-  return only(frame, trusts(Sensor::gyro) && wrong != Sensor::gyro,
-              trusts(Sensor::odometry) && wrong != Sensor::odometry, room);
+  const std::optional<Sensor> wrong = implausibleSensor(turnsTo(frame));
+  return withSensors(frame, trusts(Sensor::gyro) && wrong != Sensor::gyro,
+                     trusts(Sensor::odometry) && wrong != Sensor::odometry, scratch);
 }
 
-const Frame &SensorMonitor::trusted(const Frame &frame, Frame &room) const
+const Frame &SensorMonitor::trusted(const Frame &frame, Frame &scratch) const
 {
-  return only(frame, trustsNow(Sensor::gyro), trustsNow(Sensor::odometry), room);
+  return withSensors(frame, trustsNow(Sensor::gyro), trustsNow(Sensor::odometry), scratch);
 }
 
 void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts)
@@ -124,7 +125,7 @@ void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const
     return;
   m_distrusted[s] = lasts != Lasts::no;
   if (lasts == Lasts::until_agree)
-    m_may_return[s] = m_verdicts.size();
+    m_may_recover[s] = m_verdicts.size();
   m_verdicts.push_back({toString(sensor), kind, since_s, text});
 }
 
@@ -145,14 +146,15 @@ bool SensorMonitor::hasGyroAgreedInTurns() const
   return m_comparisons.front().a_ns <= from_ns && turned.minCoeff() > kTurned;
 }
 
-/// A sensor that was silent or stuck agrees with the points again, or a gyro that contradicted them for a moment.
-void SensorMonitor::checkReturn(Sensor sensor)
+/// Ends the verdict on a sensor that was silent or stuck, or on a gyro that contradicted the points for a moment, once
+/// it agrees with the points again.
+void SensorMonitor::checkRecovery(Sensor sensor)
 {
   const int s = static_cast<int>(sensor);
   const auto window = static_cast<std::size_t>(m_options.window);
-  if (!has(sensor) || !m_may_return[s] || m_comparisons.size() < window)
+  if (!isDistrusted(sensor) || !m_may_recover[s] || m_comparisons.size() < window)
     return;
-  const std::string &kind = m_verdicts[*m_may_return[s]].kind;
+  const std::string &kind = m_verdicts[*m_may_recover[s]].kind;
   if (kind != "ended" && kind != "stuck" && !hasGyroAgreedInTurns())
     return;
   const bool is_gyro = sensor == Sensor::gyro;
@@ -170,14 +172,14 @@ void SensorMonitor::checkReturn(Sensor sensor)
   while (is_gyro && m_comparisons.front().b_ns <= agreed_ns) // what was before is judged
     m_comparisons.pop_front();
   m_distrusted[s] = false;
-  m_verdicts[*m_may_return[s]].text += fmt::format(" until {:.1f} s", secondsOf(back_ns));
-  m_may_return[s].reset();
+  m_verdicts[*m_may_recover[s]].text += fmt::format(" until {:.1f} s", secondsOf(back_ns));
+  m_may_recover[s].reset();
 }
 
-/// A sensor that two others contradict in this frame has no say in it.
-void SensorMonitor::judgeFrame(const Frame &frame)
+/// Rejects a sensor in this frame that two others contradict.
+void SensorMonitor::rejectOutvoted(const Frame &frame)
 {
-  const bool points_err = oddsOfPoints() > m_options.limit_odds;
+  const bool points_err = logOddsOfPoints() > m_options.limit_odds;
   for (auto c = m_comparisons.rbegin(); c != m_comparisons.rend() && c->b_ns == frame.stamp_ns; ++c) {
     if (!c->gyro || !c->odometry || !trusts(Sensor::odometry) || c->gyro_points <= m_options.limit_points)
       continue;
@@ -273,7 +275,7 @@ void SensorMonitor::checkStamps()
           Lasts::until_agree);
 }
 
-/// A gyro that repeats its value or says nothing more.
+/// Checks for a gyro that repeats its value or has no more samples.
 void SensorMonitor::checkGyroSamples(const Frame &frame)
 {
   const GyroSample *before = nullptr;
@@ -343,7 +345,7 @@ std::deque<SensorMonitor::Comparison>::const_iterator SensorMonitor::windowBegin
 
 /// Log-likelihood ratio that the points err and not the gyro, by all of the window where these two differ: 0 without an
 /// odometry that is trusted.
-double SensorMonitor::oddsOfPoints() const
+double SensorMonitor::logOddsOfPoints() const
 {
   if (!trusts(Sensor::odometry))
     return 0;
@@ -354,7 +356,7 @@ double SensorMonitor::oddsOfPoints() const
   return ratio;
 }
 
-/// The sensor that stands in all failing pairs.
+/// Raises a verdict on the sensor that is in all failing pairs.
 void SensorMonitor::checkRotations()
 {
   if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
@@ -369,20 +371,20 @@ void SensorMonitor::checkRotations()
       since_s = std::min(since_s, secondsOf(c->a_ns));
   }
   const int enough = m_options.of_window;
-  const bool gyro_failed = gyro_points >= enough && !has(Sensor::gyro);
-  const bool odometry_failed = odometry_points >= enough && !has(Sensor::odometry);
+  const bool gyro_failed = gyro_points >= enough && !isDistrusted(Sensor::gyro);
+  const bool odometry_failed = odometry_points >= enough && !isDistrusted(Sensor::odometry);
   if (gyro_failed && odometry_points * 2 >= gyro_points && odometry_points > 0 && gyro_odometry == 0)
     raise(Sensor::images, "rotation", since_s,
           fmt::format("images: contradict gyro and odometry since {:.1f} s (late, skewed or of another camera)",
                       since_s));
-  else if (gyro_failed && oddsOfPoints() < m_options.limit_odds && !has(Sensor::images)) {
+  else if (gyro_failed && logOddsOfPoints() < m_options.limit_odds && !isDistrusted(Sensor::images)) {
     raise(Sensor::gyro, "rotation", since_s,
           fmt::format("gyro: contradicts the points {}since {:.1f} s", gyro_odometry > 0 ? "and the odometry " : "",
                       since_s),
           Lasts::until_agree);
-    nameGyro();
+    diagnoseGyro();
   }
-  else if (odometry_failed && gyro_points == 0 && !has(Sensor::images))
+  else if (odometry_failed && gyro_points == 0 && !isDistrusted(Sensor::images))
     raise(Sensor::odometry, "rotation", since_s,
           fmt::format("odometry: its rotation contradicts the points since {:.1f} s", since_s));
 }
@@ -418,8 +420,8 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
   return total / (3 * double(errors.size()));
 }
 
-/// What is wrong with the gyro: a constant bias, another clock, or something else.
-void SensorMonitor::nameGyro()
+/// Diagnoses a gyro that contradicts the others: a constant bias, a clock offset, or something else.
+void SensorMonitor::diagnoseGyro()
 {
   SensorVerdict &verdict = m_verdicts.back();
   if (verdict.sensor != toString(Sensor::gyro))

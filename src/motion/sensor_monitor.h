@@ -77,15 +77,15 @@ public:
 
   /// All that was found so far, in the order of time; a text may become more exact.
   const std::vector<SensorVerdict> &verdicts() const { return m_verdicts; }
-  /// Whether a sensor has a verdict that lasts.
+  /// False while a lasting verdict stands against a sensor.
   bool trusts(Sensor sensor) const { return !m_distrusted[static_cast<int>(sensor)]; }
   /// Whether what a sensor says of the motion to the newest frame may be used.
   bool trustsNow(Sensor sensor) const { return trusts(sensor) && !m_wrong_now[static_cast<int>(sensor)]; }
-  /// \p frame without the sensors whose verdict lasts or that tell a turn which cannot be: for a frame that is yet to
-  /// be processed.
-  const Frame &withoutLiars(const Frame &frame, Frame &room) const;
-  /// The frame processed last, without what is not trusted in it.
-  const Frame &trusted(const Frame &frame, Frame &room) const;
+  /// \p frame, which is yet to be processed, without the sensors whose verdict lasts or whose rotation is implausible:
+  /// itself, or a copy in \p scratch.
+  const Frame &withoutRejectedSensors(const Frame &frame, Frame &scratch) const;
+  /// The frame processed last without its rejected sensors: itself, or a copy in \p scratch.
+  const Frame &trusted(const Frame &frame, Frame &scratch) const;
 
 private:
   struct Comparison ///< of the rotations over one interval
@@ -119,7 +119,7 @@ private:
     double dt = 0; ///< [s]
   };
   Turns turnsTo(const Frame &frame) const;
-  std::optional<Sensor> impossible(const Turns &turns) const;
+  std::optional<Sensor> implausibleSensor(const Turns &turns) const;
   void collect(const Frame &frame);
   void compare(const Frame &frame, const RelativeMotion &motion);
   void checkGyroSamples(const Frame &frame);
@@ -128,16 +128,16 @@ private:
   void raiseJump(double extent, double time_s);
   void checkStandingStill(double time_s);
   void checkScatter();
-  void judgeFrame(const Frame &frame);
+  void rejectOutvoted(const Frame &frame);
   void checkRotations();
   std::deque<Comparison>::const_iterator windowBegin() const;
-  double oddsOfPoints() const;
+  double logOddsOfPoints() const;
   bool hasGyroAgreedInTurns() const;
-  void checkReturn(Sensor sensor);
+  void checkRecovery(Sensor sensor);
   void checkStamps();
   void checkDirection();
   void checkTilt(const Frame &frame);
-  void nameGyro();
+  void diagnoseGyro();
   std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
   Eigen::Vector3d rateAt(std::int64_t stamp_ns) const;
   std::optional<Eigen::Matrix3d> gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const;
@@ -148,7 +148,7 @@ private:
     yes
   };
   void raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts = Lasts::yes);
-  bool has(Sensor sensor) const { return m_distrusted[static_cast<int>(sensor)]; }
+  bool isDistrusted(Sensor sensor) const { return m_distrusted[static_cast<int>(sensor)]; }
 
   Pose m_bMc;
   SensorMonitorOptions m_options;
@@ -162,7 +162,7 @@ private:
   bool m_had_gyro = false, m_had_odometry = false;
   std::vector<SensorVerdict> m_verdicts;
   bool m_distrusted[3] = {false, false, false};
-  bool m_wrong_now[3] = {false, false, false};               ///< in the newest frame
-  std::optional<std::size_t> m_may_return[3] = {{}, {}, {}}; ///< number of the verdict that an agreement ends
+  bool m_wrong_now[3] = {false, false, false};                ///< in the newest frame
+  std::optional<std::size_t> m_may_recover[3] = {{}, {}, {}}; ///< number of the verdict that an agreement ends
 };
 } // namespace bole

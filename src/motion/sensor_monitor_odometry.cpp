@@ -13,7 +13,7 @@ namespace bole
 {
 using Eigen::Vector3d;
 
-/// The odometry from frame to frame.
+/// Checks the steps of the odometry from frame to frame.
 void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
   const double time_s = secondsOf(frame.stamp_ns);
@@ -65,7 +65,7 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
   checkScatter();
 }
 
-/// Where the flight begins: trunks are looked for from the ground on, z = 0.
+/// Checks the height at which the flight begins: trunks are looked for above the ground, z = 0.
 void SensorMonitor::checkHeight(double height, double time_s)
 {
   if (height < m_options.height_low || height > m_options.height_high)
@@ -86,7 +86,7 @@ void SensorMonitor::raiseJump(double extent, double time_s)
     raise(Sensor::odometry, "noise", secondsOf(first->stamp_ns), "odometry: jumps again and again");
 }
 
-/// An odometry that stays where it is while the points move.
+/// Checks for an odometry that stays where it is while the points move.
 void SensorMonitor::checkStandingStill(double time_s)
 {
   double since_s = time_s;
@@ -104,7 +104,7 @@ void SensorMonitor::checkStandingStill(double time_s)
           Lasts::until_agree);
 }
 
-/// White noise on the positions, by the change from step to step.
+/// Checks the positions of the odometry for white noise, by the change from step to step.
 void SensorMonitor::checkScatter()
 {
   constexpr std::size_t kLeast = 12; // steps
@@ -121,7 +121,7 @@ void SensorMonitor::checkScatter()
           "odometry: its positions scatter from frame to frame");
 }
 
-/// A constant rotation between the direction of the odometry and that of the points.
+/// Checks for a constant rotation between the direction of flight by the odometry and by the points.
 void SensorMonitor::checkDirection()
 {
   constexpr std::size_t kLeast = 24; // comparisons

@@ -98,7 +98,7 @@ void writeHypotheses(const std::string &path, const std::vector<TrunkRecord> &ma
     if (trunk.status == TrunkStatus::confirmed)
       continue;
     addRow(text, trunk);
-    fmt::format_to(std::back_inserter(text), ",{}\n", toString(trunk.fate));
+    fmt::format_to(std::back_inserter(text), ",{}\n", toString(trunk.reject_reason));
   }
   writeAtomically(path, text);
 }
@@ -111,7 +111,7 @@ std::vector<TrunkRecord> readTrunks(const std::string &path)
   while (csv.next()) {
     trunks.push_back(readRow(csv));
     if (has_fate)
-      trunks.back().fate = csv.named(kColumns, "fate", TrunkFate::unranged);
+      trunks.back().reject_reason = csv.named(kColumns, "fate", RejectReason::unranged);
   }
   return trunks;
 }

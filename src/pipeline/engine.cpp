@@ -47,8 +47,9 @@ std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
   return SaliencyField{std::move(saliency->p_background), std::move(saliency->confidence), saliency->unknown_below};
 }
 
-/// Found again in another frame: on the same bark, and as thick but for a quarter.
-bool isSameReading(const Trunk &a, const Trunk &b)
+/// Whether two detections are of one trunk: their axes are nearer than the smaller radius, and their radii differ by
+/// less than a quarter.
+bool isSameDetection(const Trunk &a, const Trunk &b)
 {
   return distanceBetween(a, b) < std::min(a.radius(), b.radius()) && std::abs(a.log_radius - b.log_radius) < 0.25;
 }
@@ -90,9 +91,9 @@ FrameReport Engine::process(const Frame &frame)
 {
   Laps lap;
   FrameReport report;
-  const Motion motion = move(frame); // by gyro, pose filter and points, or by the images alone
+  const Motion motion = estimateMotion(frame); // by gyro, pose filter and points, or by the images alone
   lap("motion");
-  const Viewpoint view = extend(frame, motion); // Eq. 2: the next pose, and all that was seen before it
+  const Viewpoint view = extendTrajectory(frame, motion); // Eq. 2: the next pose, and all that was seen before it
   lap("smoothing");
   if (frame.status == FrameStatus::ok && motion.image_fault.empty()) {
     const auto gradient = std::make_shared<const Gradient>(computeGradient(frame.image, m_units.gradient)); // Eq. 3
@@ -100,35 +101,35 @@ FrameReport Engine::process(const Frame &frame)
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
-    loseUnplaced(predicted, view);
-    if (m_units.flow.leave_bark)
-      leaveLinesOnBark(predicted);
-    if (m_units.flow.follow_bark && view.has_ranges && newest() > 0)
-      m_bark.expect(frame.image, newest(), cameraAt(newest() - 1), view, m_map, predicted);
+    dropUncertain(predicted, view);
+    if (m_units.flow.mask_texture_edges)
+      maskTextureEdges(predicted);
+    if (m_units.flow.track_texture && view.has_ranges && newest() > 0)
+      m_texture.predict(frame.image, newest(), cameraAt(newest() - 1), view, m_map, predicted);
     const std::vector<TrackedTrunk> tracked =
         trackTrunks(*gradient, predicted, m_map, background(saliency), view, m_units); // Eq. 3-4
-    if (m_units.flow.follow_bark)
-      m_bark.read(tracked, view.camera);
+    if (m_units.flow.track_texture)
+      m_texture.correct(tracked, view.camera);
     add(tracked, view); // Eq. 9
     lap("tracking");
     m_window.push(gradient, newest(), view, m_smoother, m_units);
-    lookAtColumns(frame, tracked, view);
-    adoptNew(view, background(saliency)); // Eq. 18-21
-    if (m_units.flow.look_leaning)
-      adoptLeaning(gradient, view, background(saliency));
+    scoreByConsistency(frame, tracked, view);
+    addNewCandidates(view, background(saliency)); // Eq. 18-21
+    if (m_units.flow.detect_leaning)
+      addLeaningCandidates(gradient, view, background(saliency));
     lap("detection");
     report.trunks = inView(tracked, m_map, view.has_ranges);
     report.points = points();
     report.given_up = reviewMap(report.points, view); // Sec. 7
     lap("map");
-    report.map = known(predicted, view);
+    report.map = knownTrunks(predicted, view);
     report.saliency = fieldOf(std::move(saliency));
   }
   report.timing_ms = std::move(lap.times_ms);
-  return complete(std::move(report), frame, motion);
+  return completeReport(std::move(report), frame, motion);
 }
 
-Motion Engine::move(const Frame &frame)
+Motion Engine::estimateMotion(const Frame &frame)
 {
   if (m_motion)
     return m_motion->step(frame, m_smoother.pose(newest()), m_velocity);
@@ -141,13 +142,13 @@ Motion Engine::move(const Frame &frame)
   return motion;
 }
 
-/// The smoother takes in the motion to this frame together with what the frames before showed of trunks, in the one
-/// update of a frame: whatever follows looks from a pose that is as good as the next one will be.
-Viewpoint Engine::extend(const Frame &frame, const Motion &motion)
+/// Adds the pose of this frame to the smoother and updates it once, together with the measurements of trunks in the
+/// frame before: all later stages use the pose that this update estimates.
+Viewpoint Engine::extendTrajectory(const Frame &frame, const Motion &motion)
 {
-  constexpr double kLately_s = 1; // the covariance of what was not seen for longer hardly changes
+  constexpr double kLately_s = 1; // the covariance of a trunk that was not seen for longer hardly changes
   if (motion.has_new_unit)
-    apply(m_map.forgetUnranged());
+    apply(m_map.removeUnranged());
   if (motion.start)
     m_smoother.addFirstPose(motion.start->mean, motion.start->covariance);
   else {
@@ -181,23 +182,24 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
   return m_saliency.update(frame.image, rotation, translation);
 }
 
-/// A trunk that was out of sight while the path drifted by more than its width is not looked for, where its neighbour
-/// might be taken for it: it is detected anew, and the map ties the two visits once both are known.
-void Engine::loseUnplaced(std::vector<PredictedTrunk> &predicted, const Viewpoint &view)
+/// Drops the predictions of trunks that were out of sight while the path drifted by more than their width: a neighbour
+/// could be associated with them. Such a trunk is detected as a new one, and the map merges both visits once both are
+/// known.
+void Engine::dropUncertain(std::vector<PredictedTrunk> &predicted, const Viewpoint &view)
 {
   const auto isUnplaced = [&](const PredictedTrunk &one) {
     return !one.is_placed && view.time_s - m_map.trunk(one.id).last_seen_s > m_units.map.candidate_memory_s;
   };
   for (const PredictedTrunk &one : predicted)
     if (isUnplaced(one))
-      m_map.loseSight(one.id);
+      m_map.markOutOfSight(one.id);
   predicted.erase(std::remove_if(predicted.begin(), predicted.end(), isUnplaced), predicted.end());
 }
 
 /// Replaces the image of each trunk tracked by a summary factor.
 void Engine::add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view)
 {
-  constexpr double kOnePlace = 0.05; // of a view that a camera which only turns has: what is wrong in one is so in all
+  constexpr double kOnePlace = 0.05; // weight of a view from a camera that only turns: all views share one error
   for (const TrackedTrunk &trunk : tracked) {
     if (trunk.result.status == TrackingStatus::tracked) {
       const double weight = view.has_ranges
@@ -206,12 +208,12 @@ void Engine::add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view
       if (isDropped(m_smoother.addObservation(newest(), trunk.predicted.smoother_id, summaryOf(trunk.result, weight))))
         continue;
     }
-    m_map.record(sightingOf(trunk, m_map, view, m_units.flow));
+    m_map.record(measurementOf(trunk, m_map, view, m_units.flow));
   }
 }
 
-/// Looks for trunks that the map does not know and takes them into it.
-void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
+/// Detects trunks that the map does not know and adds them as candidates.
+void Engine::addNewCandidates(const Viewpoint &view, const vpImage<float> *p_background)
 {
   const FlowOptions &flow = m_units.flow;
   if (newest() % static_cast<std::size_t>(flow.detect_every) != 0)
@@ -219,46 +221,46 @@ void Engine::adoptNew(const Viewpoint &view, const vpImage<float> *p_background)
   const bool has_ranges = m_motion->isTranslationMeasured();
   if (p_background && !has_ranges)
     for (const LineDetection &line : detectInFrame(m_window.newest(), m_map, view, p_background, m_units))
-      if (const auto adoption = followInFrame(line, m_window.newest(), m_smoother, view, m_units))
-        adopt(*adoption);
+      if (const auto track = trackInFrame(line, m_window.newest(), m_smoother, view, m_units))
+        addCandidate(*track);
   if (!has_ranges)
     return;
-  adoptBest(detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units), m_window, view);
+  addBestCandidates(detectInWindow(m_window, m_smoother, m_map, view, p_background, m_units), m_window, view);
 }
 
-/// Of each set of lines the best reading, if the map does not hold it. One that was given up is not tried again before
-/// half of the window is new, so that the next best has its turn (inhibition of return).
-/// \p found: in \p window, best first.
-void Engine::adoptBest(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view)
+/// Adds the best detection of each set of lines to the map, unless the map knows it. A detection whose candidate was
+/// rejected is not tried again before half of the window is new, so that the next best has its turn (inhibition of
+/// return). \p found: in \p window, best first.
+void Engine::addBestCandidates(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view)
 {
   const std::size_t now = window.newest().pose, half = static_cast<std::size_t>(m_units.detection.window) / 2;
   while (!m_tried.empty() && (m_tried.front().pose > now || m_tried.front().pose + half <= now))
     m_tried.pop_front();
   const auto wasGivenUp = [this](const Detection &detection) {
-    return std::any_of(m_tried.begin(), m_tried.end(), [&](const TriedReading &tried) {
-      return !m_map.isActive(tried.id) && isSameReading(tried.trunk, detection.trunk);
+    return std::any_of(m_tried.begin(), m_tried.end(), [&](const TriedDetection &tried) {
+      return !m_map.isActive(tried.id) && isSameDetection(tried.trunk, detection.trunk);
     });
   };
   found.erase(std::remove_if(found.begin(), found.end(), wasGivenUp), found.end());
-  int adopted = 0;
-  for (const Detection &detection : bestReadings(found))
-    if (!m_map.recognise(detection.trunk) && adopted < m_units.flow.adopt_most) { // the best come first
-      const Adoption adoption = followThroughWindow(detection, window, m_smoother, m_map, view, m_units);
-      m_tried.push_back({adopt(adoption), now, detection.trunk});
-      ++adopted;
+  int added = 0;
+  for (const Detection &detection : suppressNonMaxima(found))
+    if (!m_map.associate(detection.trunk) && added < m_units.flow.most_new_candidates) { // the best come first
+      const CandidateTrack track = trackThroughWindow(detection, window, m_smoother, m_map, view, m_units);
+      m_tried.push_back({addCandidate(track), now, detection.trunk});
+      ++added;
     }
 }
 
-int Engine::adopt(const Adoption &adoption) { return m_map.add(hold(adoption)); }
+int Engine::addCandidate(const CandidateTrack &track) { return m_map.add(addToSmoother(track)); }
 
-/// Gives a trunk with its views to the smoother, and returns it with its number there.
-NewTrunk Engine::hold(const Adoption &adoption)
+/// Adds a candidate and its views to the smoother and returns it with its id there.
+NewTrunk Engine::addToSmoother(const CandidateTrack &track)
 {
-  NewTrunk held = adoption.trunk;
-  held.smoother_id = m_smoother.addTrunk(held.trunk, priorOf(held.trunk, m_units.smoothing));
-  for (const AdoptedView &view : adoption.views)
-    m_smoother.addObservation(view.pose, held.smoother_id, view.summary);
-  return held;
+  NewTrunk added = track.trunk;
+  added.smoother_id = m_smoother.addTrunk(added.trunk, priorOf(added.trunk, m_units.smoothing));
+  for (const TrackedView &view : track.views)
+    m_smoother.addObservation(view.pose, added.smoother_id, view.summary);
+  return added;
 }
 
 std::vector<TriangulatedRay> Engine::points() const
@@ -273,7 +275,7 @@ std::vector<TriangulatedRay> Engine::points() const
   return triangulate(points.tracker(), wMc, m_camera);
 }
 
-/// Returns the ids of what is given up for good.
+/// Reviews the map and returns the ids of the hypotheses that it archived.
 std::vector<int> Engine::reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view)
 {
   for (const PointCount &count : countPoints(points, m_map, view, m_units))
@@ -281,14 +283,15 @@ std::vector<int> Engine::reviewMap(const std::vector<TriangulatedRay> &points, c
   MapUpdate update = m_map.review(view.time_s, view.has_ranges);
   apply(update);
   if (m_units.smoothing.fixed_lag > 0)
-    keepNearby();
-  return std::move(update.buried);
+    keepRecentTrunks();
+  return std::move(update.archived);
 }
 
-/// Under a lag: the trunks seen last tie the visits of a place together, also where a visit before is closed.
-void Engine::keepNearby()
+/// With a fixed lag: keeps the trunks seen last in the smoother, where they tie the visits of a place together even
+/// after the poses of an earlier visit are marginalised.
+void Engine::keepRecentTrunks()
 {
-  constexpr std::size_t kMost = 24; // 120 columns of what the lag closes
+  constexpr std::size_t kMost = 24; // trunks: 120 columns of the prior that marginalisation leaves
   std::vector<const MapTrunk *> trunks;
   for (const std::size_t i : m_map.active())
     if (m_map.trunks()[i].status != TrunkStatus::candidate)
@@ -310,8 +313,8 @@ TrunkEstimate Engine::estimateOf(const MapTrunk &trunk, bool with_covariance) co
   return estimate;
 }
 
-/// Covariances are asked for where something was seen lately: that of a trunk farther back costs a walk to where it
-/// stood.
+/// Takes the estimates of active trunks over into the map; covariances only of trunks seen after \p seen_since_s, since
+/// that of an older one costs a walk through the flight since then.
 void Engine::refreshMap(double seen_since_s)
 {
   for (const std::size_t i : m_map.active()) {
@@ -320,7 +323,8 @@ void Engine::refreshMap(double seen_since_s)
   }
 }
 
-/// Inactive candidates too; covariances where enough was seen for a decision.
+/// Takes all estimates over into the map, also those of inactive candidates; covariances of trunks with enough views
+/// for a decision.
 void Engine::refreshWholeMap()
 {
   for (const MapTrunk &trunk : m_map.trunks())
@@ -336,11 +340,11 @@ void Engine::apply(const MapUpdate &update)
     m_smoother.removeTrunk(trunk);
 }
 
-/// What stands about the camera. The covariance of a bearing is known where the trunk was looked for; elsewhere it is
-/// asked for, and of what was found just now it is that of the fit.
-std::vector<KnownTrunk> Engine::known(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const
+/// The trunks near the camera. The variance of a bearing comes from the prediction where the trunk was predicted, from
+/// the fit where it was detected in this frame, and else from the smoother.
+std::vector<KnownTrunk> Engine::knownTrunks(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const
 {
-  constexpr double kFar = 20; // [m]: beyond it nothing reckons with a trunk
+  constexpr double kFar = 20; // [m]: trunks beyond it are not reported
   std::vector<KnownTrunk> trunks;
   for (const std::size_t i : m_map.active()) {
     const MapTrunk &trunk = m_map.trunks()[i];
@@ -356,12 +360,12 @@ std::vector<KnownTrunk> Engine::known(const std::vector<PredictedTrunk> &predict
                             : is_new ? (J * trunk.covariance * J.transpose())(2, 2)
                                      : m_smoother.bearingVariance(trunk.smoother_id);
     trunks.push_back({trunk.id, trunk.status, trunk.trunk, trunk.observations, m_map.evidence(trunk),
-                      trunk.isGap() ? trunk.lookedThrough() : 0, trunk.covariance(2, 2), variance});
+                      trunk.isGap() ? trunk.seeThroughRatio() : 0, trunk.covariance(2, 2), variance});
   }
   return trunks;
 }
 
-FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motion &motion)
+FrameReport Engine::completeReport(FrameReport report, const Frame &frame, const Motion &motion)
 {
   const Pose wMb = m_smoother.pose(newest());
   if (newest() > 0) {
@@ -369,7 +373,7 @@ FrameReport Engine::complete(FrameReport report, const Frame &frame, const Motio
     const double dt = secondsOf(frame.stamp_ns - m_online.back().stamp_ns);
     if (dt >= kLeast_s)
       m_velocity = wMb.minus(m_smoother.pose(newest() - 1)) / dt;
-    followScale(dt);
+    updateScale(dt);
   }
   m_online.push_back({frame.stamp_ns, wMb});
   report.index = newest();
@@ -395,7 +399,7 @@ void Engine::finish()
   m_smoother.optimize(kSettled);
   refreshWholeMap();
   if (m_units.flow.final_pass && m_motion->hasRanges())
-    decideByAllFrames();
+    runFinalPass();
   else {
     const MapUpdate update = m_map.reviewAll(m_motion->hasRanges());
     apply(update);
@@ -404,8 +408,8 @@ void Engine::finish()
       refreshWholeMap();
     }
   }
-  takeScale();
-  noteViews();
+  fixScale();
+  indexViews();
 }
 
 } // namespace bole

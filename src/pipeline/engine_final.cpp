@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The last look at a flight: which hypotheses are trunks.
+// The final pass over the keyframes of a flight: which hypotheses are trunks.
 #include "pipeline/engine.h"
 
 #include <algorithm>
@@ -10,39 +10,40 @@ namespace bole
 {
 namespace
 {
-std::vector<int> idsOf(const std::vector<Judged> &judged, double least)
+std::vector<int> idsOf(const std::vector<ScoredHypothesis> &scored, double least)
 {
   std::vector<int> ids;
-  for (const Judged &one : judged)
+  for (const ScoredHypothesis &one : scored)
     if (one.log_odds >= least)
       ids.push_back(one.id);
   return ids;
 }
 
-Hypothesis hypothesisOf(const Judged &one) { return {one.id, one.trunk, one.online}; }
+Hypothesis hypothesisOf(const ScoredHypothesis &one) { return {one.id, one.trunk, one.online}; }
 
-bool isOf(const Judged &one, const Hypothesis &hypothesis)
+bool isOf(const ScoredHypothesis &one, const Hypothesis &hypothesis)
 {
   return one.id == hypothesis.id && one.trunk.minus(hypothesis.trunk).isZero(0) && one.online == hypothesis.online;
 }
 } // namespace
 
-Viewpoint Engine::viewpointOf(const KeptFrame &frame) const
+Viewpoint Engine::viewpointOf(const Keyframe &frame) const
 {
   return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
 }
 
-/// Those that are as they were \p before are not asked again.
-std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views, const std::vector<Judged> &before) const
+/// Scores all hypotheses of the map. One that has not changed since \p before keeps its score from there.
+std::vector<ScoredHypothesis> Engine::scoreAll(const std::vector<ColumnView> &views,
+                                               const std::vector<ScoredHypothesis> &before) const
 {
-  std::vector<Judged> all;
+  std::vector<ScoredHypothesis> all;
   for (const MapTrunk &trunk : m_map.trunks()) {
-    if (trunk.observations < kLeastViews || trunk.fate == TrunkFate::unranged)
+    if (trunk.observations < kLeastViews || trunk.reject_reason == RejectReason::unranged)
       continue;
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
     const auto known =
-        std::find_if(before.begin(), before.end(), [&](const Judged &one) { return isOf(one, hypothesis); });
-    if (auto one = known != before.end() ? *known : judge(hypothesis, views, farthestJudged())) {
+        std::find_if(before.begin(), before.end(), [&](const ScoredHypothesis &one) { return isOf(one, hypothesis); });
+    if (auto one = known != before.end() ? *known : scoreHypothesis(hypothesis, views, farthestScored())) {
       one->first_seen_s = trunk.first_seen_s;
       one->last_seen_s = trunk.last_seen_s;
       all.push_back(*one);
@@ -51,184 +52,189 @@ std::vector<Judged> Engine::judgeAll(const std::vector<LevelView> &views, const 
   return all;
 }
 
-double Engine::farthestJudged() const
+double Engine::farthestScored() const
 {
-  constexpr double kFarthest_m = 14; // columns of what stands beyond are too few
+  constexpr double kFarthest_m = 14; // a trunk beyond it fills too few columns
   return kFarthest_m / m_metres;
 }
 
-/// Tracks hypotheses through all frames that were kept, from where each is thought to stand.
-/// \p map: what may hide them.
-std::vector<Adoption> Engine::followAll(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
-                                        AlbumGradients &gradients) const
+/// Tracks hypotheses through all keyframes, each from its present estimate.
+/// \p map: the trunks that may occlude them.
+std::vector<CandidateTrack> Engine::trackThroughKeyframes(const std::vector<Hypothesis> &hypotheses,
+                                                          const TrunkMap &map, KeyframeGradients &gradients) const
 {
-  constexpr int kRounds = 2; // what the first finds tells the second where else to look
-  std::vector<Adoption> found;
+  constexpr int kRounds = 2; // the second starts from the fit of the first and finds borders that the first missed
+  std::vector<CandidateTrack> found;
   for (const Hypothesis &one : hypotheses) {
-    Adoption start;
+    CandidateTrack start;
     start.trunk.trunk = one.trunk;
     start.trunk.covariance = one.covariance;
     found.push_back(start);
   }
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<Follower> followers;
-    for (const Adoption &one : found)
-      followers.emplace_back(one.trunk.trunk, one.trunk.covariance);
-    for (std::size_t f = 0; f < m_album.frames().size(); ++f) {
-      const KeptFrame &frame = m_album.frames()[f];
+    std::vector<CandidateTracker> trackers;
+    for (const CandidateTrack &one : found)
+      trackers.emplace_back(one.trunk.trunk, one.trunk.covariance);
+    for (std::size_t f = 0; f < m_keyframes.frames().size(); ++f) {
+      const Keyframe &frame = m_keyframes.frames()[f];
       const Pose wMb = m_smoother.pose(frame.pose);
       const Viewpoint at = viewpointOf(frame);
-      std::shared_ptr<const Gradient> gradient; // made where somebody asks for it
-      for (std::size_t i = 0; i < followers.size(); ++i) {
+      std::shared_ptr<const Gradient> gradient; // computed when the first hypothesis needs it
+      for (std::size_t i = 0; i < trackers.size(); ++i) {
         const Eigen::Vector3d to = found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t;
         if (to.dot(at.wMc.R.col(2)) < 0 || to.head<2>().norm() > m_units.flow.track_range)
           continue;
         if (!gradient)
           gradient = gradients[f];
-        followers[i].look(*gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
+        trackers[i].track(*gradient, frame.pose, wMb, at, map, hypotheses[i].id, m_units);
       }
     }
-    for (std::size_t i = 0; i < followers.size(); ++i)
-      if (Adoption next = followers[i].fitted(m_map.trunk(hypotheses[i].id).first_seen_s, m_camera, m_units);
+    for (std::size_t i = 0; i < trackers.size(); ++i)
+      if (CandidateTrack next = trackers[i].fit(m_map.trunk(hypotheses[i].id).first_seen_s, m_camera, m_units);
           !next.views.empty())
         found[i] = std::move(next);
   }
   return found;
 }
 
-/// Tracks the likely ones anew and judges each where that puts it; what the smoother still holds keeps its views unless
-/// the new ones are better.
-std::vector<Engine::Reading> Engine::readAgain(const std::vector<Judged> &likely, const std::vector<LevelView> &views,
-                                               AlbumGradients &gradients) const
+/// Tracks the likely hypotheses again through all keyframes and scores each where that puts it. A trunk that is still
+/// in the smoother keeps its views there unless the new ones score better.
+std::vector<Engine::RetrackedHypothesis> Engine::retrackLikely(const std::vector<ScoredHypothesis> &likely,
+                                                               const std::vector<ColumnView> &views,
+                                                               KeyframeGradients &gradients) const
 {
-  constexpr double kBetter = 0.3; // log-odds by which new views must be better than those at hand
-  constexpr double kHides = 1.5;  // log-odds at which one may hide what stands behind it
+  constexpr double kBetter = 0.3; // log-odds by which new views must score better than those in the smoother
+  constexpr double kHides = 1.5;  // log-odds above which a hypothesis may occlude what stands behind it
   const TrunkMap map = m_map.withTrunks(idsOf(likely, kHides));
   const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
-    std::vector<Reading> readings;
-    std::vector<Adoption> followed = followAll(hypotheses, map, gradients);
+    std::vector<RetrackedHypothesis> results;
+    std::vector<CandidateTrack> followed = trackThroughKeyframes(hypotheses, map, gradients);
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       const auto refit =
-          judge({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestJudged());
-      Reading reading;
-      reading.is_seen = !followed[i].views.empty();
+          scoreHypothesis({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestScored());
+      RetrackedHypothesis result;
+      result.is_seen = !followed[i].views.empty();
       if (refit && followed[i].views.size() >= kLeastViews) {
-        reading.judged = *refit;
-        reading.judged->first_seen_s = followed[i].trunk.views.front().time_s;
-        reading.judged->last_seen_s = followed[i].trunk.views.back().time_s;
-        reading.views = std::move(followed[i]);
+        result.scored = *refit;
+        result.scored->first_seen_s = followed[i].trunk.views.front().time_s;
+        result.scored->last_seen_s = followed[i].trunk.views.back().time_s;
+        result.views = std::move(followed[i]);
       }
-      readings.push_back(std::move(reading));
+      results.push_back(std::move(result));
     }
-    return readings;
+    return results;
   };
   std::vector<Hypothesis> hypotheses;
-  for (const Judged &one : likely)
+  for (const ScoredHypothesis &one : likely)
     hypotheses.push_back(hypothesisOf(one));
-  std::vector<Reading> readings = read(hypotheses);
+  std::vector<RetrackedHypothesis> results = read(hypotheses);
   for (std::size_t i = 0; i < likely.size(); ++i) {
-    Reading &reading = readings[i];
+    RetrackedHypothesis &result = results[i];
     const MapTrunk &known = m_map.trunk(likely[i].id);
-    const bool is_held = !known.removed && reading.is_seen && isPlaced(known.place_covariance);
-    if (is_held && (!reading.views || reading.judged->log_odds <= likely[i].log_odds + kBetter)) {
-      reading.judged = likely[i];
-      reading.views.reset();
+    const bool is_held = !known.removed && result.is_seen && isPlaced(known.place_covariance);
+    if (is_held && (!result.views || result.scored->log_odds <= likely[i].log_odds + kBetter)) {
+      result.scored = likely[i];
+      result.views.reset();
     }
   }
-  /// Reads each again where \p guess_of puts it, and keeps what \p is_better.
+  /// Tracks each hypothesis again from the alternative that \p guess_of proposes; keeps it where \p is_better says so.
   const auto challenge = [&](const auto &guess_of, const auto &is_better) {
     std::vector<Hypothesis> guesses;
     std::vector<std::size_t> of;
-    for (std::size_t i = 0; i < readings.size(); ++i)
-      if (readings[i].judged)
-        if (const auto guess = guess_of(hypothesisOf(*readings[i].judged))) {
+    for (std::size_t i = 0; i < results.size(); ++i)
+      if (results[i].scored)
+        if (const auto guess = guess_of(hypothesisOf(*results[i].scored))) {
           guesses.push_back(*guess);
           of.push_back(i);
         }
-    std::vector<Reading> others = read(guesses);
+    std::vector<RetrackedHypothesis> others = read(guesses);
     for (std::size_t k = 0; k < others.size(); ++k)
-      if (others[k].views && is_better(k, *others[k].judged, *readings[of[k]].judged))
-        readings[of[k]] = std::move(others[k]);
+      if (others[k].views && is_better(k, *others[k].scored, *results[of[k]].scored))
+        results[of[k]] = std::move(others[k]);
   };
   const double thickest = m_units.detection.radius_max;
-  // one border may be the edge of a shadow on the bark, or of something behind
-  std::vector<BorderDoubt> doubts;
+  // first alternative: one border was the edge of a shadow on the bark, or of something behind the trunk
+  std::vector<BorderProposal> proposals;
   challenge(
-      [&](const Hypothesis &reading) -> std::optional<Hypothesis> {
-        const auto doubt = doubtBorders(reading, views, farthestJudged(), thickest);
-        if (!doubt)
+      [&](const Hypothesis &hypothesis) -> std::optional<Hypothesis> {
+        const auto proposal = proposeBorders(hypothesis, views, farthestScored(), thickest);
+        if (!proposal)
           return std::nullopt;
-        doubts.push_back(*doubt);
-        return doubt->guess;
+        proposals.push_back(*proposal);
+        return proposal->guess;
       },
-      [&](std::size_t k, const Judged &other, const Judged &reading) {
-        return isSilhouetteOf(other, reading, doubts[k], views, farthestJudged());
+      [&](std::size_t k, const ScoredHypothesis &other, const ScoredHypothesis &current) {
+        return isBetterSilhouette(other, current, proposals[k], views, farthestScored());
       });
-  // lines that are not the same in all frames put a trunk nearer or farther than its bark says
-  challenge([&](const Hypothesis &reading) { return nearerOrFarther(reading, views, farthestJudged(), thickest); },
-            [](std::size_t, const Judged &other, const Judged &reading) { return other.log_odds > reading.log_odds; });
-  return readings;
+  // second alternative: lines that differ from frame to frame gave another range than the texture does
+  challenge([&](const Hypothesis &hypothesis) { return proposeRange(hypothesis, views, farthestScored(), thickest); },
+            [](std::size_t, const ScoredHypothesis &other, const ScoredHypothesis &current) {
+              return other.log_odds > current.log_odds;
+            });
+  return results;
 }
 
-/// The last word on where the trunks stand. It moves no pose: columns and borders share the path by which both are
-/// measured.
-void Engine::placeByColumns()
+/// Refines the borders and ranges of the trunks by photo-consistency, after the last optimisation. No pose is moved,
+/// because columns and borders were both measured along this path.
+void Engine::refineByConsistency()
 {
-  const std::vector<LevelView> views = levelViews(m_album.frames());
+  const std::vector<ColumnView> views = columnViews(m_keyframes.frames());
   for (const MapTrunk &trunk : m_map.trunks()) {
     if (trunk.removed)
       continue;
-    TrunkEstimate estimate = endedByDepth({trunk.id, trunk.trunk, trunk.covariance}, views, farthestJudged());
-    estimate.trunk = placedByBark(estimate.trunk, views, farthestJudged());
+    TrunkEstimate estimate = fuseDepthBorders({trunk.id, trunk.trunk, trunk.covariance}, views, farthestScored());
+    estimate.trunk = fuseTextureRange(estimate.trunk, views, farthestScored());
     estimate.place_covariance =
         trunk.place_covariance + (*estimate.covariance - trunk.covariance).topLeftCorner<2, 2>();
     m_map.refresh(estimate);
   }
 }
 
-/// Whether a place is known as well as is asked for, from where it was seen.
+/// Whether the standard deviation of a place, relative to the pose that saw it, is below MapOptions::most_place_sigma.
 bool Engine::isPlaced(const Eigen::Matrix2d &covariance) const
 {
   const double most = m_units.map.most_place_sigma;
   return most == 0 || covariance.trace() <= most * most;
 }
 
-/// Every hypothesis in the light of all frames.
-void Engine::decideByAllFrames()
+/// The final pass: scores every hypothesis by all keyframes, tracks the likely ones again, and confirms the best set of
+/// which no two share a place or lines.
+void Engine::runFinalPass()
 {
-  constexpr double kLikely = -1.5; // log-odds at which a hypothesis is tracked again
-  constexpr double kHides = 0.5;   // log-odds at which one hides what leans behind it
-  const std::vector<LevelView> views = levelViews(m_album.frames());
-  const std::vector<Judged> before = judgeAll(views);
-  AlbumGradients gradients(m_album.frames(), m_units.gradient);
+  constexpr double kLikely = -1.5; // log-odds above which a hypothesis is tracked again
+  constexpr double kHides = 0.5;   // log-odds above which a hypothesis may occlude a leaning trunk behind it
+  const std::vector<ColumnView> views = columnViews(m_keyframes.frames());
+  const std::vector<ScoredHypothesis> before = scoreAll(views);
+  KeyframeGradients gradients(m_keyframes.frames(), m_units.gradient);
   detectLeaning(m_map.withTrunks(idsOf(before, kHides)), gradients);
   const double apart = m_units.map.merge_distance;
-  m_judged = judgeAll(views, before);
-  std::vector<Reading> readings =
-      readAgain(chooseSet(m_judged, kLikely, apart, views, farthestJudged()), views, gradients);
-  std::vector<Judged> again;
-  for (const Reading &reading : readings) // one that is not placed would keep another of the same lines away
-    if (reading.judged && isPlaced(reading.views ? reading.views->trunk.covariance.topLeftCorner<2, 2>()
-                                                 : m_map.trunk(reading.judged->id).place_covariance))
-      again.push_back(*reading.judged);
-  const std::vector<Judged> chosen = chooseSet(again, m_units.map.confirm_odds, apart, views, farthestJudged());
+  m_scored = scoreAll(views, before);
+  std::vector<RetrackedHypothesis> results =
+      retrackLikely(chooseSet(m_scored, kLikely, apart, views, farthestScored()), views, gradients);
+  std::vector<ScoredHypothesis> again;
+  for (const RetrackedHypothesis &result : results) // one of unknown place must not suppress another of its lines
+    if (result.scored && isPlaced(result.views ? result.views->trunk.covariance.topLeftCorner<2, 2>()
+                                               : m_map.trunk(result.scored->id).place_covariance))
+      again.push_back(*result.scored);
+  const std::vector<ScoredHypothesis> chosen =
+      chooseSet(again, m_units.map.confirm_odds, apart, views, farthestScored());
   std::map<int, TrunkDecision> decisions;
-  for (const Judged &one : m_judged)
+  for (const ScoredHypothesis &one : m_scored)
     decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
-  for (const Judged &one : chosen)
+  for (const ScoredHypothesis &one : chosen)
     decisions[one.id] = {one.id, one.log_odds, true, std::nullopt};
-  for (Reading &reading : readings) {
-    if (!reading.judged || !reading.views || !decisions[reading.judged->id].is_trunk)
+  for (RetrackedHypothesis &result : results) {
+    if (!result.scored || !result.views || !decisions[result.scored->id].is_trunk)
       continue;
-    decisions[reading.judged->id].found = hold(*reading.views);
+    decisions[result.scored->id].found = addToSmoother(*result.views);
   }
   std::vector<TrunkDecision> list;
   for (auto &[id, decision] : decisions)
     list.push_back(std::move(decision));
-  for (const std::size_t gone : m_map.decide(list))
+  for (const std::size_t gone : m_map.applyDecisions(list))
     m_smoother.removeTrunk(gone);
   m_smoother.optimize(kSettled);
   refreshWholeMap();
-  placeByColumns();
+  refineByConsistency();
 }
 } // namespace bole

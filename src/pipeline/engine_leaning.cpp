@@ -23,7 +23,8 @@ StageOptions alongLeaning(StageOptions options, int side)
   return options;
 }
 
-/// Lines are smeared where they are added up along another lean.
+/// Sorts by quality and contrast: a line that is summed along another lean than its own is smeared, so the detection
+/// with the right lean comes first.
 void sortBySharpness(std::vector<Detection> &found)
 {
   const auto sharpness = [](const Detection &one) {
@@ -34,9 +35,9 @@ void sortBySharpness(std::vector<Detection> &found)
 }
 } // namespace
 
-/// To either side in turn.
-void Engine::adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const Viewpoint &view,
-                          const vpImage<float> *p_background)
+/// Looks for trunks that lean to the left and to the right in alternate frames.
+void Engine::addLeaningCandidates(const std::shared_ptr<const Gradient> &gradient, const Viewpoint &view,
+                                  const vpImage<float> *p_background)
 {
   const int side = static_cast<int>(newest() % 2);
   const StageOptions options = alongLeaning(m_units, side);
@@ -45,16 +46,16 @@ void Engine::adoptLeaning(const std::shared_ptr<const Gradient> &gradient, const
     return;
   std::vector<Detection> found = detectInWindow(m_leaning[side], m_smoother, m_map, view, p_background, options);
   sortBySharpness(found);
-  adoptBest(std::move(found), m_leaning[side], view);
+  addBestCandidates(std::move(found), m_leaning[side], view);
 }
 
-/// What stands between the \p likely ones.
-void Engine::detectLeaning(const TrunkMap &likely, AlbumGradients &gradients)
+/// Detects leaning trunks between the \p likely ones in all keyframes and adds them as candidates.
+void Engine::detectLeaning(const TrunkMap &likely, KeyframeGradients &gradients)
 {
   const StageOptions options[2] = {alongLeaning(m_units, 0), alongLeaning(m_units, 1)};
   DetectionWindow windows[2];
-  for (std::size_t i = 0; i < m_album.frames().size(); ++i) {
-    const KeptFrame &frame = m_album.frames()[i];
+  for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i) {
+    const Keyframe &frame = m_keyframes.frames()[i];
     const Viewpoint at = viewpointOf(frame);
     for (const int side : {0, 1})
       windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
@@ -66,7 +67,7 @@ void Engine::detectLeaning(const TrunkMap &likely, AlbumGradients &gradients)
       found.insert(found.end(), leaning.begin(), leaning.end());
     }
     sortBySharpness(found);
-    adoptBest(std::move(found), windows[0], at);
+    addBestCandidates(std::move(found), windows[0], at);
   }
 }
 } // namespace bole

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What each frame shows of the map that the flight ended with.
+// Reports of past frames by the map at the end of the flight.
 #include "geometry/constants.h"
 #include "geometry/failure.h"
 #include "geometry/horizontal_view.h"
@@ -9,7 +9,7 @@
 
 namespace bole
 {
-void Engine::noteViews()
+void Engine::indexViews()
 {
   m_views.clear();
   const Graph graph = m_smoother.graph();
@@ -20,7 +20,8 @@ void Engine::noteViews()
     std::sort(poses.begin(), poses.end());
 }
 
-/// Frames from the place of another are not kept for the last look: they show what those before and after them do.
+/// Whether a trunk was seen from a pose. A frame from the same place as another is no keyframe: it counts as a view
+/// where the views before and after it do.
 bool Engine::isSeen(const MapTrunk &trunk, std::size_t pose) const
 {
   const auto found = m_views.find(trunk.smoother_id);
@@ -30,8 +31,8 @@ bool Engine::isSeen(const MapTrunk &trunk, std::size_t pose) const
   const auto after = std::lower_bound(views.begin(), views.end(), pose);
   if (after == views.begin() || after == views.end() || *after == pose)
     return after != views.end() && *after == pose;
-  const auto isEarlier = [](const KeptFrame &frame, std::size_t other) { return frame.pose < other; };
-  const auto &kept = m_album.frames();
+  const auto isEarlier = [](const Keyframe &frame, std::size_t other) { return frame.pose < other; };
+  const auto &kept = m_keyframes.frames();
   return std::lower_bound(kept.begin(), kept.end(), *std::prev(after) + 1, isEarlier) ==
          std::lower_bound(kept.begin(), kept.end(), *after, isEarlier);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The scale of the map, and what is read in it.
+// The scale of the map, and the results in metres.
 #include "pipeline/engine.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ ScaleEstimate Engine::estimateScale(bool with_radii) const
 
 /// Measures the scale from time to time and lets the metres follow it. The radii count only at the end: the detector
 /// looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows them runs away.
-void Engine::followScale(double seconds_passed)
+void Engine::updateScale(double seconds_passed)
 {
   constexpr std::size_t kLeast = 10, kMost = 60; // frames between two measurements
   constexpr std::size_t kShare = 10;             // of what is compared there is a tenth more by then
@@ -57,8 +57,8 @@ void Engine::measureScale()
   m_motion->measureScale([this](std::size_t pose) { return m_smoother.pose(pose); });
 }
 
-/// At the end.
-void Engine::takeScale()
+/// Fixes the scale at the end of the flight, by the radii of the trunks too.
+void Engine::fixScale()
 {
   if (!m_motion->hasRanges())
     return;

@@ -8,7 +8,7 @@
 
 namespace bole
 {
-void Album::add(const vpImage<unsigned char> &image, const LevelImage &level, std::size_t pose, double time_s)
+void KeyframeStore::add(const vpImage<unsigned char> &image, const ColumnImage &level, std::size_t pose, double time_s)
 {
   constexpr std::size_t kMostBytes = std::size_t(256) << 20; // of pictures
   if (m_offered++ % m_every != 0)
@@ -17,18 +17,18 @@ void Album::add(const vpImage<unsigned char> &image, const LevelImage &level, st
   if (m_frames.size() * image.getSize() <= kMostBytes)
     return;
   m_every *= 2;
-  std::deque<KeptFrame> kept; // a vpImage that was moved from would not own what is assigned to it
+  std::deque<Keyframe> kept; // a vpImage that was moved from would not own what is assigned to it
   for (std::size_t i = 0; i < m_frames.size(); i += 2)
     kept.push_back(std::move(m_frames[i]));
   m_frames = std::move(kept);
 }
 
-AlbumGradients::AlbumGradients(const std::deque<KeptFrame> &frames, const GradientOptions &options)
+KeyframeGradients::KeyframeGradients(const std::deque<Keyframe> &frames, const GradientOptions &options)
     : m_frames(frames), m_options(options), m_made(frames.size())
 {
 }
 
-std::shared_ptr<const Gradient> AlbumGradients::operator[](std::size_t frame)
+std::shared_ptr<const Gradient> KeyframeGradients::operator[](std::size_t frame)
 {
   constexpr std::size_t kMostBytes = std::size_t(128) << 20; // 40 s of 320x240 at 10 Hz
   if (m_made[frame])
@@ -42,7 +42,7 @@ std::shared_ptr<const Gradient> AlbumGradients::operator[](std::size_t frame)
   return gradient;
 }
 
-OddsTerms oddsTerms(const ColumnEvidence &evidence, double online)
+OddsTerms oddsTerms(const PhotoConsistency &evidence, double online)
 {
   OddsTerms terms;
   terms << 1, evidence.own, std::clamp(std::min(evidence.background, evidence.nearer), -1.0, 2.0),
@@ -57,40 +57,41 @@ OddsTerms oddsWeights()
   return weights;
 }
 
-std::optional<Judged> judge(const Hypothesis &hypothesis, const std::vector<LevelView> &views, double farthest)
+std::optional<ScoredHypothesis> scoreHypothesis(const Hypothesis &hypothesis, const std::vector<ColumnView> &views,
+                                                double farthest)
 {
-  const auto evidence = columnEvidence(hypothesis.trunk, views, farthest);
+  const auto evidence = photoConsistency(hypothesis.trunk, views, farthest);
   if (!evidence)
     return std::nullopt;
-  return judgedBy(*evidence, hypothesis);
+  return scoreFrom(*evidence, hypothesis);
 }
 
-Judged judgedBy(const ColumnEvidence &evidence, const Hypothesis &hypothesis)
+ScoredHypothesis scoreFrom(const PhotoConsistency &evidence, const Hypothesis &hypothesis)
 {
   return {hypothesis.id, hypothesis.trunk, hypothesis.online, evidence,
           oddsWeights().dot(oddsTerms(evidence, hypothesis.online))};
 }
 
-bool isBehind(const ColumnEvidence &evidence)
+bool isBackgroundInside(const PhotoConsistency &evidence)
 {
   constexpr double kBackground = 0.15; // difference inside a border
   return std::max(evidence.inside_left, evidence.inside_right) > kBackground;
 }
 
-bool goesOnBeside(const ColumnEvidence &evidence)
+bool continuesBeyondBorder(const PhotoConsistency &evidence)
 {
   constexpr double kGoesOn = -0.25; // difference beside a border
-  return evidence.leastBeside() < kGoesOn;
+  return evidence.weakestOutside() < kGoesOn;
 }
 
 namespace
 {
-/// From where \p trunk is seen to where it stands [m], in the mean of the views; one of them at least must show it.
-Eigen::Vector2d meanLineOfSight(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+/// Mean vector from the camera to \p trunk [m] over the views that show it, of which there must be one.
+Eigen::Vector2d meanLineOfSight(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   int n = 0;
-  for (const LevelView &view : views)
+  for (const ColumnView &view : views)
     if (locate(trunk, view, farthest)) {
       sum += trunk.axisAt(view.z).head<2>() - view.position;
       ++n;
@@ -114,7 +115,7 @@ Trunk withBordersMoved(Trunk trunk, const std::array<double, 2> &move, const Eig
   return trunk;
 }
 
-/// Of place and logarithm of the radius, by variances of the borders [m^2].
+/// Covariance of place and log radius that follows from the variances of both borders [m^2].
 Eigen::Matrix3d covarianceByBorders(const std::array<double, 2> &variance, const Eigen::Vector2d &leftwards,
                                     double radius)
 {
@@ -123,7 +124,7 @@ Eigen::Matrix3d covarianceByBorders(const std::array<double, 2> &variance, const
   return J * Eigen::Vector2d(variance[0], variance[1]).asDiagonal() * J.transpose();
 }
 
-/// How far \p trunk surely goes on outside of its borders [px], left and right.
+/// By how much \p trunk surely continues beyond its left and right border by depth [px].
 std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &borders)
 {
   constexpr double kMixed_px = 1.25; // more than of 98 in 100 borders that are read right (seeds 400 to 423)
@@ -134,8 +135,8 @@ std::array<double, 2> beyondBorders(const Trunk &trunk, const DepthBorders &bord
   return beyond;
 }
 
-/// What depth says against borders beside which \p trunk goes on [log-odds].
-double oddsAgainst(const Trunk &trunk, const DepthBorders &borders)
+/// Log-odds against borders beyond which \p trunk continues by depth.
+double logOddsAgainst(const Trunk &trunk, const DepthBorders &borders)
 {
   constexpr double kOdds_px = 1, kMost = 4; // log-odds a pixel by which it does, of one border
   const auto [left, right] = beyondBorders(trunk, borders);
@@ -143,14 +144,14 @@ double oddsAgainst(const Trunk &trunk, const DepthBorders &borders)
 }
 } // namespace
 
-std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::vector<LevelView> &views, double farthest,
-                                        double radius_max, double outside_px)
+std::optional<BorderProposal> proposeBorders(const Hypothesis &hypothesis, const std::vector<ColumnView> &views,
+                                             double farthest, double radius_max, double outside_px)
 {
   constexpr double kSigma_px = 1; // of a border by depth
   // by which depth ends a trunk inside a border: more than of 19 in 20 that are read right; enough where the other is
   // not
   constexpr double kInside_px = 2.5, kBeside_px = 1.5;
-  const Trunk &trunk = reading.trunk;
+  const Trunk &trunk = hypothesis.trunk;
   const std::optional<DepthBorders> borders = depthBorders(trunk, views, farthest);
   if (!borders)
     return std::nullopt;
@@ -171,42 +172,42 @@ std::optional<BorderDoubt> doubtBorders(const Hypothesis &reading, const std::ve
   if (radius < borders->px || radius > radius_max)
     return std::nullopt;
   const Eigen::Vector2d leftwards = meanLineOfSight(trunk, views, farthest).unitOrthogonal();
-  Hypothesis guess{reading.id, withBordersMoved(trunk, move, leftwards), reading.online};
+  Hypothesis guess{hypothesis.id, withBordersMoved(trunk, move, leftwards), hypothesis.online};
   guess.covariance.topLeftCorner<3, 3>() = covarianceByBorders({variance, variance}, leftwards, radius);
-  return BorderDoubt{guess, oddsAgainst(trunk, *borders)};
+  return BorderProposal{guess, logOddsAgainst(trunk, *borders)};
 }
 
-bool isSilhouetteOf(const Judged &other, const Judged &reading, const BorderDoubt &doubt,
-                    const std::vector<LevelView> &views, double farthest)
+bool isBetterSilhouette(const ScoredHypothesis &other, const ScoredHypothesis &hypothesis,
+                        const BorderProposal &proposal, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kSure = 0.1; // log-odds
   const auto borders = depthBorders(other.trunk, views, farthest);
-  const double against = borders ? oddsAgainst(other.trunk, *borders) : 0;
-  return other.log_odds - against > reading.log_odds - doubt.against + kSure;
+  const double against = borders ? logOddsAgainst(other.trunk, *borders) : 0;
+  return other.log_odds - against > hypothesis.log_odds - proposal.against + kSure;
 }
 
-double silhouetteScore(const Judged &reading)
+double silhouetteScore(const ScoredHypothesis &hypothesis)
 {
   constexpr double kOdds = 0.3, kClear = 0.5; // weight of a log-odd; a border of more is clear enough
-  return kOdds * reading.log_odds + std::min(reading.evidence.weakestBorder(), kClear);
+  return kOdds * hypothesis.log_odds + std::min(hypothesis.evidence.weakestBorder(), kClear);
 }
 
-std::optional<Hypothesis> nearerOrFarther(const Hypothesis &reading, const std::vector<LevelView> &views,
-                                          double farthest, double radius_max)
+std::optional<Hypothesis> proposeRange(const Hypothesis &hypothesis, const std::vector<ColumnView> &views,
+                                       double farthest, double radius_max)
 {
   constexpr double kLeast = 0.01, kSigma = 0.02; // of the range: less leads to the same lines; how sure the bark is
-  const std::optional<double> by_bark = rangeByColumns(reading.trunk, views, farthest);
-  if (!by_bark || std::abs(*by_bark) < kLeast || reading.trunk.radius() * std::exp(*by_bark) > radius_max)
+  const std::optional<double> by_bark = rangeByTexture(hypothesis.trunk, views, farthest);
+  if (!by_bark || std::abs(*by_bark) < kLeast || hypothesis.trunk.radius() * std::exp(*by_bark) > radius_max)
     return std::nullopt;
-  const Eigen::Vector2d toward = meanLineOfSight(reading.trunk, views, farthest);
-  Hypothesis guess{reading.id, movedAlong(toward, reading.trunk, *by_bark), reading.online};
+  const Eigen::Vector2d toward = meanLineOfSight(hypothesis.trunk, views, farthest);
+  Hypothesis guess{hypothesis.id, movedAlong(toward, hypothesis.trunk, *by_bark), hypothesis.online};
   Eigen::Vector3d along; // as the range grows by its logarithm
   along << toward, 1;
   guess.covariance.topLeftCorner<3, 3>() = kSigma * kSigma * along * along.transpose();
   return guess;
 }
 
-TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> &views, double farthest)
+TrunkEstimate fuseDepthBorders(TrunkEstimate estimate, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kBorder2 = 0.67, kDepth2 = 1; // variances of the ends by borders and by depth [px^2]
   constexpr double kMost_px = 2;                 // by which depth differs that counts
@@ -215,7 +216,7 @@ TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> 
   if (!borders)
     return estimate;
   const Eigen::Vector2d leftwards = meanLineOfSight(estimate.trunk, views, farthest).unitOrthogonal();
-  const LevelImage &image = *views.back().image;
+  const ColumnImage &image = *views.back().image;
   const double band = std::abs(image.elevation[0] - image.elevation[1]); // over which columns are added up [tan]
   const double smeared_px = band * std::abs(leftwards.dot(estimate.trunk.lean)) / image.step;
   const double share = kBorder2 / (kBorder2 + kDepth2 + smeared_px * smeared_px);
@@ -232,23 +233,24 @@ TrunkEstimate endedByDepth(TrunkEstimate estimate, const std::vector<LevelView> 
   return estimate;
 }
 
-Trunk placedByBark(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+Trunk fuseTextureRange(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kBark = 0.5; // its share: it errs by as much as the borders (rms), and only in part as they do
-  const std::optional<double> by_bark = rangeByColumns(trunk, views, farthest);
+  const std::optional<double> by_bark = rangeByTexture(trunk, views, farthest);
   return by_bark ? movedAlong(meanLineOfSight(trunk, views, farthest), trunk, kBark * *by_bark) : trunk;
 }
 
 namespace
 {
-/// A hypothesis is made of the lines of a \p better one where both fill the same columns in most of the views that it
-/// was read in. What hides it in others does not count.
-bool fillSameColumns(const Judged &one, const Judged &better, const std::vector<LevelView> &views, double farthest)
+/// Whether \p one is made of the lines of a \p better hypothesis: both fill the same columns in most views of \p one.
+/// Views in which it is occluded do not count.
+bool fillSameColumns(const ScoredHypothesis &one, const ScoredHypothesis &better, const std::vector<ColumnView> &views,
+                     double farthest)
 {
   constexpr int kLeastShared = 4;
   constexpr double kMostly = 0.5; // of what either fills; of the views
   int read = 0, same = 0;
-  for (const LevelView &view : views) {
+  for (const ColumnView &view : views) {
     if (view.time_s < one.first_seen_s || view.time_s > one.last_seen_s)
       continue;
     const auto at_a = locate(one.trunk, view, farthest);
@@ -267,15 +269,17 @@ bool fillSameColumns(const Judged &one, const Judged &better, const std::vector<
 }
 } // namespace
 
-std::vector<Judged> chooseSet(std::vector<Judged> judged, double least, double apart,
-                              const std::vector<LevelView> &views, double farthest)
+std::vector<ScoredHypothesis> chooseSet(std::vector<ScoredHypothesis> scored, double least, double apart,
+                                        const std::vector<ColumnView> &views, double farthest)
 {
-  judged.erase(std::remove_if(judged.begin(), judged.end(), [&](const Judged &one) { return one.log_odds < least; }),
-               judged.end());
-  std::sort(judged.begin(), judged.end(), [](const Judged &a, const Judged &b) { return a.log_odds > b.log_odds; });
-  std::vector<Judged> chosen;
-  for (const Judged &one : judged)
-    if (std::none_of(chosen.begin(), chosen.end(), [&](const Judged &better) {
+  scored.erase(
+      std::remove_if(scored.begin(), scored.end(), [&](const ScoredHypothesis &one) { return one.log_odds < least; }),
+      scored.end());
+  std::sort(scored.begin(), scored.end(),
+            [](const ScoredHypothesis &a, const ScoredHypothesis &b) { return a.log_odds > b.log_odds; });
+  std::vector<ScoredHypothesis> chosen;
+  for (const ScoredHypothesis &one : scored)
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const ScoredHypothesis &better) {
           return distanceBetween(one.trunk, better.trunk) < one.trunk.radius() + better.trunk.radius() + apart ||
                  fillSameColumns(one, better, views, farthest);
         }))

@@ -69,7 +69,7 @@ PosePrior MonocularMotion::first(const Frame &frame)
   double tilt = kGuessed;
   m_points.track(frame);
   if (frame.status == FrameStatus::ok) {
-    place(frame, std::nullopt);
+    placeFrame(frame, std::nullopt);
     if (m_first_up) {
       prior.mean.R = levelled(Matrix3d::Identity(), m_bMc.R * *m_first_up);
       tilt = kSeen;
@@ -81,8 +81,8 @@ PosePrior MonocularMotion::first(const Frame &frame)
   return prior;
 }
 
-/// Places the frame by its points, and asks it for the direction of gravity and for its height.
-PointOdometryResult MonocularMotion::place(const Frame &frame, const std::optional<GyroRotation> &rotated)
+/// Places the frame by its points and measures the direction of gravity and the height over the ground in it.
+PointOdometryResult MonocularMotion::placeFrame(const Frame &frame, const std::optional<GyroRotation> &rotated)
 {
   const PointOdometryResult placed = m_odometry.process(m_points.tracker(), rotated);
   m_pointsMc = placed.wMc;
@@ -98,7 +98,7 @@ PointOdometryResult MonocularMotion::place(const Frame &frame, const std::option
   return placed;
 }
 
-/// Up in the last frame placed.
+/// The direction of up in the camera of the frame placed last.
 std::optional<Vector3d> MonocularMotion::up() const
 {
   if (!m_vertical.known())
@@ -139,7 +139,7 @@ void MonocularMotion::measureHeight()
 }
 
 /// The ground under the camera, smoothed: bumps and slopes of some metres stay.
-void MonocularMotion::learnGround(const Pose &wMb)
+void MonocularMotion::updateGround(const Pose &wMb)
 {
   constexpr double kMemory = 0.9;
   if (!m_height_seen)
@@ -185,8 +185,8 @@ Odometry MonocularMotion::toBody(const Pose &caMcb, Matrix6d covariance, bool is
   return {m_bMc * Pose(caMcb.R, m_unit * caMcb.t) * m_bMc.inverse(), to_body * covariance * to_body.transpose()};
 }
 
-/// Frames before the first baseline was known, now that they can be placed.
-void MonocularMotion::addBacklog(Motion &motion) const
+/// Adds the motion between the frames before the first baseline, which can be placed now.
+void MonocularMotion::addEarlierFrames(Motion &motion) const
 {
   const std::vector<PlacedFrame> path = m_odometry.trajectory();
   const std::size_t newest = path.size() - 1; // its motion comes as the step
@@ -206,7 +206,7 @@ void MonocularMotion::addBacklog(Motion &motion) const
     add(last, newest);
 }
 
-/// On the gyro, and on an odometry that the first frame does not have.
+/// Verdicts on the gyro, and on an odometry that is not used because the first frame does not have it.
 std::vector<SensorVerdict> MonocularMotion::verdicts() const
 {
   std::vector<SensorVerdict> verdicts = m_monitor.verdicts();
@@ -217,19 +217,19 @@ std::vector<SensorVerdict> MonocularMotion::verdicts() const
   return verdicts;
 }
 
-MotionStep MonocularMotion::expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
+MotionStep MonocularMotion::predictStep(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
 {
   const MotionStep step = m_model.step(frame, wMa, m_points.gyroBias(), velocity);
   m_model.advance(frame);
   return step;
 }
 
-/// By the points.
-void MonocularMotion::judgeGyro(const Frame &frame)
+/// Compares the gyro with the rotations of the points.
+void MonocularMotion::compareGyro(const Frame &frame)
 {
-  Frame images = frame, room;
+  Frame images = frame, scratch;
   images.wMb_odometry.reset(); // one that begins late is not used
-  m_monitor.process(images, m_points.process(m_monitor.withoutLiars(images, room)));
+  m_monitor.process(images, m_points.process(m_monitor.withoutRejectedSensors(images, scratch)));
 }
 
 Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d &velocity)
@@ -239,21 +239,21 @@ Motion MonocularMotion::step(const Frame &frame, const Pose &wMa, const Vector6d
   if (frame.wMb_odometry && !m_odometry_from_s)
     m_odometry_from_s = secondsOf(frame.stamp_ns);
   motion.is_rotation_seen = true;
-  Frame room;
+  Frame scratch;
   if (frame.gyro.empty())
     m_points.track(frame);
   else
-    judgeGyro(frame);
-  motion.step = expected(m_monitor.trusted(frame, room), wMa, velocity);
+    compareGyro(frame);
+  motion.step = predictStep(m_monitor.trusted(frame, scratch), wMa, velocity);
   motion.step.is_step_measured = false;
   motion.image_fault = m_points.fault();
   if (frame.status == FrameStatus::ok && motion.image_fault.empty())
-    see(frame, wMa, motion);
+    useImageMotion(frame, wMa, motion);
   return motion;
 }
 
-/// What the image of \p frame says of its motion, in place of what was expected.
-void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
+/// Replaces the predicted step by the motion that the image of \p frame measures.
+void MonocularMotion::useImageMotion(const Frame &frame, const Pose &wMa, Motion &motion)
 {
   const bool is_next = !m_placed.empty() && m_placed.back() + 1 == m_frame;
   std::optional<GyroRotation> rotated; // of the camera
@@ -266,7 +266,7 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
   const bool is_first = m_placed.empty(), had_unit = m_has_unit;
   const Pose before = m_pointsMc;
   const std::size_t last_placed = is_first ? m_frame : m_placed.back();
-  const PointOdometryResult placed = place(frame, rotated);
+  const PointOdometryResult placed = placeFrame(frame, rotated);
   motion.has_new_unit = m_has_unit && !had_unit;
   if (is_first)
     return;
@@ -276,7 +276,7 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
     const std::vector<PlacedFrame> path = m_odometry.trajectory();
     caMcb = path[path.size() - 2].wMc.inverse() * path.back().wMc;
     covariance.setZero(); // of the whole way from the start: between two frames of one solution little is left
-    addBacklog(motion);
+    addEarlierFrames(motion);
   }
   const Odometry odometry = toBody(caMcb, covariance, !m_has_unit);
   if (is_next) {
@@ -292,6 +292,6 @@ void MonocularMotion::see(const Frame &frame, const Pose &wMa, Motion &motion)
     const Matrix3d of_up = std::min(30, m_frames_with_up) * basis * m_vertical.covariance() * basis.transpose();
     motion.step.absolute = tiltPrior(wMa * motion.step.aMb, m_bMc.R * *up(), of_up);
   }
-  learnGround(wMa * motion.step.aMb);
+  updateGround(wMa * motion.step.aMb);
 }
 } // namespace bole

@@ -9,7 +9,8 @@
 ///
 /// Frames: w level with the first camera at its origin, a the body at the frame before, b the body now.
 /// A camera that only rotates gets its rotation; its place is held until some parallax says otherwise.
-/// What is learnt of earlier frames only later (the first baseline, frames after a gap) comes as more odometry.
+/// Motion between earlier frames that becomes known later (first baseline, frames after a gap) is added as further
+/// odometry.
 
 #include "motion/ground_plane.h"
 #include "motion/point_odometry.h"
@@ -36,15 +37,15 @@ public:
   std::vector<SensorVerdict> verdicts() const override;
 
 private:
-  MotionStep expected(const Frame &frame, const Pose &wMa, const Vector6d &velocity);
-  void judgeGyro(const Frame &frame);
-  void see(const Frame &frame, const Pose &wMa, Motion &motion);
-  PointOdometryResult place(const Frame &frame, const std::optional<GyroRotation> &rotated);
+  MotionStep predictStep(const Frame &frame, const Pose &wMa, const Vector6d &velocity);
+  void compareGyro(const Frame &frame);
+  void useImageMotion(const Frame &frame, const Pose &wMa, Motion &motion);
+  PointOdometryResult placeFrame(const Frame &frame, const std::optional<GyroRotation> &rotated);
   void chooseUnit();
   void measureHeight();
-  void learnGround(const Pose &wMb);
+  void updateGround(const Pose &wMb);
   Odometry toBody(const Pose &caMcb, Matrix6d covariance, bool is_held) const;
-  void addBacklog(Motion &motion) const;
+  void addEarlierFrames(Motion &motion) const;
   bool isHeightKnown() const { return m_camera_height > 0; }
   std::optional<Eigen::Vector3d> up() const;
   double upSigma() const; ///< [rad]

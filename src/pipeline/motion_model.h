@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What the sensors say of the motion between two frames, as the smoother wants it.
+/// The motion between two frames by the sensors, with its covariance, as a measurement for the smoother.
 ///
 /// Idea: a pose filter's errors are not one random walk. Its horizontal steps are (optical flow on the ground: noise of
 /// a centimetre a frame, a scale that is off by some per cent), but its height (sonar) and its roll and pitch (gravity)

@@ -37,11 +37,11 @@ struct Motion
 {
   std::optional<PosePrior> start;        ///< of the first frame, instead of a step
   MotionStep step;                       ///< from the frame before
-  std::vector<OdometryBetween> odometry; ///< more of it, also between earlier frames
+  std::vector<OdometryBetween> odometry; ///< further relative poses, also between earlier frames
   std::vector<DirectionBetween> directions;
   bool is_odometry_used = false; ///< of the frame
   bool is_rotation_seen = false; ///< by gyro, pose filter or points; else it is only expected
-  std::string image_fault;       ///< what its points say against the image of the frame: it is not used
+  std::string image_fault;       ///< why the image of the frame is not used, by its points; empty where it is
   bool has_new_unit = false;     ///< the first parallax came with this frame: ranges before it were guesses
 };
 
@@ -78,7 +78,7 @@ public:
   virtual std::optional<double> groundZ() const = 0;
   /// Compares the lengths of the path as it is known now, \p path, with what measures metres.
   virtual void measureScale(const PathScale::Path &path) { static_cast<void>(path); }
-  /// As far as the motion itself tells.
+  /// The scale as the motion source estimates it by itself.
   virtual ScaleEstimate scale() const = 0;
   /// Sensors that contradicted the others so far.
   virtual std::vector<SensorVerdict> verdicts() const { return {}; }

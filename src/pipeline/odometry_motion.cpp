@@ -20,7 +20,7 @@ Odometry rotationAlone(const RelativePoseEstimate &estimate, const Pose &bMc)
   return odometry;
 }
 
-/// What the points say without a gyro that is not trusted.
+/// The motions by points alone, for a frame whose gyro is rejected.
 std::vector<RelativeMotion> pointsAlone(std::vector<RelativeMotion> seen)
 {
   for (RelativeMotion &motion : seen)
@@ -55,19 +55,19 @@ PosePrior OdometryMotion::first(const Frame &frame)
   return prior;
 }
 
-/// The motion by the points; the sensors are compared with it.
+/// Measures the motion by points, compares the sensors with it, and returns what may be used.
 std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
 {
   std::vector<RelativeMotion> seen;
-  Frame room;
+  Frame scratch;
   if (m_use_points)
-    seen = m_points.process(m_monitor.withoutLiars(frame, room));
+    seen = m_points.process(m_monitor.withoutRejectedSensors(frame, scratch));
   m_monitor.process(frame, seen);
   if (!m_monitor.trustsNow(Sensor::gyro))
     seen = pointsAlone(std::move(seen));
   else if (m_monitor.trustsNow(Sensor::images))
     m_points.learn(seen);
-  const Frame &trusted = m_monitor.trusted(frame, room);
+  const Frame &trusted = m_monitor.trusted(frame, scratch);
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
   m_path_scale.add(trusted);
@@ -81,8 +81,8 @@ Motion OdometryMotion::step(const Frame &frame, const Pose &wMa, const Vector6d 
   const GyroBias bias = m_points.gyroBias(); // as before this frame, whose points will teach it
   const std::vector<RelativeMotion> seen = observe(frame);
   motion.image_fault = m_points.fault();
-  Frame room;
-  const Frame &trusted = m_monitor.trusted(frame, room);
+  Frame scratch;
+  const Frame &trusted = m_monitor.trusted(frame, scratch);
   motion.step = m_model.step(trusted, wMa, bias, velocity, m_inertial_step);
   motion.is_odometry_used = trusted.wMb_odometry.has_value();
   motion.is_rotation_seen = motion.step.is_step_measured || !trusted.gyro.empty();
@@ -109,7 +109,8 @@ std::optional<double> OdometryMotion::groundZ() const
   return m_has_odometry ? std::optional<double>(0.0) : std::nullopt;
 }
 
-/// The path tells its scale where it sways; where it does not, the odometry's scale may be known better.
+/// Takes the scale of the path, which is observable where the path sways, or that of the odometry where it is known
+/// better.
 void OdometryMotion::measureScale(const PathScale::Path &path)
 {
   if (!m_has_odometry)

@@ -107,9 +107,9 @@ Graph Pipeline::graph() const { return m_engine->graph(); }
 std::vector<Decision> Pipeline::decisions() const
 {
   std::vector<Decision> decisions;
-  for (const Judged &judged : m_engine->judged()) {
-    Decision decision{judged.trunk, {}, judged.log_odds};
-    OddsTerms::Map(decision.terms.data()) = oddsTerms(judged.evidence, judged.online);
+  for (const ScoredHypothesis &scored : m_engine->scored()) {
+    Decision decision{scored.trunk, {}, scored.log_odds};
+    OddsTerms::Map(decision.terms.data()) = oddsTerms(scored.evidence, scored.online);
     decisions.push_back(decision);
   }
   return decisions;

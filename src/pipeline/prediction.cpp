@@ -10,7 +10,7 @@ namespace bole
 {
 namespace
 {
-/// Of the bearing of a trunk that was missed: the error of a prediction grows from frame to frame.
+/// Variance that misses add to the bearing of a trunk: the error of its prediction grows from frame to frame [rad^2].
 double missedVariance(int misses, double fx, const StageOptions &options)
 {
   const double sigma_px = std::min(options.flow.search_px * misses, options.tracking.scan_max_px / 3);

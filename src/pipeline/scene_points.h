@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What the points of the scene say beside the trunks: where something stands, and what the camera looks through.
+/// Triangulated points of the scene: where obstacles stand, and which hypotheses are gaps that points are seen through.
 
 #include "motion/point_motion.h"
 #include "pipeline/prediction.h"

@@ -120,12 +120,12 @@ void setSensors(StageOptions &o, const Options &options)
 /// A camera that is steered by what it tracks rests before one trunk or goes round it.
 void setServoing(StageOptions &o)
 {
-  o.flow.follow_bark = true;      // its borders slip: along lines of light and shade, and to what passes behind
-  o.flow.leave_bark = true;       // light and shade walk over a trunk that it goes round
-  o.flow.look_leaning = true;     // a trunk of the task may lean, and there is no last look
-  o.flow.search_px = 1;           // it has little else than that trunk to correct its heading by
-  o.flow.view_correlation = 0.25; // m: so long a line on the bark is taken for the border that it stands beside
-  o.flow.turned_frames = 3;       // from the other side a border may be dark where it was bright
+  o.flow.track_texture = true;      // its borders slip: along lines of light and shade, and to what passes behind
+  o.flow.mask_texture_edges = true; // light and shade walk over a trunk that it goes round
+  o.flow.detect_leaning = true;     // a trunk of the task may lean, and there is no last look
+  o.flow.search_px = 1;             // it has little else than that trunk to correct its heading by
+  o.flow.view_correlation = 0.25;   // m: so long a line on the bark is taken for the border that it stands beside
+  o.flow.turned_frames = 3;         // from the other side a border may be dark where it was bright
   // From one distance it sees the same heights of a trunk: bow remains, taper does not.
   o.tracking.border_correlation = 0.8;
 }

@@ -41,7 +41,7 @@ struct FlowOptions
   bool use_saliency = true;     ///< motion saliency: off leaves detection ungated
   bool final_pass = true;       ///< at the end every hypothesis is judged by all frames: see final_pass.h
   int detect_every = 1;         ///< frames between two runs of the detector, 1 to 100
-  int adopt_most = 3;           ///< detections that become candidates in one frame, the best, 1 to 100: each costs
+  int most_new_candidates = 3;  ///< detections that become candidates in one frame, the best, 1 to 100: each costs
                                 ///< time and, while it is wrong, pulls on the trajectory
   double view_spacing = 0.06;   ///< least move between two views of the detector's window [m], 0 to 1
   double trunk_low = 0.25;      ///< part of a trunk that is tracked: height over the ground from [m], 0 to 5
@@ -52,12 +52,11 @@ struct FlowOptions
   double gate_sigma_px = 1.0;   ///< of a border beside the prediction [px], 0.1 to 10
   double search_px = 0;         ///< a trunk missed is looked for wider: standard deviation sideways for each frame in a
                                 ///< row that it was missed [px], up to a third of tracking.scan_max_px; 0 to 5
-  bool follow_bark = false;     ///< near trunks are followed by their bark from image to image
-  bool leave_bark = false;      ///< a border beside which the trunk goes on by its depth is not read, and looked for
-                                ///< beyond
-  bool look_leaning = false;    ///< trunks that lean are looked for in flight, too
-  double view_correlation = 0;  ///< views of a trunk from places nearer to one another than this share what is wrong in
-                                ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
+  bool track_texture = false;   ///< near trunks are tracked by their texture from image to image
+  bool mask_texture_edges = false; ///< a border beyond which the trunk continues by depth is not used
+  bool detect_leaning = false;     ///< trunks that lean are looked for in flight, too
+  double view_correlation = 0; ///< views of a trunk from places nearer to one another than this share what is wrong in
+                               ///< them, and count by how far the camera moved between them [m], 0 (never) to 1
   int turned_frames = 0; ///< borders whose contrast changed its sign are accepted after so many frames in a row at
                          ///< the predicted place: from its other side a bright trunk may be darker than the
                          ///< background; 0 (never) to 1000

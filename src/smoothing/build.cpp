@@ -20,7 +20,8 @@ void Smoother::State::checkTrunk(std::size_t trunk) const
                       trunks.size());
 }
 
-/// From the estimate to the point; new points are shifted as those of their neighbours.
+/// The offset from the estimate of a pose to its linearisation point; new points are shifted as those of their
+/// neighbours.
 Eigen::Vector3d Smoother::State::shiftOfPoint(int pose) const
 {
   if (pose < 0 || !isOpen(poses[pose].variable))
@@ -71,7 +72,7 @@ std::size_t Smoother::State::newTrunk(const Trunk &point, const TrunkPrior &prio
   return number;
 }
 
-/// Where one was recycled, or at the end.
+/// Stores a variable where one was recycled, or at the end.
 int Smoother::State::placeVariable(Variable variable)
 {
   if (free_variables.empty()) {
@@ -141,7 +142,7 @@ int Smoother::State::placeFactor(Factor factor)
   return id;
 }
 
-/// By its kind alone, as its variables may be closed by now.
+/// The size by the kind of factor alone, as its variables may be marginalised by now.
 std::size_t blockSize(FactorKind kind)
 {
   const int columns = kind == FactorKind::pose_prior                                      ? 6
@@ -190,7 +191,7 @@ void Smoother::State::dropFactor(int factor)
   }
 }
 
-/// Once nothing that is eliminated names them any more.
+/// Frees the dropped factors once no eliminated variable names them any more.
 void Smoother::State::freeDropped()
 {
   for (const int id : dropped_factors) {
@@ -217,12 +218,12 @@ void Smoother::State::addOdometryFactor(int a, int b, const Odometry &measured)
 }
 
 /// Opens the trunk, if need be, for what \p pose saw of it.
-void Smoother::State::see(int pose, int trunk)
+void Smoother::State::openTrunkFor(int pose, int trunk)
 {
   TrunkState &seen = trunks[trunk];
   if (!isOpen(seen.variable)) { // closed by the lag: what was known of it is its prior now
     seen.prior.mean = seen.point;
-    seen.prior.sigma = seen.closed_covariance.diagonal().cwiseSqrt();
+    seen.prior.sigma = seen.marginalised_covariance.diagonal().cwiseSqrt();
     reopenTrunk(trunk);
   }
   seen.last_pose = std::max(seen.last_pose, pose);
@@ -230,7 +231,7 @@ void Smoother::State::see(int pose, int trunk)
 
 void Smoother::State::addObservationFactor(int pose, int trunk, const SquareRootSummary &summary)
 {
-  see(pose, trunk);
+  openTrunkFor(pose, trunk);
   ++trunks[trunk].observations;
   ++live_observations;
   newFactor(FactorKind::observation, placeData(observations, FactorKind::observation, summary), poses[pose].variable,

@@ -63,19 +63,20 @@ Matrix5d Smoother::State::trunkCovariance(int trunk)
 {
   const TrunkState &state = trunks[trunk];
   if (!isOpen(state.variable))
-    return state.closed_covariance;
+    return state.marginalised_covariance;
   if (!variables[state.variable].eliminated)
     return state.prior.sigma.cwiseAbs2().asDiagonal();
   Eigen::Matrix<double, 5, 6> X = Eigen::Matrix<double, 5, 6>::Identity();
   return inverseForm<5>(&state.variable, &X, 1);
 }
 
-/// Of what is closed, the oldest pose that is open has to do for the one that saw it.
+/// Covariance of a trunk's place relative to the pose that saw it last, or, where that pose is marginalised, to the
+/// oldest one that is not.
 Eigen::Matrix2d Smoother::State::placeCovariance(int trunk)
 {
   const TrunkState &seen = trunks[trunk];
   if (!isOpen(seen.variable))
-    return seen.closed_place_covariance;
+    return seen.marginalised_place_covariance;
   const PoseState &from = poses[std::max(seen.last_pose, oldest_open_pose)];
   if (!variables[seen.variable].eliminated || !variables[from.variable].eliminated)
     return seen.prior.sigma.head<2>().cwiseAbs2().asDiagonal();
@@ -92,14 +93,14 @@ Matrix6d Smoother::State::poseCovariance(int pose)
 {
   const PoseState &state = poses[pose];
   if (!isOpen(state.variable))
-    return closed_covariances[static_cast<std::size_t>(pose / kCovarianceEvery)];
+    return marginalised_covariances[static_cast<std::size_t>(pose / kCovarianceEvery)];
   if (!variables[state.variable].eliminated)
     throw vpException(vpException::notInitialized, "pose = %d, must be taken in by update() first", pose);
   const Matrix6d X = Matrix6d::Identity();
   return inverseForm<6>(&state.variable, &X, 1);
 }
 
-/// That of \p which of the coordinates of the relative trunk: \p which takes them from it.
+/// Covariance of those coordinates of the relative trunk that \p which selects.
 template <int Columns>
 Eigen::Matrix<double, Columns, Columns>
 Smoother::State::relativeCovariance(int trunk, const Eigen::Matrix<double, Columns, 4> &which)

@@ -24,7 +24,7 @@ Graph Smoother::State::graph() const
     graph.trunks.push_back({static_cast<std::int64_t>(poses.size() + j), estimate(trunks[j]), trunks[j].prior});
   }
   if (oldest_open_pose > 0) // what the closed poses leave behind, reduced to the pose after them
-    graph.pose_priors.push_back({0, {graph.poses.front().wMb, closed_covariances.back()}});
+    graph.pose_priors.push_back({0, {graph.poses.front().wMb, marginalised_covariances.back()}});
   for (const Factor &factor : factors) {
     if (!factor.alive)
       continue;
@@ -53,9 +53,9 @@ std::size_t Smoother::State::memoryBytes() const
 {
   std::size_t bytes = variables.size() * sizeof(Variable) + factors.size() * sizeof(Factor) +
                       poses.size() * sizeof(PoseState) + trunks.size() * sizeof(TrunkState) +
-                      closed_covariances.size() * sizeof(Matrix6d) + observations.size() * sizeof(SquareRootSummary) +
-                      odometry.size() * sizeof(Odometry) + relative_poses.size() * sizeof(RelativePoseMeasurement) +
-                      pose_priors.size() * sizeof(PosePrior);
+                      marginalised_covariances.size() * sizeof(Matrix6d) +
+                      observations.size() * sizeof(SquareRootSummary) + odometry.size() * sizeof(Odometry) +
+                      relative_poses.size() * sizeof(RelativePoseMeasurement) + pose_priors.size() * sizeof(PosePrior);
   for (const Variable &v : variables)
     bytes +=
         (v.columns.capacity() + v.contribution.capacity()) * sizeof(double) + v.old_columns.capacity() * sizeof(float) +

@@ -6,19 +6,20 @@
 
 namespace bole
 {
-/// A leaf of the tree leaves exactly its contribution behind.
-void Smoother::State::closeVariable(int id)
+/// Marginalises a variable that is a leaf of the elimination tree: its contribution becomes a linear prior on its
+/// neighbours.
+void Smoother::State::marginaliseVariable(int id)
 {
   Variable &v = variables[id];
   if (v.is_pose) {
     if (v.number % kCovarianceEvery == 0)
-      closed_covariances.push_back(poseCovariance(v.number));
+      marginalised_covariances.push_back(poseCovariance(v.number));
     poses[v.number].point = estimate(poses[v.number]);
     poses[v.number].variable = -1;
   }
   else {
-    trunks[v.number].closed_covariance = trunkCovariance(v.number);
-    trunks[v.number].closed_place_covariance = placeCovariance(v.number);
+    trunks[v.number].marginalised_covariance = trunkCovariance(v.number);
+    trunks[v.number].marginalised_place_covariance = placeCovariance(v.number);
     trunks[v.number].point = estimate(trunks[v.number]);
     trunks[v.number].variable = -1;
   }
@@ -76,9 +77,9 @@ void Smoother::State::closeVariable(int id)
   recycle(id);
 }
 
-/// Trunks that are kept and come to be the oldest that is open are eliminated behind a pose in the middle of the lag
-/// from now on, all at once: a pose before it is closed without them being eliminated again.
-void Smoother::State::moveKept()
+/// Moves the kept trunks behind a pose in the middle of the lag when they have become the oldest open variables, all at
+/// once, so that the poses before it are marginalised without eliminating these trunks again.
+void Smoother::State::reorderKept()
 {
   const auto isBefore = [this](const TrunkState &trunk, int pose) {
     return trunk.is_kept && std::max(trunk.last_pose, trunk.behind) < pose;
@@ -95,7 +96,7 @@ void Smoother::State::moveKept()
     }
 }
 
-void Smoother::State::closeBehindLag()
+void Smoother::State::marginaliseBehindLag()
 {
   const int keep_from = static_cast<int>(poses.size()) - options.fixed_lag;
   const auto isLeaf = [this](int id) {
@@ -111,17 +112,17 @@ void Smoother::State::closeBehindLag()
         ++i;
         continue;
       }
-      closeVariable(id);
+      marginaliseVariable(id);
       closed = true;
     }
     if (oldest_open_pose < keep_from && isLeaf(poses[oldest_open_pose].variable)) {
-      closeVariable(poses[oldest_open_pose].variable);
+      marginaliseVariable(poses[oldest_open_pose].variable);
       ++oldest_open_pose;
       closed = true;
     }
     if (!closed)
       break;
   }
-  moveKept();
+  reorderKept();
 }
 } // namespace bole

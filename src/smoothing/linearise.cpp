@@ -181,7 +181,7 @@ Vector5d Smoother::State::limitedTrunkStep(const TrunkState &trunk, const Vector
   return trunk.kept + step * std::min({1.0, limit / std::max(move, 1e-9), 0.7 / std::max(resize, 1e-9)});
 }
 
-/// Are all neighbours by factors to be eliminated again anyway?
+/// Whether all neighbours by factors are eliminated again in this update anyway.
 bool Smoother::State::isInside(const Variable &variable) const
 {
   return std::all_of(variable.factors.begin(), variable.factors.end(), [this](int id) {

@@ -83,7 +83,7 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
   is_optimizing = false;
   for (Variable &v : variables)
     if (v.eliminated)
-      releaseOld(v);
+      compressOld(v);
   const double after = costAtEstimate();
   if (!(after <= before))
     for (Variable &v : variables)
@@ -94,7 +94,7 @@ UpdateResult Smoother::State::optimize(double tolerance, int max_iterations)
                   : settled           ? UpdateStatus::ok
                                       : UpdateStatus::iteration_limit;
   if (options.fixed_lag > 0)
-    closeBehindLag();
+    marginaliseBehindLag();
   return result;
 }
 } // namespace bole

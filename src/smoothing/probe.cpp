@@ -52,8 +52,8 @@ double weightAt(const Loss &loss, double rho)
   return 1;
 }
 
-/// Of a weighted residual: what the geometry's curvature makes, and a share of what the weight does
-/// that no longer fits. A wrong weight only makes the loss a little softer or harder.
+/// Linearisation error of a weighted residual: the part by the curvature of the geometry, and a share of the part by a
+/// weight that no longer fits. A wrong weight only makes the loss a little softer or harder.
 template <int N>
 double modelError(const Loss &loss, double cost, const Eigen::Matrix<double, N, 1> &r,
                   const Eigen::Matrix<double, N, 1> &predicted)
@@ -100,7 +100,8 @@ double Smoother::State::inThresholds(const Variable &variable, const Vector6d &s
   return std::max(moved_by / options.relinearise_position, rest);
 }
 
-/// From the point to the estimate [m]; of a trunk, at the height from which it was last seen.
+/// The displacement from the linearisation point to the estimate [m]; of a trunk at the height from which it was last
+/// seen.
 Eigen::Vector3d Smoother::State::displacement(const Variable &variable) const
 {
   if (variable.is_pose)
@@ -111,14 +112,14 @@ Eigen::Vector3d Smoother::State::displacement(const Variable &variable) const
   return trunk.point.plus(variable.delta.head<5>()).axisAt(z) - trunk.point.axisAt(before);
 }
 
-/// The same, against the next variable eliminated: what a whole stretch is shifted bends nothing.
+/// The displacement relative to the next variable eliminated, since a shift common to a whole stretch bends no factor.
 Eigen::Vector3d Smoother::State::ownDisplacement(const Variable &variable) const
 {
   const Eigen::Vector3d own = displacement(variable);
   return variable.parent < 0 ? own : Eigen::Vector3d(own - displacement(variables[variable.parent]));
 }
 
-/// What the estimate moved since the factors were last found good.
+/// The step of the estimate since the linearisation of its factors was last found good.
 Vector6d Smoother::State::ownStep(const Variable &variable) const
 {
   Vector6d step = variable.delta - variable.probed;
@@ -136,7 +137,7 @@ void Smoother::State::rememberProbe(Variable &variable) const
 
 /// Probes the factors only where the estimate has moved on since they were last found good. Pose
 /// priors are linear enough never to ask for more than their pose's own factors do.
-bool Smoother::State::movedTooFar(Variable &variable)
+bool Smoother::State::needsRelinearisation(Variable &variable)
 {
   if (inThresholds(variable, ownStep(variable)) <= 1)
     return false;

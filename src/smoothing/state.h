@@ -81,7 +81,7 @@ int rowCount(FactorKind kind);
 /// Doubles of its linearisation (not of a marginal).
 std::size_t blockSize(FactorKind kind);
 
-/// What closed variables leave behind: a quadratic in the tangents at the points where it was made.
+/// The prior that marginalised variables leave: a quadratic in the tangents at the points where it was made.
 struct MarginalData
 {
   std::vector<int> variables;
@@ -107,8 +107,8 @@ struct TrunkState
   int observations = 0;
   bool removed = false;
   bool is_kept = false; ///< open whenever it was seen last
-  Matrix5d closed_covariance = Matrix5d::Zero();
-  Eigen::Matrix2d closed_place_covariance = Eigen::Matrix2d::Zero();
+  Matrix5d marginalised_covariance = Matrix5d::Zero();
+  Eigen::Matrix2d marginalised_place_covariance = Eigen::Matrix2d::Zero();
 };
 
 /// Poses between two whose covariance is taken on closing: it is a walk through the whole lag, and changes slowly.
@@ -124,7 +124,7 @@ public:
   std::deque<Variable> variables;
   std::deque<PoseState> poses;
   std::deque<TrunkState> trunks;
-  std::vector<Matrix6d> closed_covariances; ///< of every kCovarianceEvery-th closed pose
+  std::vector<Matrix6d> marginalised_covariances; ///< of every kCovarianceEvery-th closed pose
   std::deque<Factor> factors;
   std::deque<PosePrior> pose_priors;
   std::deque<Odometry> odometry;
@@ -144,7 +144,7 @@ public:
   void dropFactor(int factor);
   void freeDropped();
   void addOdometryFactor(int a, int b, const Odometry &measured);
-  void see(int pose, int trunk);
+  void openTrunkFor(int pose, int trunk);
   void addObservationFactor(int pose, int trunk, const SquareRootSummary &summary);
   void removeTrunk(int trunk);
   void mergeTrunks(int keep, int gone);
@@ -164,7 +164,7 @@ public:
   Eigen::Vector3d ownDisplacement(const Variable &variable) const;
   Vector6d ownStep(const Variable &variable) const;
   void rememberProbe(Variable &variable) const;
-  bool movedTooFar(Variable &variable);
+  bool needsRelinearisation(Variable &variable);
   double inThresholds(const Variable &variable, const Vector6d &step) const;
   bool isInside(const Variable &variable) const;
   double linearisationError(Factor &factor);
@@ -183,11 +183,11 @@ public:
   // update.cpp
   UpdateResult update();
   void touch(int variable);
-  void closeUpwards();
+  void markAncestors();
   void addMissingContributions();
   void reeliminate(UpdateResult &result);
   void backSubstitute(UpdateResult &result);
-  int reach();
+  int passDepth();
   struct Descent
   {
     int variable, below, quiet; ///< how much deeper to go; variables in a row above it that were near their solution
@@ -195,17 +195,17 @@ public:
   void visitBelow(std::vector<Descent> &open, int &visits, UpdateResult &result);
   void fetchAhead(int pose) const;
   void pushChildren(std::vector<Descent> &open, int id, int below, int quiet) const;
-  void settle(Variable &v, int id, double *rhs, UpdateResult &result);
+  void resolveIfStale(Variable &v, int id, double *rhs, UpdateResult &result);
   int movableAge() const;
   int reachBack(const Variable &variable) const;
   void moveLinearisation(UpdateResult &result);
   Eigen::Vector3d shiftBeyondAffected() const;
-  void releaseOld(Variable &v);
+  void compressOld(Variable &v);
 
   // lag.cpp
-  void closeBehindLag();
-  void closeVariable(int variable);
-  void moveKept();
+  void marginaliseBehindLag();
+  void marginaliseVariable(int variable);
+  void reorderKept();
 
   // optimize.cpp
   void measureDampingScale();
@@ -264,7 +264,7 @@ template <typename Use> auto withColumns(const Variable &v, Use &&use)
   return v.old_columns.empty() ? use(v.columns.data()) : use(v.old_columns.data());
 }
 
-/// Where one was freed, or at the end.
+/// Stores data of a factor where some was freed, or at the end.
 template <typename Data> int Smoother::State::placeData(std::deque<Data> &list, FactorKind kind, Data data)
 {
   std::vector<int> &free = free_data[static_cast<std::size_t>(kind)];

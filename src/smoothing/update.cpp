@@ -23,8 +23,8 @@ constexpr int kQuiet = 16;             ///< variables in a row that are near the
 
 void Smoother::State::touch(int variable) { touched.push_back(variable); }
 
-/// The affected variables: all on the paths from the touched ones to their roots.
-void Smoother::State::closeUpwards()
+/// Marks the affected variables: the touched ones and all their ancestors in the elimination tree.
+void Smoother::State::markAncestors()
 {
   ++stamp;
   affected.clear();
@@ -55,7 +55,7 @@ void Smoother::State::reeliminate(UpdateResult &result)
     if (factor.alive && factor.stale)
       linearise(factor);
   }
-  closeUpwards();
+  markAncestors();
   touched.clear();
   addMissingContributions();
   orderAffected();
@@ -104,7 +104,7 @@ void Smoother::State::reeliminate(UpdateResult &result)
     eliminate(id);
     constant_cost += variables[id].share;
     for (const int child : variables[id].children) // its part is taken in
-      releaseOld(variables[child]);
+      compressOld(variables[child]);
   }
   result.eliminated += affected.size();
   freeDropped();
@@ -145,7 +145,7 @@ void Smoother::State::visitBelow(std::vector<Descent> &open, int &visits, Update
     v.visited = passes;
     const bool stale = staleness(v, rhs) > options.propagation_threshold;
     if (stale)
-      settle(v, id, rhs, result);
+      resolveIfStale(v, id, rhs, result);
     const int still = stale ? 0 : quiet + 1;
     if (still < kQuiet && below > 0)
       pushChildren(open, id, below - 1, still);
@@ -159,7 +159,7 @@ void Smoother::State::pushChildren(std::vector<Descent> &open, int id, int below
       open.push_back({c, below, quiet});
 }
 
-void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &result)
+void Smoother::State::resolveIfStale(Variable &v, int id, double *rhs, UpdateResult &result)
 {
   solve(v, rhs);
   if (!v.delta.allFinite()) {
@@ -175,7 +175,7 @@ void Smoother::State::settle(Variable &v, int id, double *rhs, UpdateResult &res
 
 /// How deep below what was eliminated again this pass goes. Every kPassesBetween-th pass goes twice as deep, of those
 /// again every kPassesBetween-th, and so on: variables far back are brought up to date too, but less often.
-int Smoother::State::reach()
+int Smoother::State::passDepth()
 {
   if (options.propagation_threshold == 0)
     return std::numeric_limits<int>::max();
@@ -192,11 +192,11 @@ void Smoother::State::backSubstitute(UpdateResult &result)
 {
   double rhs[6];
   ++passes;
-  const int below = reach();
+  const int below = passDepth();
   for (auto id = affected.rbegin(); id != affected.rend(); ++id) {
     variables[*id].visited = passes;
     staleness(variables[*id], rhs);
-    settle(variables[*id], *id, rhs, result);
+    resolveIfStale(variables[*id], *id, rhs, result);
     pushChildren(descents, *id, below - 1, 0);
   }
   int visits = options.propagation_threshold == 0 ? std::numeric_limits<int>::max() : kVisits;
@@ -205,7 +205,7 @@ void Smoother::State::backSubstitute(UpdateResult &result)
   postponed.insert(postponed.end(), descents.begin(), descents.end());
   descents.clear();
   const auto isFine = [this](int id) {
-    variables[id].in_moved = variables[id].in_moved && movedTooFar(variables[id]);
+    variables[id].in_moved = variables[id].in_moved && needsRelinearisation(variables[id]);
     return !variables[id].in_moved;
   };
   moved.erase(std::remove_if(moved.begin(), moved.end(), isFine), moved.end());
@@ -215,7 +215,7 @@ void Smoother::State::backSubstitute(UpdateResult &result)
 /// variable is eliminated again. The blocks of its factors are freed as well (they are linearised again at the same
 /// points), and its columns rounded: an error of 6e-8 of their entries, which are inverse standard deviations. A delta
 /// of a metre beside a standard deviation of .1 mm is off by 1e-3 of the latter.
-void Smoother::State::releaseOld(Variable &v)
+void Smoother::State::compressOld(Variable &v)
 {
   if (options.fixed_lag > 0) // bounds the memory by itself, and closes a pose by its contribution
     return;
@@ -304,7 +304,7 @@ void Smoother::State::moveLinearisation(UpdateResult &result)
   moved.clear();
   if (!any)
     return;
-  closeUpwards();
+  markAncestors();
   const Eigen::Vector3d shift = shiftBeyondAffected();
   for (const int id : affected) {
     if (variables[id].in_moved || isInside(variables[id])) {
@@ -328,11 +328,11 @@ UpdateResult Smoother::State::update()
     backSubstitute(result);
     if (const int old = static_cast<int>(poses.size()) - 1 - kRecentPoses; old >= 0 && isOpen(poses[old].variable))
       for (const int child : variables[poses[old].variable].children)
-        releaseOld(variables[child]);
+        compressOld(variables[child]);
     ++result.iterations;
   }
   if (options.fixed_lag > 0)
-    closeBehindLag();
+    marginaliseBehindLag();
   result.cost = constant_cost;
   if (!moved.empty())
     result.status = UpdateStatus::iteration_limit;

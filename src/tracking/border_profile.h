@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What an image says across one border: the front end of both trackers, that of the map and vpMbTrunkTracker.
+/// The profile of an image across one border: the front end of both trackers, that of the map and vpMbTrunkTracker.
 ///
 /// Idea: the energy that holds in textured forest is the absolute value of the *mean of the signed* gradient along a
 /// border, since bark and leaves cancel in the sum. The mean is taken first, at every offset of a scan at once, and

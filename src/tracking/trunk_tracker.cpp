@@ -196,7 +196,7 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
     return finish(prediction.left_hidden || prediction.right_hidden ? TrackingStatus::occluded
                                                                     : TrackingStatus::not_visible);
 
-  // where the borders may be, and which pair of maxima they are
+  // scan for maxima under the prediction, and choose the pair of them that are the borders
   RelativeTrunk start = prediction.relative;
   PeakPair pair;
   if (options.scan) {

@@ -42,7 +42,7 @@ enum class TrackingStatus
 };
 const char *toString(TrackingStatus status);
 
-/// What is known before looking.
+/// The prediction of a trunk before it is tracked in an image.
 struct TrackingPrediction
 {
   RelativeTrunk relative;

@@ -48,7 +48,7 @@ const std::vector<Step> kSteps = {
     {"log-odds not asked before confirmation",
      [](StageOptions &o) {
        o.map.confirm_odds = -20;
-       o.map.doubt_candidate = o.map.doubt_confirmed = -50;
+       o.map.reject_candidate = o.map.reject_confirmed = -50;
      }},
     {"saliency inside a trunk not asked", [](StageOptions &o) { o.map.near_range = 0; }},
     {"points behind a trunk not asked", [](StageOptions &o) { o.map.through_range = 0; }},

@@ -24,7 +24,7 @@ std::vector<Detection> detect(const DrawnFlight &flight, const std::vector<Inhib
                               const vpImage<float> *p_background = nullptr,
                               const DetectorOptions &options = DetectorOptions())
 {
-  return bestReadings(detectTrunks(flight.views(), flight.camera, known, p_background, options));
+  return suppressNonMaxima(detectTrunks(flight.views(), flight.camera, known, p_background, options));
 }
 
 TEST(Detector, FindsTrunksWhereTheyStandAndAsThickAsTheyAre)

@@ -3,8 +3,8 @@
 /// \file
 /// Trunks drawn as flat areas of grey, near before far, their borders smooth over a pixel.
 
-#include "detection/column_evidence.h"
 #include "detection/detector.h"
+#include "detection/photo_consistency.h"
 #include "geometry/so3.h"
 #include "gradient/gradient.h"
 
@@ -120,10 +120,10 @@ inline std::vector<DrawnTrunk> barkOf(const DrawnTrunk &trunk, double shadow)
   return all;
 }
 
-/// A flight past drawn trunks before the wall, as level images.
+/// A flight past drawn trunks before the wall, as rectified column images.
 struct LevelFlight
 {
-  std::vector<LevelImage> images;
+  std::vector<ColumnImage> images;
   std::vector<Pose> poses;
 
   LevelFlight(std::vector<DrawnTrunk> trunks, std::vector<Pose> path) : poses(std::move(path))
@@ -131,11 +131,12 @@ struct LevelFlight
     for (const DrawnTrunk &far : wall())
       trunks.push_back(far);
     for (const Pose &wMc : poses)
-      images.push_back(computeLevelImage(draw(trunks, wMc, PinholeCamera()), PinholeCamera(), wMc.R, ElevationRange()));
+      images.push_back(
+          computeColumnImage(draw(trunks, wMc, PinholeCamera()), PinholeCamera(), wMc.R, ElevationRange()));
   }
-  std::vector<LevelView> views() const
+  std::vector<ColumnView> views() const
   {
-    std::vector<LevelView> all;
+    std::vector<ColumnView> all;
     for (std::size_t i = 0; i < poses.size(); ++i)
       all.emplace_back(images[i], poses[i]);
     return all;

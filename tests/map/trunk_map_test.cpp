@@ -37,13 +37,13 @@ protected:
   double evidence(int id) const { return m_map.evidence(at(id)); }
   void see(int id, const TrunkView &view, std::optional<double> foreground = {}, double range = 0)
   {
-    Sighting sighting;
-    sighting.id = id;
-    sighting.kind = Sighting::Kind::seen;
-    sighting.view = view;
-    sighting.range = range;
-    sighting.foreground = foreground;
-    m_map.record(sighting);
+    TrunkMeasurement measurement;
+    measurement.id = id;
+    measurement.kind = TrunkMeasurement::Kind::seen;
+    measurement.view = view;
+    measurement.range = range;
+    measurement.foreground = foreground;
+    m_map.record(measurement);
   }
   /// \p views more views, the bearing sweeping \p parallax in all of them.
   void see(int id, int views, double parallax = 0.2, double innovation2 = 0.1)
@@ -64,10 +64,10 @@ protected:
   }
   void miss(int id, int frames)
   {
-    Sighting sighting;
-    sighting.id = id;
+    TrunkMeasurement measurement;
+    measurement.id = id;
     for (int i = 0; i < frames; ++i)
-      m_map.record(sighting);
+      m_map.record(measurement);
   }
   int confirmed(const Trunk &place, int views = 20)
   {
@@ -111,7 +111,7 @@ TEST_F(Life, OfWhatIsGivenUpForGoodARecordRemains)
 
     const bool keeps_all = memory == Memory::all, keeps_left = memory != Memory::in_sight;
     EXPECT_EQ(m_map.trunks().size(), keeps_all ? 3u : keeps_left ? 2u : 1u);
-    EXPECT_EQ(update.buried.size(), 3 - m_map.trunks().size());
+    EXPECT_EQ(update.archived.size(), 3 - m_map.trunks().size());
     EXPECT_EQ(update.removed.size(), keeps_left ? 1u : 2u); // from the smoother
     EXPECT_TRUE(m_map.isActive(stays));
     EXPECT_FALSE(m_map.isActive(gone));
@@ -127,7 +127,7 @@ TEST_F(Life, OfWhatIsGivenUpForGoodARecordRemains)
       EXPECT_EQ(records[i].observations, before[i].observations);
       EXPECT_EQ(records[i].last_seen_s, before[i].last_seen_s);
     }
-    EXPECT_EQ(records[0].fate, TrunkFate::missed);
+    EXPECT_EQ(records[0].reject_reason, RejectReason::missed);
     EXPECT_EQ(records[1].status, TrunkStatus::candidate);
     EXPECT_EQ(records[2].status, TrunkStatus::confirmed);
     EXPECT_EQ(add(trunkAt(9, 9)), 3); // no id is given twice
@@ -175,7 +175,7 @@ TEST_F(Life, TrunksAreRecognisedByTheirConstellationWhenThePathHasDrifted)
   for (const MapUpdate::Merge &merge : update.merged)
     EXPECT_EQ(merge.gone, merge.keep + 6);
   for (const int id : again)
-    EXPECT_EQ(m_map.trunk(id).fate, TrunkFate::duplicate);
+    EXPECT_EQ(m_map.trunk(id).reject_reason, RejectReason::duplicate);
 }
 
 TEST_F(Life, OtherTrunksAreNotTakenForThoseOfAnEarlierVisit)
@@ -227,8 +227,8 @@ TEST_F(Life, WithoutParallaxATrunkEarnsItsPlaceByEvenBordersAlone)
   EXPECT_EQ(at(even).status, TrunkStatus::confirmed);
   EXPECT_NE(at(uneven).status, TrunkStatus::confirmed);
   EXPECT_NE(at(faint).status, TrunkStatus::confirmed);
-  EXPECT_EQ(m_map.forgetUnranged().removed.size(), m_map.trunks().size() - 2); // those two were given up before
-  EXPECT_EQ(at(even).fate, TrunkFate::unranged);
+  EXPECT_EQ(m_map.removeUnranged().removed.size(), m_map.trunks().size() - 2); // those two were given up before
+  EXPECT_EQ(at(even).reject_reason, RejectReason::unranged);
   EXPECT_TRUE(m_map.active().empty());
 }
 
@@ -304,7 +304,7 @@ TEST_F(Life, APlaceThatIsKnownLessWellThanAskedForLeavesATrunkOutOfTheRecordsAlo
     const bool is_left_out = most == 0.5;
     EXPECT_EQ(m_map.records()[0].status, is_left_out ? TrunkStatus::candidate : TrunkStatus::confirmed) << most;
     EXPECT_EQ(m_map.records(kBreastHeight, false)[0].status, TrunkStatus::confirmed); // bearings have no place
-    EXPECT_EQ(m_map.records()[0].fate, is_left_out ? TrunkFate::undecided : TrunkFate::none) << most;
+    EXPECT_EQ(m_map.records()[0].reject_reason, is_left_out ? RejectReason::undecided : RejectReason::none) << most;
     EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
   }
 }
@@ -317,13 +317,13 @@ TEST_F(Life, TheProbabilityThatIsToldIsTheOneThatDecides)
     const int trunk = add(trunkAt(3, 1));
     see(trunk, 20);
     EXPECT_GT(m_map.logOdds(at(trunk)), m_options.confirm_odds + 0.2);
-    m_map.record(ColumnOdds{trunk, m_options.confirm_odds + columns, 6, 0});
+    m_map.record(ConsistencyScore{trunk, m_options.confirm_odds + columns, 6, 0});
     review();
     EXPECT_EQ(at(trunk).status == TrunkStatus::confirmed, columns > 0);
     EXPECT_EQ(m_map.records()[0].probability >= least, columns > 0);
   }
   const int judged = confirmed(trunkAt(9, 1));
-  m_map.decide({{judged, m_options.confirm_odds + 0.3, true, std::nullopt}});
+  m_map.applyDecisions({{judged, m_options.confirm_odds + 0.3, true, std::nullopt}});
   EXPECT_NEAR(m_map.records()[static_cast<std::size_t>(judged)].probability,
               1 / (1 + std::exp(-m_options.confirm_odds - 0.3)), 1e-9);
 }
@@ -372,7 +372,7 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
     change(changed);
     return m_map.evidence(changed);
   };
-  EXPECT_GT(after([](MapTrunk &t) { t.found_again = 3; }), odds);
+  EXPECT_GT(after([](MapTrunk &t) { t.redetections = 3; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.left.high += 0.2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.contrast *= 2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.innovation2 /= 2; }), odds);
@@ -389,12 +389,12 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
 TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)
 {
   const int trunk = add(trunkAt(3, 1));
-  see(trunk, m_options.doubt_observations - 1, 0.2, 9);
+  see(trunk, m_options.reject_observations - 1, 0.2, 9);
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::candidate); // too early to say
   see(trunk, 1, 0, 9);
   miss(trunk, m_options.lost_misses - 1);
-  ASSERT_LT(evidence(trunk), m_options.doubt_candidate);
+  ASSERT_LT(evidence(trunk), m_options.reject_candidate);
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
   EXPECT_TRUE(at(trunk).removed);
@@ -404,7 +404,7 @@ TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
 {
   const int trunk = confirmed(trunkAt(3, 1));
   change(trunk, [](MapTrunk &t) { t.innovation2 = 9; });
-  ASSERT_LT(evidence(trunk), m_options.doubt_confirmed);
+  ASSERT_LT(evidence(trunk), m_options.reject_confirmed);
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
   EXPECT_TRUE(at(trunk).removed);
@@ -414,11 +414,11 @@ TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
 TEST_F(Life, ATrunkWhoseColumnsSpeakAgainstItIsGivenUpOnceEnoughWereSeen)
 {
   const int trunk = confirmed(trunkAt(3, 1)), other = confirmed(trunkAt(6, 1));
-  m_map.record(ColumnOdds{trunk, -2, 6});
-  m_map.record(ColumnOdds{other, 2, 30});
+  m_map.record(ConsistencyScore{trunk, -2, 6});
+  m_map.record(ConsistencyScore{other, 2, 30});
   review();
   EXPECT_FALSE(at(trunk).removed);
-  m_map.record(ColumnOdds{trunk, -2, 12});
+  m_map.record(ConsistencyScore{trunk, -2, 12});
   review();
   EXPECT_TRUE(at(trunk).removed);
   EXPECT_FALSE(at(other).removed);
@@ -427,11 +427,11 @@ TEST_F(Life, ATrunkWhoseColumnsSpeakAgainstItIsGivenUpOnceEnoughWereSeen)
 TEST_F(Life, WhatTheColumnsSpeakAgainstIsNotConfirmed)
 {
   const int trunk = add(trunkAt(3, 1));
-  m_map.record(ColumnOdds{trunk, -0.7, 4});
+  m_map.record(ConsistencyScore{trunk, -0.7, 4});
   see(trunk, 20);
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::candidate);
-  m_map.record(ColumnOdds{trunk, 0.5, 5});
+  m_map.record(ConsistencyScore{trunk, 0.5, 5});
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
 }
@@ -440,7 +440,7 @@ TEST_F(Life, WhatTheColumnsSpeakAgainstIsNotConfirmed)
 TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
 {
   const int trunk = confirmed(trunkAt(3, 1, 0.08));
-  m_map.record(ColumnOdds{trunk, 1, 20, 1});
+  m_map.record(ConsistencyScore{trunk, 1, 20, 1});
   const std::size_t before = at(trunk).smoother_id;
   const double first_s = at(trunk).first_seen_s;
   NewTrunk wider;
@@ -448,12 +448,12 @@ TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
   wider.trunk = trunkAt(3.02, 0.95, 0.15);
   wider.covariance = 4e-4 * Matrix5d::Identity();
   wider.views = {viewAt(m_time_s, 0.5, 0.2, -0.2, 0.9, 0.1), viewAt(m_time_s + 0.1, 0.52, 0.2, -0.2, 0.9, 0.1)};
-  EXPECT_EQ(m_map.readAgain(trunk, wider), before);
+  EXPECT_EQ(m_map.replaceHypothesis(trunk, wider), before);
   EXPECT_EQ(at(trunk).smoother_id, 77u);
   EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
   EXPECT_NEAR(at(trunk).trunk.radius(), 0.15, 1e-12);
   EXPECT_EQ(at(trunk).observations, 2);
-  EXPECT_EQ(at(trunk).column_views, 0);
+  EXPECT_EQ(at(trunk).consistency_views, 0);
   EXPECT_FALSE(at(trunk).is_silhouette);
   EXPECT_NEAR(at(trunk).left_contrast.value_or(0), 0.2, 1e-12); // not mixed with the former border's
   EXPECT_NEAR(at(trunk).left.high - at(trunk).left.low, 0.02, 1e-12);
@@ -524,7 +524,7 @@ TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeen
   EXPECT_TRUE(m_map.active().empty());
   EXPECT_FALSE(at(candidate).removed);
   ASSERT_EQ(m_map.records().size(), 1u);
-  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::undecided);
+  EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::undecided);
 }
 
 TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
@@ -537,7 +537,7 @@ TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
   const MapUpdate update = m_map.review(10.0 + 1.01 * m_options.candidate_memory_s);
 
   EXPECT_EQ(update.removed, std::vector<std::size_t>{at(never_seen).smoother_id});
-  EXPECT_EQ(at(never_seen).fate, TrunkFate::unseen);
+  EXPECT_EQ(at(never_seen).reject_reason, RejectReason::unseen);
   EXPECT_TRUE(at(never_seen).removed);
   EXPECT_FALSE(at(seen).removed);
 }
@@ -556,7 +556,7 @@ TEST_F(Life, ACandidateThatWasLeftBehindIsConfirmedInTheEndWhereItsEstimatesNowA
   m_map.reviewAll();
 
   EXPECT_EQ(at(candidate).status, TrunkStatus::confirmed);
-  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::none);
+  EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::none);
 }
 
 TEST_F(Life, AConfirmedTrunkIsNeverLeftBehind)
@@ -604,7 +604,7 @@ TEST_F(Life, ATrunkThatComesBackAsADuplicateHandsItsViewsOver)
   EXPECT_EQ(update.merged[0].keep, at(old).smoother_id);
   EXPECT_EQ(update.merged[0].gone, at(duplicate).smoother_id);
   EXPECT_TRUE(update.removed.empty());
-  EXPECT_EQ(at(duplicate).fate, TrunkFate::duplicate);
+  EXPECT_EQ(at(duplicate).reject_reason, RejectReason::duplicate);
   EXPECT_EQ(at(old).observations, known + 20);
   EXPECT_EQ(at(old).last_seen_s, at(duplicate).last_seen_s);
 }
@@ -637,7 +637,7 @@ TEST_F(Life, ATrunkSeenLongIsNoGapForATrackThatSlipped)
     m_map.record(PointCount{trunk, 0, frame < 10 ? 1 : 0});
     m_map.record(PointCount{gap, 0, frame % 3 > 0 ? 1 : 0});
   }
-  EXPECT_GT(at(trunk).lookedThrough(), 4);
+  EXPECT_GT(at(trunk).seeThroughRatio(), 4);
   EXPECT_FALSE(at(trunk).isGap());
   EXPECT_TRUE(at(gap).isGap());
 }
@@ -646,8 +646,8 @@ TEST_F(Life, ATrunkWhosePlaceIsNotKnownAnyMoreIsLostFromSight)
 {
   const int trunk = confirmed(trunkAt(3, 1), 60), candidate = add(trunkAt(6, -2));
   see(candidate, 3);
-  m_map.loseSight(trunk);
-  m_map.loseSight(candidate);
+  m_map.markOutOfSight(trunk);
+  m_map.markOutOfSight(candidate);
   review();
   EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
   EXPECT_FALSE(at(trunk).removed);
@@ -664,7 +664,7 @@ TEST_F(Life, WhatLeansFartherThanTrunksDoIsNone)
   EXPECT_TRUE(review().changes.empty());
   change(trunk, [&](MapTrunk &known) { known.trunk.lean = {0, 5.1 * m_options.lean_sigma}; });
   review();
-  EXPECT_EQ(at(trunk).fate, TrunkFate::doubted);
+  EXPECT_EQ(at(trunk).reject_reason, RejectReason::doubted);
 }
 
 TEST_F(Life, ARivalSeenAtTheSameTimeTakesItsViewsWithIt)
@@ -676,7 +676,7 @@ TEST_F(Life, ARivalSeenAtTheSameTimeTakesItsViewsWithIt)
   const MapUpdate update = review();
   EXPECT_TRUE(update.merged.empty());
   EXPECT_EQ(update.removed, std::vector<std::size_t>{at(rival).smoother_id});
-  EXPECT_EQ(at(rival).fate, TrunkFate::outdone);
+  EXPECT_EQ(at(rival).reject_reason, RejectReason::outdone);
 }
 
 TEST_F(Life, AConfirmedTrunkOutOfSightStaysInTheRecords)
@@ -686,7 +686,7 @@ TEST_F(Life, AConfirmedTrunkOutOfSightStaysInTheRecords)
   review();
   ASSERT_EQ(at(trunk).status, TrunkStatus::lost);
   EXPECT_EQ(m_map.records()[0].status, TrunkStatus::confirmed);
-  EXPECT_EQ(m_map.records()[0].fate, TrunkFate::none);
+  EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::none);
 }
 
 TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
@@ -731,29 +731,29 @@ TEST_F(Life, NothingWiderIsHeldBesideATrunkWhoseSilhouetteWasSeen)
 {
   const int trunk = confirmed(trunkAt(3, 1, 0.1)), round = add(trunkAt(3.05, 1, 0.18));
   see(round, 5);
-  m_map.record(ColumnOdds{trunk, 3, 11, 0.5}); // too few views
+  m_map.record(ConsistencyScore{trunk, 3, 11, 0.5}); // too few views
   review();
   EXPECT_EQ(at(round).status, TrunkStatus::candidate);
-  m_map.record(ColumnOdds{trunk, 3, 12, 0.1}); // nor is this the background
+  m_map.record(ConsistencyScore{trunk, 3, 12, 0.1}); // nor is this the background
   review();
   EXPECT_EQ(at(round).status, TrunkStatus::candidate);
-  EXPECT_FALSE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
-  m_map.record(ColumnOdds{trunk, 3, 12, 0.5});
+  EXPECT_FALSE(m_map.associate(trunkAt(3.05, 1, 0.25)));
+  m_map.record(ConsistencyScore{trunk, 3, 12, 0.5});
   review();
   EXPECT_EQ(at(round).status, TrunkStatus::merged);
-  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
-  m_map.record(ColumnOdds{trunk, 3, 20, -0.5}); // light that changes takes nothing back
-  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1, 0.25)));
+  EXPECT_TRUE(m_map.associate(trunkAt(3.05, 1, 0.25)));
+  m_map.record(ConsistencyScore{trunk, 3, 20, -0.5}); // light that changes takes nothing back
+  EXPECT_TRUE(m_map.associate(trunkAt(3.05, 1, 0.25)));
 }
 
 TEST_F(Life, TheSameHypothesisIsNotTakenInTwice)
 {
   const int candidate = add(trunkAt(3, 1));
-  EXPECT_TRUE(m_map.recognise(trunkAt(3.05, 1)));
-  EXPECT_EQ(at(candidate).found_again, 1);
-  EXPECT_FALSE(m_map.recognise(trunkAt(3.05, 1, 0.3))); // another hypothesis
-  EXPECT_FALSE(m_map.recognise(trunkAt(4, 1)));
-  EXPECT_EQ(at(candidate).found_again, 1);
+  EXPECT_TRUE(m_map.associate(trunkAt(3.05, 1)));
+  EXPECT_EQ(at(candidate).redetections, 1);
+  EXPECT_FALSE(m_map.associate(trunkAt(3.05, 1, 0.3))); // another hypothesis
+  EXPECT_FALSE(m_map.associate(trunkAt(4, 1)));
+  EXPECT_EQ(at(candidate).redetections, 1);
 }
 
 TEST_F(Life, ParallaxIsTheSpreadOfTheBearingsAlsoAcrossHalfATurn)

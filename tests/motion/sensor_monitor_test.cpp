@@ -251,8 +251,8 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
       eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 1)); });
     monitor.process(frame, flight.seen(i));
     EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30) << i;
-    Frame room;
-    EXPECT_EQ(monitor.trusted(frame, room).gyro.empty(), i == 0 || i == 30) << i;
+    Frame scratch;
+    EXPECT_EQ(monitor.trusted(frame, scratch).gyro.empty(), i == 0 || i == 30) << i;
   }
   EXPECT_TRUE(monitor.verdicts().empty());
   EXPECT_TRUE(monitor.trusts(Sensor::gyro));
@@ -267,10 +267,10 @@ TEST(SensorMonitor, ATurnThatCannotBeIsLeftOutBeforeThePointsAreLookedFor)
     SensorMonitor monitor(forwardCamera());
     std::pair<int, int> without; // gyro, odometry
     for (std::size_t i = 0; i < kTo; ++i) {
-      Frame frame = flight.frame(i), room;
+      Frame frame = flight.frame(i), scratch;
       if (i >= kFrom)
         damage(frame);
-      const Frame &looked_at = monitor.withoutLiars(frame, room);
+      const Frame &looked_at = monitor.withoutRejectedSensors(frame, scratch);
       without.first += i > 0 && looked_at.gyro.empty();
       without.second += !looked_at.wMb_odometry;
       monitor.process(frame, flight.seen(i));
@@ -291,12 +291,14 @@ TEST(SensorMonitor, WithoutAnOdometryNoBodyBeginsToTurnAsFastAsAWildGyroSays)
   MadeFlight flight;
   SensorMonitor monitor(forwardCamera());
   for (std::size_t i = 0; i < 60; ++i) {
-    Frame frame = flight.frame(i), room;
+    Frame frame = flight.frame(i), scratch;
     frame.wMb_odometry.reset();
     const bool is_wild = i >= 30 && i < 40;
     if (is_wild)
       eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); });
-    EXPECT_EQ(monitor.withoutLiars(frame, room).gyro.empty(), i == 0 || is_wild || !monitor.trusts(Sensor::gyro)) << i;
+    EXPECT_EQ(monitor.withoutRejectedSensors(frame, scratch).gyro.empty(),
+              i == 0 || is_wild || !monitor.trusts(Sensor::gyro))
+        << i;
     monitor.process(frame, flight.seen(i));
     EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30 || (!is_wild && monitor.trusts(Sensor::gyro))) << i;
   }
@@ -372,8 +374,8 @@ TEST(SensorMonitor, ATrustedFrameHasNothingOfALiar)
 {
   const SensorMonitor monitor = fly(faults()[1].damage);
   Frame frame = MadeFlight().frame(5);
-  Frame room;
-  EXPECT_TRUE(monitor.trusted(frame, room).gyro.empty());
-  EXPECT_TRUE(monitor.trusted(frame, room).wMb_odometry);
+  Frame scratch;
+  EXPECT_TRUE(monitor.trusted(frame, scratch).gyro.empty());
+  EXPECT_TRUE(monitor.trusted(frame, scratch).wMb_odometry);
 }
 } // namespace bole

@@ -166,7 +166,7 @@ TEST_F(RunFiles, TrunksCsvHoldsTrunksAndHypothesesCsvTheRestWithTheReason)
   TrunkRecord outdone = confirmedTrunk();
   outdone.id = 8;
   outdone.status = TrunkStatus::lost;
-  outdone.fate = TrunkFate::outdone;
+  outdone.reject_reason = RejectReason::outdone;
   const std::vector<TrunkRecord> map = {confirmedTrunk(), outdone};
   writeTrunks(path("trunks.csv"), map);
   writeHypotheses(path("hypotheses.csv"), map);
@@ -175,7 +175,7 @@ TEST_F(RunFiles, TrunksCsvHoldsTrunksAndHypothesesCsvTheRestWithTheReason)
   EXPECT_EQ(trunks[0].id, 3);
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_EQ(rest[0].id, 8);
-  EXPECT_EQ(rest[0].fate, TrunkFate::outdone);
+  EXPECT_EQ(rest[0].reject_reason, RejectReason::outdone);
 }
 
 TEST_F(RunFiles, EveryColumnHasAUnitInALineThatBeginsAsAComment)

@@ -19,20 +19,20 @@ Trunk trunkAt(double x, double y, double radius)
   return trunk;
 }
 
-Judged judgedAt(int id, const Trunk &trunk, double log_odds)
+ScoredHypothesis judgedAt(int id, const Trunk &trunk, double log_odds)
 {
-  Judged judged;
-  judged.id = id;
-  judged.trunk = trunk;
-  judged.log_odds = log_odds;
-  return judged;
+  ScoredHypothesis scored;
+  scored.id = id;
+  scored.trunk = trunk;
+  scored.log_odds = log_odds;
+  return scored;
 }
 
 /// A camera that moves sideways past what stands along x.
 struct Path
 {
-  std::vector<LevelImage> images;
-  std::vector<LevelView> views;
+  std::vector<ColumnImage> images;
+  std::vector<ColumnView> views;
 
   Path() : images(10)
   {
@@ -46,10 +46,10 @@ struct Path
   }
 };
 
-std::vector<int> idsOf(const std::vector<Judged> &judged)
+std::vector<int> idsOf(const std::vector<ScoredHypothesis> &scored)
 {
   std::vector<int> ids;
-  for (const Judged &one : judged)
+  for (const ScoredHypothesis &one : scored)
     ids.push_back(one.id);
   return ids;
 }
@@ -80,19 +80,20 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
   constexpr double kFarthest = 14, kRadiusMax = 0.38;
   const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, lit{3.42, 0.39, 0.09, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
-  const std::vector<LevelView> views = flight.views();
-  const Judged narrow = judgedAt(1, test::trunkOf(lit), 3);
-  const auto doubt = doubtBorders({1, narrow.trunk}, views, kFarthest, kRadiusMax);
-  ASSERT_TRUE(doubt.has_value());
-  EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
-  EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.02);
-  EXPECT_FALSE(doubtBorders({1, narrow.trunk}, views, kFarthest, 0.1).has_value()); // wider than any trunk
-  Judged wide = judgedAt(1, test::trunkOf(whole), 2.8);
-  EXPECT_FALSE(doubtBorders({1, wide.trunk}, views, kFarthest, kRadiusMax).has_value()); // it ends there
-  EXPECT_TRUE(isSilhouetteOf(wide, narrow, *doubt, views, kFarthest));
+  const std::vector<ColumnView> views = flight.views();
+  const ScoredHypothesis narrow = judgedAt(1, test::trunkOf(lit), 3);
+  const auto proposal = proposeBorders({1, narrow.trunk}, views, kFarthest, kRadiusMax);
+  ASSERT_TRUE(proposal.has_value());
+  EXPECT_NEAR(proposal->guess.trunk.radius(), whole.radius, 0.02);
+  EXPECT_NEAR(proposal->guess.trunk.xy.y(), whole.y, 0.02);
+  EXPECT_FALSE(proposeBorders({1, narrow.trunk}, views, kFarthest, 0.1).has_value()); // wider than any trunk
+  ScoredHypothesis wide = judgedAt(1, test::trunkOf(whole), 2.8);
+  EXPECT_FALSE(proposeBorders({1, wide.trunk}, views, kFarthest, kRadiusMax).has_value()); // it ends there
+  EXPECT_TRUE(isBetterSilhouette(wide, narrow, *proposal, views, kFarthest));
   wide.log_odds = -2;
-  EXPECT_FALSE(isSilhouetteOf(wide, narrow, *doubt, views, kFarthest)); // less of a trunk than depth makes up for
-  EXPECT_FALSE(isSilhouetteOf(narrow, narrow, *doubt, views, kFarthest));
+  EXPECT_FALSE(
+      isBetterSilhouette(wide, narrow, *proposal, views, kFarthest)); // less of a trunk than depth makes up for
+  EXPECT_FALSE(isBetterSilhouette(narrow, narrow, *proposal, views, kFarthest));
 }
 
 /// A rim of light of less than two pixels is left out.
@@ -101,16 +102,16 @@ TEST(FinalPass, ForSteeringAPixelBeyondABorderIsEnoughToLookThere)
   constexpr double kFarthest = 14, kRadiusMax = 0.38;
   const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
-  const std::vector<LevelView> views = flight.views();
-  const auto judged = judge({1, test::trunkOf(without_rim), 3}, views, kFarthest);
-  const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
-  ASSERT_TRUE(judged && right);
-  EXPECT_FALSE(doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax).has_value());
-  const auto doubt = doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax, 1);
-  ASSERT_TRUE(doubt.has_value());
-  EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.01);
-  EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.01);
-  EXPECT_LT(silhouetteScore(*judged) + 0.05, silhouetteScore(*right));
+  const std::vector<ColumnView> views = flight.views();
+  const auto scored = scoreHypothesis({1, test::trunkOf(without_rim), 3}, views, kFarthest);
+  const auto right = scoreHypothesis({1, test::trunkOf(whole), 3}, views, kFarthest);
+  ASSERT_TRUE(scored && right);
+  EXPECT_FALSE(proposeBorders({1, scored->trunk}, views, kFarthest, kRadiusMax).has_value());
+  const auto proposal = proposeBorders({1, scored->trunk}, views, kFarthest, kRadiusMax, 1);
+  ASSERT_TRUE(proposal.has_value());
+  EXPECT_NEAR(proposal->guess.trunk.radius(), whole.radius, 0.01);
+  EXPECT_NEAR(proposal->guess.trunk.xy.y(), whole.y, 0.01);
+  EXPECT_LT(silhouetteScore(*scored) + 0.05, silhouetteScore(*right));
 }
 
 /// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
@@ -119,21 +120,21 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
   constexpr double kFarthest = 14, kRadiusMax = 0.38;
   const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, wide{3.55, 0.37, 0.25, 0}, beside{3.55, 0.43, 0.18, 0};
   const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
-  const std::vector<LevelView> views = flight.views();
-  for (const test::DrawnTrunk &reading : {wide, beside}) {
-    const auto judged = judge({1, test::trunkOf(reading), 3}, views, kFarthest);
-    ASSERT_TRUE(judged.has_value());
-    EXPECT_TRUE(isBehind(judged->evidence));
-    const auto doubt = doubtBorders({1, judged->trunk}, views, kFarthest, kRadiusMax);
-    ASSERT_TRUE(doubt.has_value());
-    EXPECT_NEAR(doubt->guess.trunk.radius(), whole.radius, 0.02);
-    EXPECT_NEAR(doubt->guess.trunk.xy.y(), whole.y, 0.03);
-    EXPECT_TRUE(
-        isSilhouetteOf(*judge({1, doubt->guess.trunk, 3}, views, kFarthest), *judged, *doubt, views, kFarthest));
+  const std::vector<ColumnView> views = flight.views();
+  for (const test::DrawnTrunk &hypothesis : {wide, beside}) {
+    const auto scored = scoreHypothesis({1, test::trunkOf(hypothesis), 3}, views, kFarthest);
+    ASSERT_TRUE(scored.has_value());
+    EXPECT_TRUE(isBackgroundInside(scored->evidence));
+    const auto proposal = proposeBorders({1, scored->trunk}, views, kFarthest, kRadiusMax);
+    ASSERT_TRUE(proposal.has_value());
+    EXPECT_NEAR(proposal->guess.trunk.radius(), whole.radius, 0.02);
+    EXPECT_NEAR(proposal->guess.trunk.xy.y(), whole.y, 0.03);
+    EXPECT_TRUE(isBetterSilhouette(*scoreHypothesis({1, proposal->guess.trunk, 3}, views, kFarthest), *scored,
+                                   *proposal, views, kFarthest));
   }
-  const auto right = judge({1, test::trunkOf(whole), 3}, views, kFarthest);
+  const auto right = scoreHypothesis({1, test::trunkOf(whole), 3}, views, kFarthest);
   ASSERT_TRUE(right.has_value());
-  EXPECT_FALSE(isBehind(right->evidence));
+  EXPECT_FALSE(isBackgroundInside(right->evidence));
 }
 
 /// A reading that leaves a rim of a pixel and a half out on the right.
@@ -142,9 +143,9 @@ TEST(FinalPass, DepthHasItsShareInWhereATrunkEnds)
   constexpr double kFarthest = 14;
   const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
-  const std::vector<LevelView> views = flight.views();
+  const std::vector<ColumnView> views = flight.views();
   const Matrix5d sure = 1e-6 * Matrix5d::Identity();
-  const TrunkEstimate mended = endedByDepth({1, test::trunkOf(without_rim), sure}, views, kFarthest);
+  const TrunkEstimate mended = fuseDepthBorders({1, test::trunkOf(without_rim), sure}, views, kFarthest);
   EXPECT_GT(mended.trunk.radius(), without_rim.radius + 0.003);
   EXPECT_LT(mended.trunk.radius(), whole.radius);
   EXPECT_LT(mended.trunk.xy.y(), without_rim.y - 0.003);
@@ -154,11 +155,11 @@ TEST(FinalPass, DepthHasItsShareInWhereATrunkEnds)
   EXPECT_GT(wider(1, 1), std::pow(0.004, 2));
   EXPECT_LT(wider(1, 1), std::pow(0.02, 2));
   EXPECT_NEAR(wider(2, 2), wider(1, 1) / std::pow(mended.trunk.radius(), 2), 0.1 * wider(2, 2));
-  const TrunkEstimate right = endedByDepth({1, test::trunkOf(whole), sure}, views, kFarthest);
+  const TrunkEstimate right = fuseDepthBorders({1, test::trunkOf(whole), sure}, views, kFarthest);
   EXPECT_NEAR(right.trunk.radius(), whole.radius, 0.005);
   EXPECT_NEAR(right.trunk.xy.y(), whole.y, 0.005);
   EXPECT_LT((*right.covariance - sure)(1, 1), wider(1, 1));
-  const TrunkEstimate unseen = endedByDepth({1, test::trunkOf(whole), sure}, {}, kFarthest);
+  const TrunkEstimate unseen = fuseDepthBorders({1, test::trunkOf(whole), sure}, {}, kFarthest);
   EXPECT_TRUE(unseen.trunk.minus(test::trunkOf(whole)).isZero(0));
   EXPECT_TRUE((*unseen.covariance - sure).isZero(0));
 }
@@ -169,38 +170,38 @@ TEST(FinalPass, TheBarkTellsHowFarATrunkStands)
   constexpr double kFarthest = 14, kRadiusMax = 0.38;
   const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60};
   const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
-  const std::vector<LevelView> views = flight.views();
-  EXPECT_FALSE(nearerOrFarther({1, test::trunkOf(whole)}, views, kFarthest, kRadiusMax).has_value());
+  const std::vector<ColumnView> views = flight.views();
+  EXPECT_FALSE(proposeRange({1, test::trunkOf(whole)}, views, kFarthest, kRadiusMax).has_value());
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const LevelView &view : views)
+  for (const ColumnView &view : views)
     middle += view.position / static_cast<double>(views.size());
   for (const double scale : {1 / 1.08, 1.08}) {
-    Hypothesis reading{1, test::trunkOf(whole)};
-    reading.trunk.xy = middle + scale * (reading.trunk.xy - middle);
-    reading.trunk.log_radius += std::log(scale);
-    const auto guess = nearerOrFarther(reading, views, kFarthest, kRadiusMax);
+    Hypothesis hypothesis{1, test::trunkOf(whole)};
+    hypothesis.trunk.xy = middle + scale * (hypothesis.trunk.xy - middle);
+    hypothesis.trunk.log_radius += std::log(scale);
+    const auto guess = proposeRange(hypothesis, views, kFarthest, kRadiusMax);
     ASSERT_TRUE(guess.has_value()) << scale;
     EXPECT_LT((guess->trunk.xy - test::trunkOf(whole).xy).norm(), 0.06) << scale;
     EXPECT_NEAR(guess->trunk.radius(), whole.radius, 0.004) << scale;
-    EXPECT_FALSE(nearerOrFarther(reading, views, kFarthest, 0.17).has_value()) << "thicker than any trunk";
-    const Trunk between = placedByBark(reading.trunk, views, kFarthest);
-    EXPECT_LT((between.xy - 0.5 * (reading.trunk.xy + guess->trunk.xy)).norm(), 0.02) << "as sure as its borders";
+    EXPECT_FALSE(proposeRange(hypothesis, views, kFarthest, 0.17).has_value()) << "thicker than any trunk";
+    const Trunk between = fuseTextureRange(hypothesis.trunk, views, kFarthest);
+    EXPECT_LT((between.xy - 0.5 * (hypothesis.trunk.xy + guess->trunk.xy)).norm(), 0.02) << "as sure as its borders";
     EXPECT_NEAR(between.radius() / (between.xy - middle).norm(),
-                reading.trunk.radius() / (reading.trunk.xy - middle).norm(), 1e-9)
+                hypothesis.trunk.radius() / (hypothesis.trunk.xy - middle).norm(), 1e-9)
         << "as wide in the images";
   }
 }
 
 TEST(FinalPass, TheAlbumIsBounded)
 {
-  Album album;
+  KeyframeStore keyframes;
   const vpImage<unsigned char> image(4000, 4000, 90); // 16 MB each
   for (std::size_t i = 0; i < 40; ++i)
-    album.add(image, LevelImage(), i, 0.1 * static_cast<double>(i));
-  EXPECT_GE(album.frames().size(), 8u);
-  EXPECT_LE(album.frames().size(), 17u);
-  for (std::size_t i = 1; i < album.frames().size(); ++i)
-    EXPECT_GT(album.frames()[i].pose, album.frames()[i - 1].pose);
-  EXPECT_GE(album.frames().back().pose, 30u); // the end of the flight is kept too
+    keyframes.add(image, ColumnImage(), i, 0.1 * static_cast<double>(i));
+  EXPECT_GE(keyframes.frames().size(), 8u);
+  EXPECT_LE(keyframes.frames().size(), 17u);
+  for (std::size_t i = 1; i < keyframes.frames().size(); ++i)
+    EXPECT_GT(keyframes.frames()[i].pose, keyframes.frames()[i - 1].pose);
+  EXPECT_GE(keyframes.frames().back().pose, 30u); // the end of the flight is kept too
 }
 } // namespace

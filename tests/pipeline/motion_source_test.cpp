@@ -179,10 +179,10 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
   const MapTrunk *slot = standsAt(-0.7), *post = standsAt(1.1);
   ASSERT_TRUE(slot && post); // two borders with parallax are all that a trunk is asked for at first
   EXPECT_FALSE(post->removed);
-  EXPECT_GT(slot->lookedThrough(), 2);
+  EXPECT_GT(slot->seeThroughRatio(), 2);
   EXPECT_TRUE(slot->isGap());
   EXPECT_GT(post->points_on, 0);
-  EXPECT_EQ(post->lookedThrough(), 0);
+  EXPECT_EQ(post->seeThroughRatio(), 0);
 }
 } // namespace
 } // namespace bole

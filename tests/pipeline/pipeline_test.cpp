@@ -150,7 +150,8 @@ TEST(Pipeline, OfWhatIsNoTrunkItTellsWhy)
     pipeline.process(byHand(k));
   pipeline.finish();
   for (const TrunkRecord &trunk : pipeline.map())
-    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.fate == TrunkFate::none) << toString(trunk.fate);
+    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.reject_reason == RejectReason::none)
+        << toString(trunk.reject_reason);
 }
 
 TEST(Pipeline, AFrameThatIsNotOkKeepsItsReasonAndItsPose)

@@ -12,7 +12,7 @@
 #include "saliency/pyramid_loops.h"
 #include "saliency/rotation_loops.h"
 #include "smoothing/front_loops.h"
-#include "tracking/bark_loops.h"
+#include "tracking/patch_loops.h"
 #include "tracking/profile_loops.h"
 
 #include <cmath>

@@ -15,7 +15,7 @@
 #include "saliency/pyramid_loops.cpp"
 #include "saliency/rotation_loops.cpp"
 #include "smoothing/front_loops.cpp"
-#include "tracking/bark_loops.cpp"
+#include "tracking/patch_loops.cpp"
 #include "tracking/profile_loops.cpp"
 #include "vector_loops.h"
 

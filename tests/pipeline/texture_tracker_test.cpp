@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "pipeline/bark_follower.h"
+#include "pipeline/texture_tracker.h"
 
 #include "support/drawn_bark.h"
 
@@ -36,7 +36,7 @@ protected:
     one.tracking.range = {-0.3, 0.4};
     one.tracking.covariance = 1e-4 * Matrix4d::Identity(); // two pixels
     std::vector<PredictedTrunk> predicted{one};
-    m_follower.expect(test::drawBark(real(frame), m_trunk, bark), static_cast<std::size_t>(frame) + 1, real(frame - 1),
+    m_tracker.predict(test::drawBark(real(frame), m_trunk, bark), static_cast<std::size_t>(frame) + 1, real(frame - 1),
                       view, m_map, predicted);
     return predicted.front();
   }
@@ -46,7 +46,7 @@ protected:
     one.predicted = predicted;
     one.result.status = status;
     one.result.optimum = borders;
-    m_follower.read({one}, kCamera);
+    m_tracker.correct({one}, kCamera);
   }
   double off_px(const PredictedTrunk &predicted, int frame) const
   {
@@ -59,7 +59,7 @@ protected:
 
   Trunk m_trunk{{2.0, 0.2}, std::log(0.15)};
   TrunkMap m_map{MapOptions(), {}};
-  BarkFollower m_follower;
+  TextureTracker m_tracker;
 };
 
 TEST_F(FollowedBark, MendsThePredictionOfAWrongStep)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tracking/bark_shift.h"
+#include "tracking/texture_shift.h"
 
-#include "tracking/bark_loops.h"
+#include "tracking/patch_loops.h"
 
 #include <Eigen/Dense>
 
@@ -48,7 +48,7 @@ void centre(Patch &patch)
   }
 }
 
-/// Between pixels; -1 outside.
+/// Grey level between pixels by linear interpolation; -1 outside of the image.
 double interpolated(const vpImage<unsigned char> &image, const Eigen::Vector2d &u_px)
 {
   const int x = static_cast<int>(std::floor(u_px.x())), y = static_cast<int>(std::floor(u_px.y()));
@@ -60,10 +60,10 @@ double interpolated(const vpImage<unsigned char> &image, const Eigen::Vector2d &
 }
 
 /// What moves a pixel of the newer image to where the one before shows the same bark.
-class BarkWarp
+class TextureWarp
 {
 public:
-  BarkWarp(const BarkView &before, const BarkView &now, const PinholeCamera &camera, const Trunk &trunk)
+  TextureWarp(const TextureView &before, const TextureView &now, const PinholeCamera &camera, const Trunk &trunk)
       : m_camera(camera),
         m_aMb(before.wMc.inverse() * now.wMc),
         m_relative(relativeTrunk(now.wMc, Pose(), trunk)),
@@ -75,7 +75,7 @@ public:
   const RelativeTrunk &relative() const { return m_relative; }
   Eigen::Vector3d inTrunk(const Eigen::Vector2d &u_px) const { return m_tRc * m_camera.ray(u_px); }
 
-  /// None beside the trunk, and behind the camera before.
+  /// Where a pixel was in the image before; none beside the trunk or behind that camera.
   std::optional<Eigen::Vector2d> operator()(const Eigen::Vector2d &u_px) const
   {
     const Eigen::Vector3d ray = inTrunk(u_px);
@@ -98,8 +98,8 @@ private:
 };
 
 /// \p margin_px: columns that a shift may need beside the patch.
-Patch patchOf(const BarkWarp &warp, const BarkView &before, const PinholeCamera &camera, const ElevationRange &part,
-              int margin_px)
+Patch patchOf(const TextureWarp &warp, const TextureView &before, const PinholeCamera &camera,
+              const ElevationRange &part, int margin_px)
 {
   Patch patch;
   const RelativeTrunk &trunk = warp.relative();
@@ -140,7 +140,7 @@ Patch patchOf(const BarkWarp &warp, const BarkView &before, const PinholeCamera 
   return patch;
 }
 
-/// Sum of the squared differences at a shift, but for that of the means.
+/// Sum of the squared differences at a shift, without the difference of the means.
 double differenceAt(const Patch &patch, const vpImage<unsigned char> &image, int dx, int dy)
 {
   PatchSums sums;
@@ -156,7 +156,7 @@ struct AcrossMinimum
   double shift_px = 0, sigma_px = 0;
 };
 
-/// Of the left or the right half of the patch.
+/// The minimum for the left or the right half of the patch.
 std::optional<AcrossMinimum> halfMinimum(const Patch &patch, bool right, const vpImage<unsigned char> &image,
                                          int across, int dy)
 {
@@ -182,8 +182,8 @@ std::optional<AcrossMinimum> halfMinimum(const Patch &patch, bool right, const v
                        std::sqrt(2 * kShared * grey2 / curvature)};
 }
 
-/// What moves otherwise in one half is no bark, or not all of it.
-bool movesAsOne(const Patch &patch, const vpImage<unsigned char> &image, int across, int dy)
+/// Whether both halves of the patch move alike: what moves otherwise in one half is no bark, or not all of it.
+bool isRigid(const Patch &patch, const vpImage<unsigned char> &image, int across, int dy)
 {
   constexpr double kSigmas = 3, kLeast_px = 0.3, kMost_px = 1;
   const auto left = halfMinimum(patch, false, image, across, dy), right = halfMinimum(patch, true, image, across, dy);
@@ -194,12 +194,12 @@ bool movesAsOne(const Patch &patch, const vpImage<unsigned char> &image, int acr
 }
 } // namespace
 
-std::optional<BarkShift> barkShift(const BarkView &before, const BarkView &now, const PinholeCamera &camera,
-                                   const Trunk &trunk, const ElevationRange &part, double search_px)
+std::optional<TextureShift> textureShift(const TextureView &before, const TextureView &now, const PinholeCamera &camera,
+                                         const Trunk &trunk, const ElevationRange &part, double search_px)
 {
   constexpr double kUnique = 9; // chi-squared (1) by which another shift must be worse
   constexpr double kLeastSigma_px = 0.15, kMostSigma_px = 0.7;
-  const BarkWarp warp(before, now, camera, trunk);
+  const TextureWarp warp(before, now, camera, trunk);
   if (!warp.relative().isFinite())
     return std::nullopt;
   const int across = static_cast<int>(std::ceil(std::clamp(search_px, 1.0, 30.0))) + 1;
@@ -234,12 +234,12 @@ std::optional<BarkShift> barkShift(const BarkView &before, const BarkView &now, 
     for (Eigen::Index dx = 0; dx < columns; ++dx)
       if ((std::abs(dx - x) > 2 || std::abs(dy - y) > 2) && difference(dx, dy) < least + kUnique * kShared * grey2)
         return std::nullopt;
-  if (!movesAsOne(patch, now.image, across, static_cast<int>(y) - kVertical_px))
+  if (!isRigid(patch, now.image, across, static_cast<int>(y) - kVertical_px))
     return std::nullopt;
   const Eigen::Vector2d finer = (-solver.solve(gradient)).cwiseMax(-1.0).cwiseMin(1.0);
   const Eigen::Vector2d shift(double(x) - across + finer.x(), double(y) - kVertical_px + finer.y());
   const Eigen::Vector3d expected = warp.inTrunk(patch.middle_px), real = warp.inTrunk(patch.middle_px + shift);
-  return BarkShift{std::atan2(real.y(), real.x()) - std::atan2(expected.y(), expected.x()),
-                   std::pow(sigma_px / camera.fx, 2)};
+  return TextureShift{std::atan2(real.y(), real.x()) - std::atan2(expected.y(), expected.x()),
+                      std::pow(sigma_px / camera.fx, 2)};
 }
 } // namespace bole

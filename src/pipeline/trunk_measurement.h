@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What a frame shows of the trunks that were predicted in it.
+/// Measurements of the trunks predicted in a frame.
 
 #include "pipeline/prediction.h"
 #include <bole/summary_factor.h>
 
 namespace bole
 {
-/// A predicted trunk after the frame was looked at.
+/// A predicted trunk with its measurement in the frame.
 struct TrackedTrunk
 {
   PredictedTrunk predicted;
@@ -17,14 +17,15 @@ struct TrackedTrunk
   std::optional<double> foreground; ///< mean of 1 - p(background) inside it
 };
 
-/// Whether bearing and log(r/d) are where they were expected: chi square against the covariance of the prediction and
-/// the noise of the borders.
+/// Whether the measurement is inside the gate: chi-square bound on the squared Mahalanobis distance of bearing and
+/// log(r/d), by the covariance of the prediction and the noise of the borders.
 bool isInsideGate(const TrackingPrediction &prediction, const TrackingResult &result, double fx,
                   const FlowOptions &options);
 
-/// Mean square of the borders found against those expected [px^2], at most 9. It is divided by what is allowed to a
-/// wide trunk, whose borders are rougher, and to weak borders, which noise moves.
-double misfit(const TrackingResult &result, const RelativeTrunk &expected, double fx, const FlowOptions &options);
+/// Mean squared innovation of both borders [px^2], at most 9. It is divided by the variance allowed to a wide trunk,
+/// whose borders are rougher, and to weak borders, which noise moves.
+double meanSquaredInnovation(const TrackingResult &result, const RelativeTrunk &expected, double fx,
+                             const FlowOptions &options);
 
 /// Share of its information that a view from \p camera adds to the view before, from \p before [m].
 double weightOfView(const std::optional<Eigen::Vector3d> &before, const Eigen::Vector3d &camera,
@@ -33,7 +34,7 @@ double weightOfView(const std::optional<Eigen::Vector3d> &before, const Eigen::V
 /// The summary factor of a trunk tracked (Eq. 9), of which \p weight counts.
 SummaryFactor summaryOf(const TrackingResult &result, double weight);
 
-/// What the view of a trunk tracked adds to its history. \p expected: where the map had it.
+/// The view that a tracked trunk adds to its history. \p expected: its prediction.
 TrunkView viewOf(const TrackingResult &result, const RelativeTrunk &expected, const Trunk &trunk, const Viewpoint &view,
                  const FlowOptions &options);
 
@@ -42,7 +43,7 @@ std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vecto
                                       const TrunkMap &map, const vpImage<float> *p_background, const Viewpoint &view,
                                       const StageOptions &options);
 
-/// What the map is told of a trunk tracked.
-Sighting sightingOf(const TrackedTrunk &tracked, const TrunkMap &map, const Viewpoint &view,
-                    const FlowOptions &options);
+/// The measurement that the map records of a tracked trunk.
+TrunkMeasurement measurementOf(const TrackedTrunk &tracked, const TrunkMap &map, const Viewpoint &view,
+                               const FlowOptions &options);
 } // namespace bole

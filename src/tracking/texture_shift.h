@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// How far the bark of a trunk moved from one image to the next beside what was expected.
+/// How far the texture of a trunk moved from one image to the next beyond its prediction.
 ///
 /// Idea: borders may be taken for lines of light and shade or of what stands behind, and a border that slips does so
 /// frame by frame. What lies between them moves with the trunk and with nothing else: the pixels that surely show bark
@@ -20,13 +20,13 @@
 namespace bole
 {
 /// An image and where the camera stood, or is expected to stand.
-struct BarkView
+struct TextureView
 {
   const vpImage<unsigned char> &image;
   Pose wMc;
 };
 
-struct BarkShift
+struct TextureShift
 {
   double angle = 0;    ///< of the trunk about its axis' direction beside where it was expected, to the left [rad]
   double variance = 0; ///< [rad^2]
@@ -35,6 +35,6 @@ struct BarkShift
 /// \p part: tangents of elevation between which the trunk is looked at. \p search_px: largest shift that is looked for
 /// across the trunk, 1 to 30. None where the trunk is narrow in the image, or its bark shows too little or repeats
 /// itself.
-std::optional<BarkShift> barkShift(const BarkView &before, const BarkView &now, const PinholeCamera &camera,
-                                   const Trunk &trunk, const ElevationRange &part, double search_px);
+std::optional<TextureShift> textureShift(const TextureView &before, const TextureView &now, const PinholeCamera &camera,
+                                         const Trunk &trunk, const ElevationRange &part, double search_px);
 } // namespace bole

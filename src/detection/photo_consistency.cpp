@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "detection/column_evidence.h"
+#include "detection/photo_consistency.h"
 
 #include "geometry/median.h"
 #include "geometry/parabola.h"
@@ -26,13 +26,13 @@ constexpr double kLeastParallax = 0.015, kMostParallax = 0.08, kBestParallax = 0
 struct Seen
 {
   std::size_t view = 0;
-  TrunkInLevelView at;
+  TrunkInColumnView at;
 };
 
 constexpr double kBin = 0.5;                         // [px] of a place across where a trunk's ends are looked for
 constexpr std::size_t kMostInside = 12, kBeside = 4; // columns inside a trunk, beside each of its borders
 
-/// What the columns of ColumnCurves count for, in its order.
+/// What the columns of ConsistencyCurves count for, in its order.
 constexpr std::size_t kInside = 0, kBesideLeft = 1, kBesideRight = 2, kInsideLeft = 3, kInsideRight = 4;
 
 /// A column of a view that is compared.
@@ -44,7 +44,7 @@ struct Column
   std::size_t also = kInside;  ///< for what else, if for anything
 };
 
-std::vector<Column> columnsInside(const TrunkInLevelView &at, double radius, double px)
+std::vector<Column> columnsInside(const TrunkInColumnView &at, double radius, double px)
 {
   std::vector<Column> columns;
   columns.reserve(kMostInside + 2 * kBeside);
@@ -61,8 +61,8 @@ std::vector<Column> columnsInside(const TrunkInLevelView &at, double radius, dou
   return columns;
 }
 
-/// Inside the trunk and beside its borders.
-std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double px)
+/// The columns to compare: inside the trunk and beside its borders.
+std::vector<Column> columnsOf(const TrunkInColumnView &at, double radius, double px)
 {
   std::vector<Column> columns = columnsInside(at, radius, px);
   const double strip = std::max(2.5 * px, std::min(0.4 * at.half_angle, 6 * px));
@@ -75,9 +75,10 @@ std::vector<Column> columnsOf(const TrunkInLevelView &at, double radius, double 
 }
 
 /// The views that stand apart by the right parallax, the best first.
-std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &all, const std::vector<LevelView> &views)
+std::vector<std::size_t> stereoPartners(const Seen &seen, const std::vector<Seen> &all,
+                                        const std::vector<ColumnView> &views)
 {
-  const LevelView &view = views[seen.view];
+  const ColumnView &view = views[seen.view];
   const double c = std::cos(seen.at.bearing), s = std::sin(seen.at.bearing);
   const Vector2d toward = c * view.forward + s * view.left;
   std::vector<std::pair<double, std::size_t>> good;
@@ -104,7 +105,7 @@ std::vector<std::size_t> partnersOf(const Seen &seen, const std::vector<Seen> &a
 double across(const Vector2d &direction, const Vector2d &a) { return direction.x() * a.y() - direction.y() * a.x(); }
 
 /// What a trunk covers in a view [tan of the bearing]; nothing where it is not in sight.
-std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
+std::pair<double, double> coveredBy(const Trunk &trunk, const ColumnView &view)
 {
   const auto at = locate(trunk, view, std::numeric_limits<double>::infinity());
   if (!at)
@@ -113,7 +114,7 @@ std::pair<double, double> coveredBy(const Trunk &trunk, const LevelView &view)
 }
 
 /// How \p view sees what stands at a range along \p direction from \p from and leans by \p lean [tan].
-CarriedColumn carriedTo(const LevelView &view, const Vector2d &from, const Vector2d &direction, const Vector2d &lean)
+CarriedColumn carriedTo(const ColumnView &view, const Vector2d &from, const Vector2d &direction, const Vector2d &lean)
 {
   const Vector2d base = from - view.position;
   const auto number = [](double value) { return static_cast<float>(value); };
@@ -128,7 +129,7 @@ CarriedColumn carriedTo(const LevelView &view, const Vector2d &from, const Vecto
           std::numeric_limits<float>::max()};
 }
 
-OtherColumns numbersOf(const LevelImage &image)
+OtherColumns numbersOf(const ColumnImage &image)
 {
   OtherColumns columns{};
   columns.q_first = static_cast<float>(image.q_first);
@@ -146,7 +147,7 @@ OtherColumns numbersOf(const LevelImage &image)
 /// \p add: takes the kind of a column, which of the ranges, the difference.
 template <std::size_t Tried, typename Add>
 void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
-             const std::vector<LevelView> &views, const std::array<double, Tried> &scales, const Add &add)
+             const std::vector<ColumnView> &views, const std::array<double, Tried> &scales, const Add &add)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
@@ -154,15 +155,15 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
   constexpr double kHidden = 1.05;  // over the range of the trunk: behind it
   struct Partner
   {
-    const LevelView *view;
+    const ColumnView *view;
     std::pair<double, double> covered;
     OtherColumns columns;
     float by_value;
   };
-  const LevelView &view = views[seen.view];
+  const ColumnView &view = views[seen.view];
   std::vector<Partner> partners;
   partners.reserve(kPartners);
-  for (const std::size_t p : partnersOf(seen, all, views)) {
+  for (const std::size_t p : stereoPartners(seen, all, views)) {
     const double unit = std::max(kUnit * 0.5 * (view.image->contrast + views[p].image->contrast), kLeast);
     partners.push_back(
         {&views[p], coveredBy(trunk, views[p]), numbersOf(*views[p].image), static_cast<float>(1 / unit)});
@@ -198,18 +199,18 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
   }
 }
 
-/// What one view says of \p trunk beside its partners among \p all; nothing where there is nothing to compare.
-std::optional<ColumnCurves> curvesOf(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all,
-                                     const std::vector<LevelView> &views)
+/// Compares one view of \p trunk with its stereo partners among \p all; none where no partner shows the same columns.
+std::optional<ConsistencyCurves> curvesOf(const Trunk &trunk, const Seen &seen, const std::vector<Seen> &all,
+                                          const std::vector<ColumnView> &views)
 {
-  ColumnCurves here;
+  ConsistencyCurves here;
   compare(trunk, seen, columnsOf(seen.at, trunk.radius(), views[seen.view].image->step), all, views, kScales,
           [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); });
   return here.count[kInside][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
-/// The views that show it.
-std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+/// The views in which \p trunk is in sight.
+std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   std::vector<Seen> all;
   all.reserve(views.size());
@@ -219,8 +220,8 @@ std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<LevelView> &vi
   return all;
 }
 
-/// As many as are looked at, spread over the flight.
-std::vector<Seen> spread(const std::vector<Seen> &all)
+/// At most kViews of the views, evenly spread over the flight.
+std::vector<Seen> evenSubset(const std::vector<Seen> &all)
 {
   constexpr std::size_t kViews = 24;
   if (all.size() <= kViews)
@@ -233,13 +234,13 @@ std::vector<Seen> spread(const std::vector<Seen> &all)
 }
 } // namespace
 
-void ColumnCurves::add(std::size_t kind, std::size_t range, double value)
+void ConsistencyCurves::add(std::size_t kind, std::size_t range, double value)
 {
   sum[kind][range] += value;
   ++count[kind][range];
 }
 
-void ColumnCurves::add(const ColumnCurves &view)
+void ConsistencyCurves::add(const ConsistencyCurves &view)
 {
   for (std::size_t kind = 0; kind < sum.size(); ++kind)
     for (std::size_t k = 0; k < kTriedRanges; ++k)
@@ -248,7 +249,7 @@ void ColumnCurves::add(const ColumnCurves &view)
   ++views;
 }
 
-void ColumnCurves::fade(double share)
+void ConsistencyCurves::fade(double share)
 {
   for (std::size_t kind = 0; kind < sum.size(); ++kind)
     for (std::size_t k = 0; k < kTriedRanges; ++k) {
@@ -257,12 +258,12 @@ void ColumnCurves::fade(double share)
     }
 }
 
-double ColumnCurves::mean(std::size_t kind, std::size_t range) const
+double ConsistencyCurves::mean(std::size_t kind, std::size_t range) const
 {
   return count[kind][range] > 0 ? sum[kind][range] / count[kind][range] : std::numeric_limits<double>::infinity();
 }
 
-double ColumnCurves::least(std::size_t kind, std::size_t first, std::size_t end) const
+double ConsistencyCurves::least(std::size_t kind, std::size_t first, std::size_t end) const
 {
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t s = first; s < end; ++s)
@@ -270,28 +271,28 @@ double ColumnCurves::least(std::size_t kind, std::size_t first, std::size_t end)
   return best;
 }
 
-LevelView::LevelView(const LevelImage &level, const Pose &wMc, double time)
+ColumnView::ColumnView(const ColumnImage &level, const Pose &wMc, double time)
     : image(&level), position(wMc.t.head<2>()), z(wMc.t.z()), time_s(time)
 {
   forward = (wMc.R * level.cRl).col(0).head<2>().normalized();
   left = {-forward.y(), forward.x()};
 }
 
-std::optional<TrunkInLevelView> locate(const Trunk &trunk, const LevelView &view, double farthest)
+std::optional<TrunkInColumnView> locate(const Trunk &trunk, const ColumnView &view, double farthest)
 {
   constexpr double kAhead = 0.3, kNotInside = 0.3, kSide = 0.02; // [m], [m] from the bark, [rad]
   const Vector2d w = trunk.axisAt(view.z).head<2>() - view.position;
   const double ahead = w.dot(view.forward), range = w.norm(), radius = trunk.radius();
   if (ahead < kAhead || range < radius + kNotInside || range > farthest)
     return std::nullopt;
-  TrunkInLevelView at{std::atan2(w.dot(view.left), ahead), std::asin(radius / range), range};
+  TrunkInColumnView at{std::atan2(w.dot(view.left), ahead), std::asin(radius / range), range};
   if (std::abs(at.bearing) + at.half_angle > std::atan(-view.image->q_first) - kSide)
     return std::nullopt;
   return at;
 }
 
-std::optional<ColumnCurves> columnsOfView(const Trunk &trunk, std::size_t which, const std::vector<LevelView> &views,
-                                          double farthest)
+std::optional<ConsistencyCurves> consistencyOfView(const Trunk &trunk, std::size_t which,
+                                                   const std::vector<ColumnView> &views, double farthest)
 {
   const auto at = locate(trunk, views[which], farthest);
   if (!at)
@@ -299,27 +300,28 @@ std::optional<ColumnCurves> columnsOfView(const Trunk &trunk, std::size_t which,
   const auto here = curvesOf(trunk, {which, *at}, locateAll(trunk, views, farthest), views);
   if (!here)
     return std::nullopt;
-  ColumnCurves curves;
+  ConsistencyCurves curves;
   curves.add(*here);
   return curves;
 }
 
-std::optional<ColumnEvidence> columnEvidence(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+std::optional<PhotoConsistency> photoConsistency(const Trunk &trunk, const std::vector<ColumnView> &views,
+                                                 double farthest)
 {
   const std::vector<Seen> all = locateAll(trunk, views, farthest);
-  ColumnCurves curves;
-  for (const Seen &seen : spread(all))
+  ConsistencyCurves curves;
+  for (const Seen &seen : evenSubset(all))
     if (const auto here = curvesOf(trunk, seen, all, views))
       curves.add(*here);
-  return evidenceOf(curves);
+  return consistencyOf(curves);
 }
 
-std::optional<ColumnEvidence> evidenceOf(const ColumnCurves &curves)
+std::optional<PhotoConsistency> consistencyOf(const ConsistencyCurves &curves)
 {
   constexpr int kLeastViews = 3;
   if (curves.views < kLeastViews)
     return std::nullopt;
-  ColumnEvidence evidence;
+  PhotoConsistency evidence;
   evidence.views = curves.views;
   const auto from = [&](std::size_t kind, std::size_t first, std::size_t end, double own) {
     const double best = curves.least(kind, first, end);
@@ -352,7 +354,7 @@ struct LeastDifference
 
 /// \p on_bark: how far what the columns show stands out from the plane of the axis, 1 as the bark does.
 std::optional<LeastDifference> leastDifference(double on_bark, const Trunk &trunk, const std::vector<Seen> &all,
-                                               const std::vector<LevelView> &views)
+                                               const std::vector<ColumnView> &views)
 {
   constexpr std::size_t kTried = 32;
   constexpr double kStep = 0.02; // of the logarithm of the range
@@ -360,7 +362,7 @@ std::optional<LeastDifference> leastDifference(double on_bark, const Trunk &trun
   std::array<double, kTried> scales, sum{}, seen{};
   for (std::size_t k = 0; k < kTried; ++k)
     scales[k] = std::exp(kStep * (static_cast<double>(k) - 0.5 * (kTried - 1)));
-  for (const Seen &one : spread(all)) {
+  for (const Seen &one : evenSubset(all)) {
     std::vector<Column> columns = columnsInside(one.at, trunk.radius(), views[one.view].image->step);
     for (Column &column : columns) {
       const double axis = one.at.range * std::cos(column.angle - one.at.bearing);
@@ -387,7 +389,7 @@ std::optional<LeastDifference> leastDifference(double on_bark, const Trunk &trun
 }
 } // namespace
 
-std::optional<double> rangeByColumns(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+std::optional<double> rangeByTexture(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kSure = 0.01; // a mean difference that speaks for the one or the other
   const std::vector<Seen> all = locateAll(trunk, views, farthest);
@@ -402,7 +404,7 @@ namespace
 {
 /// depthBorders(), looked for up to \p reach bins on either side of the axis. \p px: DepthBorders::px.
 std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk &trunk, const std::vector<Seen> &all,
-                                               const std::vector<LevelView> &views)
+                                               const std::vector<ColumnView> &views)
 {
   // logarithms of the ratio of both differences, the trunk's over the background's
   constexpr double kThere = -0.5, kSurely = -0.3, kLikely = -0.15;
@@ -411,9 +413,9 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
                                                     kScales[8],        kScales[9],    kScales[10]};
   constexpr std::size_t kHere = 3; // of them the first
   const double radius = trunk.radius(), bin = kBin * px;
-  std::vector<ColumnCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
+  std::vector<ConsistencyCurves> places(static_cast<std::size_t>(2 * reach + 1)); // across, from right to left
   std::vector<Column> columns(places.size());
-  for (const Seen &seen : spread(all)) {
+  for (const Seen &seen : evenSubset(all)) {
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const double across = bin * (static_cast<double>(i) - reach);
       const double depth = std::sqrt(std::max(radius * radius - across * across, 0.0));
@@ -424,7 +426,7 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
             [&places](std::size_t i, std::size_t k, double d) { places[i].add(0, k, d); });
   }
   const auto ratioAt = [&](int across) { // infinite or NaN where it is not known
-    const ColumnCurves &place = places[static_cast<std::size_t>(across + reach)];
+    const ConsistencyCurves &place = places[static_cast<std::size_t>(across + reach)];
     return std::log((place.least(0, 0, kHere) + kAlike) / (place.least(0, kHere, kHereAndBehind.size()) + kAlike));
   };
   const int within = static_cast<int>(0.7 * radius / bin);
@@ -452,7 +454,7 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
 }
 } // namespace
 
-std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<LevelView> &views, double farthest)
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kNear = 6, kFar = 8; // [px] outside of the borders
   constexpr std::size_t kLeastViews = 6;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "pipeline/sighting.h"
+#include "pipeline/trunk_measurement.h"
 
 #include "geometry/horizontal_view.h"
 
@@ -24,7 +24,8 @@ bool isInsideGate(const TrackingPrediction &prediction, const TrackingResult &re
   return innovation.dot(S.inverse() * innovation) <= options.gate;
 }
 
-double misfit(const TrackingResult &result, const RelativeTrunk &expected, double fx, const FlowOptions &options)
+double meanSquaredInnovation(const TrackingResult &result, const RelativeTrunk &expected, double fx,
+                             const FlowOptions &options)
 {
   constexpr double kMost = 9;     // [px^2]: farther off is wrong, however far
   constexpr double kWide_px = 20; // width from which the borders are rough by more than noise
@@ -63,7 +64,7 @@ TrunkView viewOf(const TrackingResult &result, const RelativeTrunk &expected, co
   seen.left_contrast = result.left_contrast;
   seen.right_contrast = result.right_contrast;
   seen.evenness = result.evenness;
-  seen.innovation2 = misfit(result, expected, view.camera.fx, options);
+  seen.innovation2 = meanSquaredInnovation(result, expected, view.camera.fx, options);
   seen.camera = view.wMc.t;
   return seen;
 }
@@ -107,21 +108,23 @@ std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vecto
   return seen;
 }
 
-Sighting sightingOf(const TrackedTrunk &tracked, const TrunkMap &map, const Viewpoint &view, const FlowOptions &options)
+TrunkMeasurement measurementOf(const TrackedTrunk &tracked, const TrunkMap &map, const Viewpoint &view,
+                               const FlowOptions &options)
 {
   const TrackingStatus status = tracked.result.status;
   const PredictedTrunk &predicted = tracked.predicted;
-  Sighting sighting;
-  sighting.id = predicted.id;
-  sighting.is_flipped = tracked.is_flipped;
-  sighting.range = predicted.range;
+  TrunkMeasurement measurement;
+  measurement.id = predicted.id;
+  measurement.is_flipped = tracked.is_flipped;
+  measurement.range = predicted.range;
   if (status == TrackingStatus::tracked) {
-    sighting.kind = Sighting::Kind::seen;
-    sighting.view = viewOf(tracked.result, predicted.tracking.relative, map.trunk(predicted.id).trunk, view, options);
-    sighting.foreground = tracked.foreground;
+    measurement.kind = TrunkMeasurement::Kind::seen;
+    measurement.view =
+        viewOf(tracked.result, predicted.tracking.relative, map.trunk(predicted.id).trunk, view, options);
+    measurement.foreground = tracked.foreground;
   }
   else if (status == TrackingStatus::occluded || status == TrackingStatus::not_visible)
-    sighting.kind = Sighting::Kind::hidden;
-  return sighting;
+    measurement.kind = TrunkMeasurement::Kind::hidden;
+  return measurement;
 }
 } // namespace bole

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The gate between a prediction and what was found, and what a view counts for.
-#include "pipeline/sighting.h"
+#include "pipeline/trunk_measurement.h"
 
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ TEST(Misfit, GrowsWithTheSquareOfTheOffsetInPixelsAndEndsSomewhere)
 {
   const auto misfitOf = [](double pixels) {
     const Case c = found(pixels / kFocal);
-    return misfit(c.result, c.prediction.relative, kFocal, c.options);
+    return meanSquaredInnovation(c.result, c.prediction.relative, kFocal, c.options);
   };
   EXPECT_NEAR(misfitOf(2) / misfitOf(1), 4, 1e-6);
   EXPECT_EQ(misfitOf(4), misfitOf(40));
@@ -73,9 +73,9 @@ TEST(Misfit, GrowsWithTheSquareOfTheOffsetInPixelsAndEndsSomewhere)
 TEST(Misfit, AllowsMoreToFaintBorders)
 {
   Case c = found(1 / kFocal);
-  const double strong = misfit(c.result, c.prediction.relative, kFocal, c.options);
+  const double strong = meanSquaredInnovation(c.result, c.prediction.relative, kFocal, c.options);
   c.result.left_contrast = -0.01;
-  EXPECT_LT(misfit(c.result, c.prediction.relative, kFocal, c.options), 0.5 * strong);
+  EXPECT_LT(meanSquaredInnovation(c.result, c.prediction.relative, kFocal, c.options), 0.5 * strong);
 }
 
 TEST(WeightOfView, IsTheShareOfTheWayThatMakesViewsIndependent)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "pipeline/recent_columns.h"
+#include "pipeline/consistency_window.h"
 
 #include "detection/drawn_trunks.h"
 #include "pipeline/final_pass.h"
@@ -10,9 +10,9 @@ namespace
 {
 using namespace bole;
 
-TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
+TEST(ConsistencyWindow, TakesFramesFromPlacesApartAndForgetsTheOldest)
 {
-  RecentColumns columns;
+  ConsistencyWindow columns;
   const vpImage<unsigned char> image(240, 320, 90);
   Viewpoint at;
   at.wMc = SmootherOptions::forwardCamera();
@@ -27,13 +27,13 @@ TEST(RecentColumns, TakeFramesFromPlacesApartAndForgetTheOldest)
 
 /// The drone goes from the evenly lit side of a trunk to one where its left part lies in the sun, and the line between
 /// light and shade is read as the left border.
-TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade)
+TEST(ConsistencyWindow, TellsWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade)
 {
   const test::DrawnTrunk sunny{3.55, 0.3, 0.18, 150}, shady{3.5, 0.2, 0.08, 60};
   std::vector<test::DrawnTrunk> scene = test::wall();
   scene.insert(scene.end(), {sunny, shady});
   const PinholeCamera camera;
-  RecentColumns columns;
+  ConsistencyWindow columns;
   std::vector<Pose> poses;
   const auto fly = [&](int from, int to, const Trunk &reading) {
     for (int i = from; i < to; ++i) {
@@ -43,35 +43,35 @@ TEST(RecentColumns, TellWithinHalfAMetreThatABorderHasBecomeALineOfLightAndShade
       at.wMc.t = {0, -0.8 + 0.06 * i, 1.2};
       columns.add(test::draw(scene, at.wMc, camera), poses.size(), at, 0.05, ElevationRange());
       poses.push_back(at.wMc);
-      std::vector<LevelView> views;
-      for (const RecentColumns::Frame &frame : columns.frames())
+      std::vector<ColumnView> views;
+      for (const ConsistencyWindow::Frame &frame : columns.frames())
         views.emplace_back(frame.level, poses[frame.pose]);
-      columns.look(7, reading, views, 14);
+      columns.update(7, reading, views, 14);
     }
   };
-  EXPECT_FALSE(columns.lately(7));
+  EXPECT_FALSE(columns.borderConsistency(7));
   fly(0, 14, test::trunkOf(sunny));
-  ASSERT_TRUE(columns.lately(7));
-  EXPECT_FALSE(goesOnBeside(*columns.lately(7)));
-  EXPECT_TRUE(columns.mayReadAgain(7));
-  columns.noteReading(7);
+  ASSERT_TRUE(columns.borderConsistency(7));
+  EXPECT_FALSE(continuesBeyondBorder(*columns.borderConsistency(7)));
+  EXPECT_TRUE(columns.mayRedetect(7));
+  columns.noteRedetection(7);
   fly(14, 22, test::trunkOf(shady));
-  ASSERT_TRUE(columns.lately(7));
-  EXPECT_TRUE(goesOnBeside(*columns.lately(7)));
-  EXPECT_LT(columns.lately(7)->left, columns.lately(7)->right);
+  ASSERT_TRUE(columns.borderConsistency(7));
+  EXPECT_TRUE(continuesBeyondBorder(*columns.borderConsistency(7)));
+  EXPECT_LT(columns.borderConsistency(7)->left, columns.borderConsistency(7)->right);
 }
 
-TEST(RecentColumns, WhatWasReadAgainInVainWaitsTwiceAsLong)
+TEST(ConsistencyWindow, WaitsTwiceAsLongAfterARedetectionInVain)
 {
   const test::DrawnTrunk trunk{3.55, 0.3, 0.18, 60};
   const test::LevelFlight flight(test::barkOf(trunk, 0), test::sweep());
-  const std::vector<LevelView> views = flight.views();
-  RecentColumns columns;
+  const std::vector<ColumnView> views = flight.views();
+  ConsistencyWindow columns;
   const auto viewsUntilItMay = [&] {
     int n = 0;
-    for (; n < 100 && !columns.mayReadAgain(7); ++n)
-      columns.look(7, test::trunkOf(trunk), views, 14);
-    columns.noteReading(7);
+    for (; n < 100 && !columns.mayRedetect(7); ++n)
+      columns.update(7, test::trunkOf(trunk), views, 14);
+    columns.noteRedetection(7);
     return n;
   };
   EXPECT_EQ(viewsUntilItMay(), 6);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "detection/level_image.h"
+#include "detection/column_image.h"
 
 #include <Eigen/Geometry>
 
@@ -51,7 +51,7 @@ std::vector<float> slopesOf(const std::vector<float> &value)
   return slope;
 }
 
-double contrastOf(const LevelImage &level)
+double contrastOf(const ColumnImage &level)
 {
   double variance = 0;
   int bands = 0;
@@ -74,7 +74,7 @@ double contrastOf(const LevelImage &level)
 }
 } // namespace
 
-LevelColumn LevelImage::at(double q, double lean) const
+LevelColumn ColumnImage::at(double q, double lean) const
 {
   LevelColumn column;
   const double by_elevation = lean * (1 + q * q);
@@ -89,12 +89,12 @@ LevelColumn LevelImage::at(double q, double lean) const
   return column;
 }
 
-LevelImage computeLevelImage(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                             const Eigen::Matrix3d &wRc, const ElevationRange &range)
+ColumnImage computeColumnImage(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                               const Eigen::Matrix3d &wRc, const ElevationRange &range)
 {
   constexpr double kFinest = 1.0 / 300; // of a column: finer than the roughness of bark
   constexpr int kLeast = 5, kMost = 16; // samples of a band
-  LevelImage level;
+  ColumnImage level;
   const Vector3d forward = wRc.col(2);
   level.cRl =
       wRc.transpose() * Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()).toRotationMatrix();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "pipeline/adoption.h"
+#include "pipeline/candidate_track.h"
 
 #include "smoothing/factors.h"
 
@@ -69,14 +69,14 @@ TrunkPrior priorOf(const Trunk &guess, const SmootherOptions &options)
   return prior;
 }
 
-Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const SmootherOptions &options,
+Trunk fitTrunk(const Trunk &guess, const std::vector<TrackedView> &views, const SmootherOptions &options,
                Matrix5d *information)
 {
   constexpr int kIterations = 4; // from a detection's guess it has settled after two or three
   const TrunkPrior prior = priorOf(guess, options);
   const double robust = options.summary_loss.width;
   std::vector<std::pair<SquareRootSummary, Pose>> usable;
-  for (const AdoptedView &view : views)
+  for (const TrackedView &view : views)
     if (SquareRootSummary root; squareRoot(view.summary, root) != SummaryStatus::indefinite)
       usable.emplace_back(root, view.wMb);
   Trunk trunk = guess;
@@ -97,8 +97,8 @@ Trunk fitTrunk(const Trunk &guess, const std::vector<AdoptedView> &views, const 
   return trunk;
 }
 
-void Follower::look(const Gradient &gradient, std::size_t pose, const Pose &wMb, const Viewpoint &at,
-                    const TrunkMap &map, int id, const StageOptions &options)
+void CandidateTracker::track(const Gradient &gradient, std::size_t pose, const Pose &wMb, const Viewpoint &at,
+                             const TrunkMap &map, int id, const StageOptions &options)
 {
   constexpr double kTilt = 0.01;   // standard deviation of the two angles that one view hardly knows [rad]
   constexpr double kBorder_px = 1; // and of bearing and half width, beside that of the trunk
@@ -123,64 +123,64 @@ void Follower::look(const Gradient &gradient, std::size_t pose, const Pose &wMb,
     return;
   m_views.push_back({pose, wMb, summaryOf(result, weightOfView(m_before, at.wMc.t, options.flow))});
   m_before = at.wMc.t;
-  blendContrast(m_left_contrast, result.left_contrast);
-  blendContrast(m_right_contrast, result.right_contrast);
+  updateMeanContrast(m_left_contrast, result.left_contrast);
+  updateMeanContrast(m_right_contrast, result.right_contrast);
   m_seen.push_back(viewOf(result, relative, m_guess, at, options.flow));
   m_results.push_back(result);
 }
 
-Adoption Follower::fitted(double found_s, const PinholeCamera &camera, const StageOptions &options) const
+CandidateTrack CandidateTracker::fit(double found_s, const PinholeCamera &camera, const StageOptions &options) const
 {
-  constexpr double kUnseen = 9; // [px^2]: nothing was seen of it
-  Adoption adoption;
-  adoption.views = m_views;
-  adoption.trunk.trunk = m_guess;
-  adoption.trunk.covariance = m_covariance;
-  adoption.trunk.views = m_seen;
-  adoption.trunk.found_s = found_s;
-  adoption.trunk.innovation2 = kUnseen;
+  constexpr double kUnseen = 9; // [px^2]: innovation of a hypothesis without a measurement
+  CandidateTrack track;
+  track.views = m_views;
+  track.trunk.trunk = m_guess;
+  track.trunk.covariance = m_covariance;
+  track.trunk.views = m_seen;
+  track.trunk.found_s = found_s;
+  track.trunk.innovation2 = kUnseen;
   if (m_views.empty())
-    return adoption;
+    return track;
   const SmootherOptions &smoothing = options.smoothing;
   Matrix5d information;
-  adoption.trunk.trunk = fitTrunk(m_guess, m_views, smoothing, &information);
-  adoption.trunk.covariance = information.inverse();
+  track.trunk.trunk = fitTrunk(m_guess, m_views, smoothing, &information);
+  track.trunk.covariance = information.inverse();
   double sum = 0;
   for (std::size_t i = 0; i < m_results.size(); ++i) {
-    const RelativeTrunk expected = relativeTrunk(m_views[i].wMb, smoothing.bMc, adoption.trunk.trunk);
-    sum += misfit(m_results[i], expected, camera.fx, options.flow);
+    const RelativeTrunk expected = relativeTrunk(m_views[i].wMb, smoothing.bMc, track.trunk.trunk);
+    sum += meanSquaredInnovation(m_results[i], expected, camera.fx, options.flow);
   }
-  adoption.trunk.innovation2 = sum / static_cast<double>(m_results.size());
-  return adoption;
+  track.trunk.innovation2 = sum / static_cast<double>(m_results.size());
+  return track;
 }
 
-Adoption followThroughWindow(const Hypothesis &hypothesis, const DetectionWindow &window, const Smoother &smoother,
-                             const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
+CandidateTrack trackThroughWindow(const Hypothesis &hypothesis, const DetectionWindow &window, const Smoother &smoother,
+                                  const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
 {
-  Follower follower(hypothesis.trunk, hypothesis.covariance);
+  CandidateTracker tracker(hypothesis.trunk, hypothesis.covariance);
   Viewpoint at = view;
   for (const WindowView &frame : window.views()) {
     const Pose wMb = smoother.pose(frame.pose);
     at.wMc = wMb * options.smoothing.bMc;
     at.time_s = frame.time_s;
-    follower.look(*frame.gradient, frame.pose, wMb, at, map, hypothesis.id, options);
+    tracker.track(*frame.gradient, frame.pose, wMb, at, map, hypothesis.id, options);
   }
-  return follower.fitted(view.time_s, view.camera, options);
+  return tracker.fit(view.time_s, view.camera, options);
 }
 
-Adoption followThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
-                             const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
+CandidateTrack trackThroughWindow(const Detection &detection, const DetectionWindow &window, const Smoother &smoother,
+                                  const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
 {
-  Adoption adoption = followThroughWindow(Hypothesis{-1, detection.trunk}, window, smoother, map, view, options);
-  if (adoption.views.empty()) {
-    adoption.trunk.covariance.setIdentity();
-    adoption.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
+  CandidateTrack track = trackThroughWindow(Hypothesis{-1, detection.trunk}, window, smoother, map, view, options);
+  if (track.views.empty()) {
+    track.trunk.covariance.setIdentity();
+    track.trunk.covariance.topLeftCorner<3, 3>() = detection.covariance;
   }
-  return adoption;
+  return track;
 }
 
-std::optional<Adoption> followInFrame(const LineDetection &detection, const WindowView &frame, const Smoother &smoother,
-                                      const Viewpoint &view, const StageOptions &options)
+std::optional<CandidateTrack> trackInFrame(const LineDetection &detection, const WindowView &frame,
+                                           const Smoother &smoother, const Viewpoint &view, const StageOptions &options)
 {
   const double radius = options.smoothing.prior_radius;
   TrackingPrediction prediction;
@@ -190,11 +190,11 @@ std::optional<Adoption> followInFrame(const LineDetection &detection, const Wind
   const TrackingResult result = trackTrunk(*frame.gradient, view.camera, prediction, options.tracking);
   if (result.status != TrackingStatus::tracked || !result.left_used || !result.right_used)
     return std::nullopt;
-  Adoption adoption;
-  adoption.trunk.trunk = trunkFromRelative(view.wMc, result.optimum, radius);
-  adoption.trunk.found_s = view.time_s;
-  adoption.views.push_back({frame.pose, smoother.pose(frame.pose), summaryOf(result, 1)});
-  adoption.trunk.views.push_back(viewOf(result, prediction.relative, adoption.trunk.trunk, view, options.flow));
-  return adoption;
+  CandidateTrack track;
+  track.trunk.trunk = trunkFromRelative(view.wMc, result.optimum, radius);
+  track.trunk.found_s = view.time_s;
+  track.views.push_back({frame.pose, smoother.pose(frame.pose), summaryOf(result, 1)});
+  track.trunk.views.push_back(viewOf(result, prediction.relative, track.trunk.trunk, view, options.flow));
+  return track;
 }
 } // namespace bole

@@ -12,30 +12,30 @@
 /// Laws (each a test): where the camera did not go as it was told, the prediction is mended; a border that slips by
 /// some pixels an image is not followed; what is not read for long is looked for as if it had no bark.
 
-#include "pipeline/sighting.h"
-#include "tracking/bark_shift.h"
+#include "pipeline/trunk_measurement.h"
+#include "tracking/texture_shift.h"
 
 #include <unordered_map>
 
 namespace bole
 {
-class BarkFollower
+class TextureTracker
 {
 public:
-  /// Moves each of \p predicted that is confirmed to where its bark is in \p image, of the pose number \p pose. \p
-  /// before: the camera one pose earlier.
-  void expect(const vpImage<unsigned char> &image, std::size_t pose, const Pose &before, const Viewpoint &view,
-              const TrunkMap &map, std::vector<PredictedTrunk> &predicted);
-  /// Takes in what the borders say.
-  void read(const std::vector<TrackedTrunk> &tracked, const PinholeCamera &camera);
+  /// Moves the prediction of each confirmed trunk to where its texture is in \p image, which was taken from pose number
+  /// \p pose. \p before: the camera one pose earlier.
+  void predict(const vpImage<unsigned char> &image, std::size_t pose, const Pose &before, const Viewpoint &view,
+               const TrunkMap &map, std::vector<PredictedTrunk> &predicted);
+  /// Corrects the filtered bearings by the borders measured in this image.
+  void correct(const std::vector<TrackedTrunk> &tracked, const PinholeCamera &camera);
 
 private:
-  struct Followed
+  struct FilteredBearing
   {
     RelativeTrunk seen;
     double variance = 0; ///< of its bearing [rad^2]
   };
-  std::unordered_map<int, Followed> m_followed; ///< by id of the hypothesis
+  std::unordered_map<int, FilteredBearing> m_tracked; ///< by id of the hypothesis
   vpImage<unsigned char> m_image;
   std::size_t m_pose = 0; ///< of it; 0: none yet
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// One frame reduced to the brightness of what stands upright, by bearing.
+/// Rectified column image: one frame reduced to the brightness of upright columns, by bearing.
 ///
 /// Idea: turn the camera level, as for a LevelProfile, and average the image along each vertical plane through the
 /// camera centre, in bands of elevation. A trunk fills a run of such columns with the same brightness in every band;
@@ -14,7 +14,7 @@
 
 namespace bole
 {
-struct LevelImage
+struct ColumnImage
 {
   Eigen::Matrix3d cRl = Eigen::Matrix3d::Identity(); ///< level frame (forward, left, up) to camera
   double q_first = 0; ///< tan of the bearing from the heading of column 0; columns run to the left
@@ -32,6 +32,6 @@ struct LevelImage
 
 /// Brightness of \p image seen by \p camera with the rotation \p wRc, in the elevations \p range. Columns are a pixel
 /// wide, at most 1/300 of the heading's tangent fine. Cost: about 0.2 ms at 320x240.
-LevelImage computeLevelImage(const vpImage<unsigned char> &image, const PinholeCamera &camera,
-                             const Eigen::Matrix3d &wRc, const ElevationRange &range);
+ColumnImage computeColumnImage(const vpImage<unsigned char> &image, const PinholeCamera &camera,
+                               const Eigen::Matrix3d &wRc, const ElevationRange &range);
 } // namespace bole

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tracking/bark_loops.h"
+#include "tracking/patch_loops.h"
 
 #include "geometry/vector_clones.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tracking/bark_shift.h"
+#include "tracking/texture_shift.h"
 
 #include "support/drawn_bark.h"
 
@@ -24,7 +24,7 @@ protected:
     expected.xy.y() += beside_m;
     const vpImage<unsigned char> before = test::drawBark(m_before, m_trunk, m_bark),
                                  now = test::drawBark(m_now, m_trunk, m_bark);
-    const auto shift = barkShift({before, m_before}, {now, m_expected}, kCamera, expected, kPart, kSearch_px);
+    const auto shift = textureShift({before, m_before}, {now, m_expected}, kCamera, expected, kPart, kSearch_px);
     if (!shift)
       return std::nullopt;
     return kCamera.fx * shift->angle;

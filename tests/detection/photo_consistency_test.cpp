@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the columns of a flight say of a trunk, on drawn ones before a striped wall.
-#include "detection/column_evidence.h"
+#include "detection/photo_consistency.h"
 #include "drawn_trunks.h"
 
 #include <gmock/gmock.h>
@@ -23,12 +23,12 @@ int bandsOf(const LevelColumn &column)
 }
 
 /// Where a camera that is turned and rolled sees a trunk, its columns are as bright as it is.
-TEST(LevelImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
+TEST(ColumnImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
 {
   const DrawnTrunk trunk{4, 0.6, 0.2, 40};
   for (const Pose &wMc : {lookingAhead(0, 0), lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2)}) {
-    const LevelImage level = computeLevelImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
-    const auto at = locate(trunkOf(trunk), LevelView(level, wMc), kFarthest);
+    const ColumnImage level = computeColumnImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+    const auto at = locate(trunkOf(trunk), ColumnView(level, wMc), kFarthest);
     ASSERT_TRUE(at.has_value());
     const LevelColumn inside = level.at(std::tan(at->bearing));
     const LevelColumn outside = level.at(std::tan(at->bearing + 2 * at->half_angle));
@@ -45,12 +45,12 @@ TEST(LevelImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
   }
 }
 
-TEST(LevelImage, ColumnsLeanAsTheTrunkDoes)
+TEST(ColumnImage, ColumnsLeanAsTheTrunkDoes)
 {
   const DrawnTrunk trunk{4, 0.1, 0.08, 40, 0.12};
   const Pose wMc = lookingAhead(0, 0);
-  const LevelImage level = computeLevelImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
-  const auto at = locate(trunkOf(trunk), LevelView(level, wMc), kFarthest);
+  const ColumnImage level = computeColumnImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+  const auto at = locate(trunkOf(trunk), ColumnView(level, wMc), kFarthest);
   ASSERT_TRUE(at.has_value());
   const LevelColumn upright = level.at(std::tan(at->bearing)), leaning = level.at(std::tan(at->bearing), trunk.lean);
   ASSERT_EQ(bandsOf(leaning), kLevelBands);
@@ -59,21 +59,21 @@ TEST(LevelImage, ColumnsLeanAsTheTrunkDoes)
   EXPECT_GT(upright.value[kLevelBands - 1], 150 / 255.0); // beside it
 }
 
-TEST(LevelImage, ShowsNothingOutsideTheImage)
+TEST(ColumnImage, ShowsNothingOutsideTheImage)
 {
   const Pose wMc = lookingAhead(0, 0);
-  const LevelImage level = computeLevelImage(draw({}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
+  const ColumnImage level = computeColumnImage(draw({}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
   EXPECT_EQ(bandsOf(level.at(level.q_first - 0.1)), 0);
   EXPECT_EQ(bandsOf(level.at(level.qLast() + 0.1)), 0);
   EXPECT_EQ(bandsOf(level.at(std::numeric_limits<double>::quiet_NaN())), 0);
 }
 
-TEST(ColumnEvidence, ATrunkAgreesAtItsOwnRangeOnly)
+TEST(PhotoConsistency, ATrunkAgreesAtItsOwnRangeOnly)
 {
   const std::vector<DrawnTrunk> trunks = {{3.5, 0.5, 0.15, 40}, {5, -1, 0.2, 120}};
   const LevelFlight flight(trunks, sweep());
   for (const DrawnTrunk &trunk : trunks) {
-    const auto evidence = columnEvidence(trunkOf(trunk), flight.views(), kFarthest);
+    const auto evidence = photoConsistency(trunkOf(trunk), flight.views(), kFarthest);
     ASSERT_TRUE(evidence.has_value());
     EXPECT_LT(evidence->own, 0.4);
     EXPECT_GT(evidence->nearer, 0.5);
@@ -84,78 +84,78 @@ TEST(ColumnEvidence, ATrunkAgreesAtItsOwnRangeOnly)
   }
 }
 
-TEST(ColumnEvidence, ALeaningTrunkAgreesWhereItsLeanIsKnown)
+TEST(PhotoConsistency, ALeaningTrunkAgreesWhereItsLeanIsKnown)
 {
   const DrawnTrunk leaning{3.5, 0.3, 0.1, 40, 0.12};
   const LevelFlight flight({leaning}, sweep());
   Trunk upright = trunkOf(leaning); // through the same place at the height of the camera
   upright.xy += 1.2 * upright.lean;
   upright.lean.setZero();
-  const auto known = columnEvidence(trunkOf(leaning), flight.views(), kFarthest);
-  const auto unknown = columnEvidence(upright, flight.views(), kFarthest);
+  const auto known = photoConsistency(trunkOf(leaning), flight.views(), kFarthest);
+  const auto unknown = photoConsistency(upright, flight.views(), kFarthest);
   ASSERT_TRUE(known && unknown);
   EXPECT_LT(known->own, 0.5);
   EXPECT_LT(known->own, 0.5 * unknown->own);
   EXPECT_GT(known->background, unknown->background);
 }
 
-TEST(ColumnEvidence, AHypothesisAtAnotherRangeDisagreesThere)
+TEST(PhotoConsistency, AHypothesisAtAnotherRangeDisagreesThere)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
   const LevelFlight flight({trunk}, sweep());
-  const double own = columnEvidence(trunkOf(trunk), flight.views(), kFarthest)->own;
+  const double own = photoConsistency(trunkOf(trunk), flight.views(), kFarthest)->own;
   for (const double scale : {0.75, 1.4}) { // on the line of sight of the middle of the flight
     const DrawnTrunk wrong{0.14 + scale * (trunk.x - 0.14), scale * trunk.y, scale * trunk.radius, 40};
-    const auto evidence = columnEvidence(trunkOf(wrong), flight.views(), kFarthest);
+    const auto evidence = photoConsistency(trunkOf(wrong), flight.views(), kFarthest);
     ASSERT_TRUE(evidence.has_value()) << scale;
     EXPECT_GT(evidence->own, own + 0.5) << scale;
     EXPECT_FALSE(evidence->is_best_at_own) << scale;
   }
 }
 
-TEST(ColumnEvidence, AGapBetweenTwoTrunksShowsWhatStandsBehind)
+TEST(PhotoConsistency, AGapBetweenTwoTrunksShowsWhatStandsBehind)
 {
   const DrawnTrunk left{3.5, 0.6, 0.15, 40}, right{3.5, 0, 0.15, 40}, gap{3.5, 0.3, 0.15, 0};
   const LevelFlight flight({left, right}, sweep());
-  const auto none = columnEvidence(trunkOf(gap), flight.views(), kFarthest);
-  const auto trunk = columnEvidence(trunkOf(left), flight.views(), kFarthest);
+  const auto none = photoConsistency(trunkOf(gap), flight.views(), kFarthest);
+  const auto trunk = photoConsistency(trunkOf(left), flight.views(), kFarthest);
   ASSERT_TRUE(none && trunk);
   EXPECT_GT(none->own, 1);
   EXPECT_LT(none->background, trunk->background - 0.3);
 }
 
 /// The right part of the trunk lies in shadow: its reading is as wide as the lit part.
-TEST(ColumnEvidence, BesideAnEdgeOfShadowTheTrunkGoesOn)
+TEST(PhotoConsistency, BesideAnEdgeOfShadowTheTrunkGoesOn)
 {
   const DrawnTrunk lit{3.5, 0.4, 0.08, 150}, shadow{3.55, 0.3, 0.18, 60};
   const LevelFlight flight({lit, shadow}, sweep());
-  const auto evidence = columnEvidence(trunkOf(lit), flight.views(), kFarthest);
+  const auto evidence = photoConsistency(trunkOf(lit), flight.views(), kFarthest);
   ASSERT_TRUE(evidence.has_value());
   EXPECT_LT(evidence->right, evidence->left - 0.2);
   EXPECT_LT(evidence->right, -0.25);
 }
 
 /// Taken view by view it is what it is taken at once; what was seen long ago fades.
-TEST(ColumnEvidence, ViewByViewItIsTheSame)
+TEST(PhotoConsistency, ViewByViewItIsTheSame)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
   const LevelFlight flight({trunk}, sweep());
-  const std::vector<LevelView> views = flight.views();
-  const auto at_once = columnEvidence(trunkOf(trunk), views, kFarthest);
-  ColumnCurves all, faded;
-  EXPECT_FALSE(evidenceOf(all).has_value());
+  const std::vector<ColumnView> views = flight.views();
+  const auto at_once = photoConsistency(trunkOf(trunk), views, kFarthest);
+  ConsistencyCurves all, faded;
+  EXPECT_FALSE(consistencyOf(all).has_value());
   for (std::size_t i = 0; i < views.size(); ++i)
-    if (const auto view = columnsOfView(trunkOf(trunk), i, views, kFarthest)) {
+    if (const auto view = consistencyOfView(trunkOf(trunk), i, views, kFarthest)) {
       all.add(*view);
       faded.fade(0.5);
       faded.add(*view);
     }
-  const auto by_view = evidenceOf(all), lately = evidenceOf(faded);
+  const auto by_view = consistencyOf(all), lately = consistencyOf(faded);
   ASSERT_TRUE(at_once && by_view && lately);
   EXPECT_EQ(by_view->views, at_once->views);
   EXPECT_NEAR(by_view->own, at_once->own, 1e-9);
   EXPECT_NEAR(by_view->left, at_once->left, 1e-9);
-  const auto last = columnsOfView(trunkOf(trunk), views.size() - 1, views, kFarthest);
+  const auto last = consistencyOfView(trunkOf(trunk), views.size() - 1, views, kFarthest);
   ASSERT_TRUE(last.has_value());
   EXPECT_LT(std::abs(lately->own - last->mean(0, 4)), std::abs(by_view->own - last->mean(0, 4)) + 1e-9);
 }
@@ -185,16 +185,16 @@ TEST(DepthBorders, AreNoneOfWhatIsNotThereOrHasNoParallax)
   const LevelFlight flight({trunk}, sweep()), still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
   EXPECT_FALSE(depthBorders(trunkOf({3.5, -0.4, 0.15, 40}), flight.views(), kFarthest).has_value());
   EXPECT_FALSE(depthBorders(trunkOf(trunk), still.views(), kFarthest).has_value());
-  const std::vector<LevelView> all = flight.views();
+  const std::vector<ColumnView> all = flight.views();
   EXPECT_FALSE(depthBorders(trunkOf(trunk), {all.begin(), all.begin() + 5}, kFarthest).has_value());
 }
 
-TEST(ColumnEvidence, WithoutParallaxThereIsNone)
+TEST(PhotoConsistency, WithoutParallaxThereIsNone)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
   const LevelFlight still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
-  EXPECT_FALSE(columnEvidence(trunkOf(trunk), still.views(), kFarthest).has_value());
+  EXPECT_FALSE(photoConsistency(trunkOf(trunk), still.views(), kFarthest).has_value());
   const LevelFlight flight({trunk}, sweep());
-  EXPECT_FALSE(columnEvidence(trunkOf({-4, 0, 0.15, 40}), flight.views(), kFarthest).has_value()); // behind
+  EXPECT_FALSE(photoConsistency(trunkOf({-4, 0, 0.15, 40}), flight.views(), kFarthest).has_value()); // behind
 }
 } // namespace

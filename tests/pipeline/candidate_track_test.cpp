@@ -2,7 +2,7 @@
 // How a detection becomes a candidate: followed through the window, fitted to what was seen.
 #include "support/drawn_trunks.h"
 
-#include "pipeline/adoption.h"
+#include "pipeline/candidate_track.h"
 
 #include <gtest/gtest.h>
 
@@ -45,9 +45,9 @@ protected:
     detection.trunk.log_radius = std::log(radius);
     return detection;
   }
-  Adoption follow(const Detection &detection) const
+  CandidateTrack follow(const Detection &detection) const
   {
-    return followThroughWindow(detection, m_window, m_smoother, m_map, m_view, m_options);
+    return trackThroughWindow(detection, m_window, m_smoother, m_map, m_view, m_options);
   }
 
   StageOptions m_options;
@@ -59,27 +59,27 @@ protected:
 
 TEST_F(Adopting, EveryViewOfTheWindowThatShowsTheTrunkIsTakenIn)
 {
-  const Adoption adoption = follow(detected(0.02, 0.15));
-  EXPECT_EQ(adoption.views.size(), static_cast<std::size_t>(kFrames));
-  EXPECT_EQ(adoption.trunk.views.size(), adoption.views.size());
-  EXPECT_LT(adoption.trunk.innovation2, 0.5);
+  const CandidateTrack track = follow(detected(0.02, 0.15));
+  EXPECT_EQ(track.views.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(track.trunk.views.size(), track.views.size());
+  EXPECT_LT(track.trunk.innovation2, 0.5);
 }
 
 TEST_F(Adopting, TheTrunkIsFittedToItsViews)
 {
-  const Adoption adoption = follow(detected(0.1, 0.154));
-  EXPECT_NEAR(adoption.trunk.trunk.xy.x(), 4, 0.04);
-  EXPECT_NEAR(adoption.trunk.trunk.xy.y(), 1.6, 0.02);
-  EXPECT_NEAR(adoption.trunk.trunk.radius(), 0.15, 0.005);
+  const CandidateTrack track = follow(detected(0.1, 0.154));
+  EXPECT_NEAR(track.trunk.trunk.xy.x(), 4, 0.04);
+  EXPECT_NEAR(track.trunk.trunk.xy.y(), 1.6, 0.02);
+  EXPECT_NEAR(track.trunk.trunk.radius(), 0.15, 0.005);
 }
 
 TEST_F(Adopting, WhereNothingStandsNothingIsSeen)
 {
   Detection nothing = detected(0, 0.15);
   nothing.trunk.xy = {4, 0.9};
-  const Adoption adoption = follow(nothing);
-  EXPECT_TRUE(adoption.views.empty());
-  EXPECT_EQ(adoption.trunk.innovation2, 9); // the worst there is
+  const CandidateTrack track = follow(nothing);
+  EXPECT_TRUE(track.views.empty());
+  EXPECT_EQ(track.trunk.innovation2, 9); // the worst there is
 }
 
 TEST_F(Adopting, ViewsBehindANearerTrunkOfTheMapAreLeftOut)
@@ -95,13 +95,13 @@ TEST_F(Adopting, ViewsBehindANearerTrunkOfTheMapAreLeftOut)
 TEST_F(Adopting, ViewsFromOnePlaceCountForOne)
 {
   m_options.flow.view_correlation = 0.16; // twice the way between two views
-  const Adoption adoption = follow(detected(0.02, 0.15));
-  const Adoption all = [&] {
+  const CandidateTrack track = follow(detected(0.02, 0.15));
+  const CandidateTrack all = [&] {
     m_options.flow.view_correlation = 0;
     return follow(detected(0.02, 0.15));
   }();
-  EXPECT_EQ(adoption.views[0].summary.F, all.views[0].summary.F);
-  EXPECT_LT((adoption.views[1].summary.F - 0.5 * all.views[1].summary.F).norm(), 1e-6 * all.views[1].summary.F.norm());
+  EXPECT_EQ(track.views[0].summary.F, all.views[0].summary.F);
+  EXPECT_LT((track.views[1].summary.F - 0.5 * all.views[1].summary.F).norm(), 1e-6 * all.views[1].summary.F.norm());
 }
 
 TEST(DetectionWindow, KeepsViewsFromPlacesApartAndAlwaysTheNewest)
