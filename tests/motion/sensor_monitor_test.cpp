@@ -16,9 +16,11 @@ using test::MadeFlight;
 constexpr double kBegins_s = 5;
 
 /// \p damage changes a frame before the monitor sees it.
-SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8)
+SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8,
+                  double sway = 1.2)
 {
   MadeFlight flight;
+  flight.sway = sway;
   flight.frame_rate = rate;
   flight.odometry_noise = 0.012;
   flight.force_noise = 0.1;
@@ -111,6 +113,24 @@ TEST(SensorMonitor, SensorsThatAgreeRaiseNothingAtAnyRate)
   for (const double rate : {5, 10, 20, 30, 50}) {
     const SensorMonitor monitor = fly([](Frame &) {}, rate);
     EXPECT_TRUE(monitor.verdicts().empty()) << rate << " Hz: " << monitor.verdicts().front().text;
+  }
+}
+
+TEST(SensorMonitor, AFlightThatAcceleratesByMoreThanHalfOfGravityRaisesNothing)
+{
+  for (const double rate : {10, 30}) {
+    const SensorMonitor monitor = fly([](Frame &) {}, rate, 12, 5); // 5.2 m/s and 5.5 m/s^2 from side to side
+    EXPECT_TRUE(monitor.verdicts().empty()) << rate << " Hz: " << monitor.verdicts().front().text;
+  }
+}
+
+TEST(SensorMonitor, OneOddStampCostsTheOdometryNothingFromTheSecondFrameOn)
+{
+  for (const std::int64_t early_ns : {60'000'000, 95'000'000, 99'999'999}) {
+    const SensorMonitor monitor = fly([early_ns](Frame &f) { f.stamp_ns -= f.index == 60 ? early_ns : 0; });
+    EXPECT_TRUE(monitor.trustsNow(Sensor::odometry)) << early_ns;
+    for (const SensorVerdict &verdict : monitor.verdicts())
+      EXPECT_NE(verdict.kind, "noise") << verdict.text;
   }
 }
 

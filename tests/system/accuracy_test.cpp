@@ -20,8 +20,9 @@ struct KnownFlight
   const char *scene;      ///< what `bole simulate` is given; "": the demonstration
   std::size_t found;      ///< of the trunks that should be found, at least
   std::size_t wrong;      ///< confirmed without a trunk of the truth, at most
-  double radius, ate;     ///< RMSE of the radii and of the trajectory after x, y and yaw [m], at most
-  double radius_expected; ///< RMSE of the radii of those that should be found [m], at most
+  double ate;             ///< RMSE of the trajectory after x, y and yaw [m], at most
+  double radius_expected; ///< RMSE of the radii of those that should be found [m], at most: a map that holds more
+                          ///< trunks, farther and seen less, is no worse for it
 };
 std::ostream &operator<<(std::ostream &out, const KnownFlight &flight) { return out << flight.name; }
 
@@ -59,7 +60,6 @@ TEST_P(Accuracy, IsNotBelowThatOfToday)
   EXPECT_GE(trunks.all.found, flight.found) << "of " << trunks.all.expected;
   EXPECT_LE(trunks.false_positives.size(), flight.wrong) << "of " << trunks.confirmed;
   EXPECT_LE(duplicates, 1u);
-  EXPECT_LE(trunks.all.radius_rmse, flight.radius);
   EXPECT_LE(radiusOfTheExpected(trunks), flight.radius_expected);
   EXPECT_LE(ate, flight.ate);
   for (const char *file : {"trajectory_online.tum", "map.svg", "timing.csv", "options.yaml"})
@@ -73,14 +73,14 @@ TEST_P(Accuracy, IsNotBelowThatOfToday)
 INSTANTIATE_TEST_SUITE_P(
     Flights, Accuracy,
     testing::Values(
-        KnownFlight{"demonstration", "", 7, 2, .025, .10, .025},
-        KnownFlight{"forward", "--seed 11 --density .09 --light overcast --bark mixed --path forward", 3, 1, .03, .08,
+        KnownFlight{"demonstration", "", 7, 2, .10, .025},
+        KnownFlight{"forward", "--seed 11 --density .09 --light overcast --bark mixed --path forward", 3, 1, .08,
                     .04}, // a trunk 6 m away, seen over 3 degrees, is 6 cm too wide
-        KnownFlight{"slalom", "--seed 12 --density .07 --light sun --bark bright --path slalom", 8, 1, .08, .065, .042},
+        KnownFlight{"slalom", "--seed 12 --density .07 --light sun --bark bright --path slalom", 8, 1, .065, .042},
         KnownFlight{"lateral", "--seed 13 --density .12 --light overcast --bark dark --path lateral --h264 1000", 5, 1,
-                    .03, .05, .015},
+                    .05, .015},
         KnownFlight{"loop", "--seed 14 --density .08 --light sun --bark mixed --path loop --exposure 15", 4, 2, .075,
-                    .075, .06}),
+                    .06}),
     [](const auto &flight) { return std::string(flight.param.name); });
 
 /// The frames of \p sequence there and back again and again, without its gyro.
