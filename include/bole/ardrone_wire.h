@@ -36,8 +36,8 @@ struct Navdata
 
   struct Demo ///< option 0
   {
-    std::uint32_t control_state = 0; ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
-    std::uint32_t battery_percent = 0;
+    std::uint32_t control_state = 0;   ///< upper 16 bits: 2 landed, 3 flying, 4 hovering, 6 taking off, 8 landing
+    std::uint32_t battery_percent = 0; ///< [%]
     Eigen::Vector3f phi_theta_psi_mdeg = Eigen::Vector3f::Zero(); ///< roll, pitch, yaw [milli-degree]
     std::int32_t altitude_mm = 0;                                 ///< over the ground [mm]
     Eigen::Vector3f velocity_mm_s = Eigen::Vector3f::Zero();      ///< [mm/s], drone's axes
@@ -93,19 +93,22 @@ enum class PaveFrameType : std::uint8_t
 /// header is 64 or 68 bytes long by firmware and says so itself.
 struct PaveHeader
 {
-  std::uint8_t version = 2;                            ///< of the envelope
-  std::uint8_t codec = 4;                              ///< 4 = H.264
-  std::uint16_t header_size = 64;                      ///< [byte]
-  std::uint32_t payload_size = 0;                      ///< [byte]
-  std::uint16_t coded_width = 0, coded_height = 0;     ///< [px], multiples of 16
-  std::uint16_t display_width = 0, display_height = 0; ///< [px]
-  std::uint32_t frame_number = 0;                      ///< rising by one
-  std::uint32_t timestamp_ms = 0;                      ///< drone's clock, wraps after 49.7 days
-  PaveFrameType frame_type = PaveFrameType::unknown;   ///< what the payload is
-  std::uint32_t stream_position = 0;                   ///< payload bytes sent before this frame, low word
-  std::uint16_t stream_id = 0;                         ///< of the encoder
-  std::uint8_t header1_size = 0, header2_size = 0;     ///< [byte] SPS and PPS in front of a key frame
-  std::uint32_t advertised_size = 0;                   ///< [byte]
+  std::uint8_t version = 2;                          ///< of the envelope
+  std::uint8_t codec = 4;                            ///< 4 = H.264
+  std::uint16_t header_size = 64;                    ///< [byte]
+  std::uint32_t payload_size = 0;                    ///< [byte]
+  std::uint16_t coded_width = 0;                     ///< [px], a multiple of 16
+  std::uint16_t coded_height = 0;                    ///< [px], a multiple of 16
+  std::uint16_t display_width = 0;                   ///< [px]
+  std::uint16_t display_height = 0;                  ///< [px]
+  std::uint32_t frame_number = 0;                    ///< rising by one
+  std::uint32_t timestamp_ms = 0;                    ///< drone's clock, wraps after 49.7 days
+  PaveFrameType frame_type = PaveFrameType::unknown; ///< what the payload is
+  std::uint32_t stream_position = 0;                 ///< payload bytes sent before this frame, low word
+  std::uint16_t stream_id = 0;                       ///< of the encoder
+  std::uint8_t header1_size = 0;                     ///< [byte] SPS in front of a key frame
+  std::uint8_t header2_size = 0;                     ///< [byte] PPS behind it
+  std::uint32_t advertised_size = 0;                 ///< [byte]
 
   /// True when the fields are such as a drone can send: the signature alone appears in payloads by chance.
   bool isPlausible() const;
@@ -116,9 +119,9 @@ std::vector<std::uint8_t> encodePaveHeader(const PaveHeader &header);
 /// One received piece.
 struct RecordedPiece
 {
-  LinkChannel channel = LinkChannel::video;
-  std::int64_t arrival_ns = 0;     ///< host's steady clock
-  std::vector<std::uint8_t> bytes; ///< as received
+  LinkChannel channel = LinkChannel::video; ///< that it came by
+  std::int64_t arrival_ns = 0;              ///< host's steady clock
+  std::vector<std::uint8_t> bytes;          ///< as received
 };
 
 /// Reads raw.bin, which `bole record` writes. A damaged or cut piece is skipped, and the next whole one searched for,

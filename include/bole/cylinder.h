@@ -47,7 +47,8 @@ RelativeTrunk relativeTrunk(const Cylinder &c);
 /// line beside foot and top. \p relative is relativeTrunk(c).
 struct ContactLine
 {
-  Eigen::Vector3d foot, top; ///< [m]
+  Eigen::Vector3d foot; ///< lower end [m]
+  Eigen::Vector3d top;  ///< upper end [m]
 };
 /// On the side \p border.
 ContactLine contactLine(const Cylinder &c, const RelativeTrunk &relative, Border border);

@@ -106,6 +106,7 @@ class FrameJudge
 {
 public:
   /// \param camera of the images judged; only its focal length is used.
+  /// \param bMc the camera in the body, to which gyro and odometry belong
   FrameJudge(const PinholeCamera &camera, const Pose &bMc);
   ~FrameJudge();
   void judge(Frame &frame); ///< in the order of time

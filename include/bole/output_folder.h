@@ -28,13 +28,14 @@ void removeFiles(const std::string &folder, const FileNames &names);
 class OutputFolder
 {
 public:
+  /// Makes \p path, or takes it where it holds nothing but \p names.
   OutputFolder(std::string path, const FileNames &names);
   ~OutputFolder();
   OutputFolder(const OutputFolder &) = delete;
   OutputFolder &operator=(const OutputFolder &) = delete;
 
-  const std::string &path() const { return m_path; }
-  std::string file(const std::string &name) const { return m_path + "/" + name; }
+  const std::string &path() const { return m_path; }                              ///< of the folder
+  std::string file(const std::string &name) const { return m_path + "/" + name; } ///< path of \p name in it
   /// Whether no command wrote here before.
   bool isNew() const { return m_is_new; }
 
