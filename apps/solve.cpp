@@ -17,6 +17,8 @@ void solve(const std::string &file, const std::string &output, double tolerance)
   const Graph graph = readG2o(file);
   fmt::print("{}: {} poses, {} trunks, {} summaries; cost {:.9g}\n", file, graph.poses.size(), graph.trunks.size(),
              graph.observations.size(), cost(graph));
+  if (!graph.assumed.empty())
+    fmt::print("{}\n", graph.assumed);
   Smoother smoother(graph, SmootherOptions());
   const auto start = std::chrono::steady_clock::now();
   const UpdateResult result = smoother.optimize(tolerance);

@@ -67,6 +67,7 @@ struct Graph
   std::vector<OdometryEdge> odometry;           ///< steps of the pose filter
   std::vector<RelativePoseEdge> relative_poses; ///< steps of the point features
   std::vector<ObservationEdge> observations;    ///< views of trunks
+  std::string assumed;                          ///< by readG2o() where the file leaves it open, for its user
 };
 
 /// Sum of rho(|r|^2) / 2 over all factors and trunk priors at the values of the vertices. The
@@ -104,12 +105,16 @@ Graph scaled(const Graph &graph, double factor);
 ///   d log s) |
 /// | EDGE_DIRECTION | a b, quaternion of caRcb, direction (3), covariance (15), see
 ///   RelativePoseMeasurement |
+/// | VERTEX_SE2, EDGE_SE2 | read alone: x y theta in place of t and quaternion, information (6): poses in the plane |
+/// | EDGE_SE3_PRIOR | read alone: pose, id of a PARAMS_SE3OFFSET, then as above, of what the pose carries there |
+/// | FIX | read alone: poses that stay where they are (to 1e-6) |
 /// | PARAMS_SE3OFFSET | id, t (3), quaternion: bMc, the camera in the body |
 /// | LOSS | summary or direction, quadratic, huber or cauchy, width |
 ///
 /// EDGE_SE3:QUAT and VERTEX_SE3:QUAT are g2o's own: its rotation error is the vector part of the
 /// quaternion, half our angle, so the information is scaled by 2 (mixed) and 4 (rotation). Numbers
-/// have 17 digits: what is read back is what was written, to rounding.
+/// have 17 digits: what is read back is what was written, to rounding. Where a file holds no pose, neither by a prior
+/// nor by FIX, its first stays where it is, and Graph::assumed says so.
 ///@{
 
 /// Throws vpException(ioError) where \p path cannot be written. Atomic: a temporary file beside it,
@@ -118,7 +123,7 @@ void writeG2o(const std::string &path, const Graph &graph);
 /// The same to a stream.
 void writeG2o(std::ostream &out, const Graph &graph);
 
-/// Throws vpException "file:line: ..." for an unknown tag, a wrong count of numbers, NaN, an id
+/// Throws vpException "file:line: ..." for a file without a pose, an unknown tag, a wrong count of numbers, NaN, an id
 /// used twice or never defined, an indefinite matrix, a pose that nothing ties to the world.
 Graph readG2o(const std::string &path);
 /// The same from a stream; \p name stands for the file in messages.

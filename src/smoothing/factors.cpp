@@ -29,6 +29,7 @@ Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N,
 }
 template Matrix6d squareRootInformation<6>(const Matrix6d &, const char *);
 template Matrix5d squareRootInformation<5>(const Matrix5d &, const char *);
+template Matrix3d squareRootInformation<3>(const Matrix3d &, const char *);
 
 Vector6d residual(const PosePrior &prior, const Matrix6d &S, const Pose &wMb, Matrix6d *J)
 {

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <fmt/core.h>
 #include <functional>
@@ -37,6 +37,12 @@ public:
         readLine();
     }
     resolveEdges();
+    if (m_graph.poses.empty())
+      throw vpException(vpException::badValue, "%s: no pose, must have VERTEX_SE3:QUAT or VERTEX_SE2", m_name.c_str());
+    if (m_graph.pose_priors.empty()) {
+      hold(0);
+      m_graph.assumed = fmt::format("no pose is held by the file: pose {} stays where it is", m_graph.poses[0].id);
+    }
     if (const std::optional<std::size_t> loose = untiedPose(m_graph)) {
       const std::int64_t name = m_graph.poses[*loose].id;
       m_line = m_line_of.at(name);
@@ -68,21 +74,25 @@ private:
   double number()
   {
     const std::string text = word();
-    char *end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    if (end != text.c_str() + text.size() || !std::isfinite(value))
+    double value = 0;
+    if (!isRead(text, value) || !std::isfinite(value))
       fail(fmt::format("{}: {} = {}, must be a finite number", m_fields[0], m_next - 1, text));
     return value;
   }
   std::int64_t id()
   {
     const std::string text = word();
-    char *end = nullptr;
-    errno = 0;
-    const long long value = std::strtoll(text.c_str(), &end, 10);
-    if (end != text.c_str() + text.size() || value < 0 || errno == ERANGE)
+    std::int64_t value = 0;
+    if (!isRead(text, value) || value < 0)
       fail(fmt::format("{}: id = {}, must be a whole number of at least 0 and below 2^63", m_fields[0], text));
     return value;
+  }
+  /// Whatever the locale is.
+  template <typename Number> static bool isRead(const std::string &text, Number &value)
+  {
+    const char *begin = text.data() + (text[0] == '+'), *end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(begin, end, value);
+    return error == std::errc() && stop == end && begin != end;
   }
   template <int N> Eigen::Matrix<double, N, 1> vector()
   {
@@ -129,6 +139,29 @@ private:
     const Matrix6d inverse = information.inverse();
     return positiveDefinite<6>(0.5 * (inverse + inverse.transpose()));
   }
+  /// In the plane: what leaves it is held as firmly.
+  Pose planarPose()
+  {
+    const Eigen::Vector3d v = vector<3>();
+    return {Eigen::AngleAxisd(v.z(), Eigen::Vector3d::UnitZ()).toRotationMatrix(), {v.x(), v.y(), 0}};
+  }
+  Matrix6d planarCovariance()
+  {
+    const Eigen::Matrix3d C = positiveDefinite<3>(upper<3>()).inverse();
+    constexpr int kAt[3] = {0, 1, 5};
+    Matrix6d covariance = Matrix6d::Zero();
+    covariance.diagonal() << 0, 0, C(0, 0), C(2, 2), C(2, 2), 0;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        covariance(kAt[r], kAt[c]) = 0.5 * (C(r, c) + C(c, r));
+    return positiveDefinite<6>(covariance);
+  }
+  /// As good as fixed where it stands.
+  void hold(std::size_t pose)
+  {
+    constexpr double kSure = 1e-6; // [m], [rad]
+    m_graph.pose_priors.push_back({pose, {m_graph.poses[pose].wMb, kSure * kSure * Matrix6d::Identity()}});
+  }
   Trunk trunk()
   {
     const Vector5d v = vector<5>();
@@ -141,23 +174,32 @@ private:
   {
     const std::string tag = word();
     if (tag == "VERTEX_SE3:QUAT")
-      readPose();
+      readPose([this] { return pose(); });
+    else if (tag == "VERTEX_SE2")
+      readPose([this] { return planarPose(); });
     else if (tag == "VERTEX_TRUNK")
       readTrunk();
     else if (tag == "EDGE_SE3:QUAT")
-      readOdometry();
-    else if (tag == "EDGE_SE3_PRIOR:QUAT")
-      readPosePrior();
+      readOdometry([this] { return pose(); }, [this] { return covariance(); });
+    else if (tag == "EDGE_SE2")
+      readOdometry([this] { return planarPose(); }, [this] { return planarCovariance(); });
+    else if (tag == "EDGE_SE3_PRIOR:QUAT" || tag == "EDGE_SE3_PRIOR")
+      readPosePrior(tag == "EDGE_SE3_PRIOR");
+    else if (tag == "FIX")
+      readFixed();
     else if (tag == "EDGE_TRUNK_SUMMARY")
       readSummary();
     else if (tag == "EDGE_DIRECTION")
       readDirection();
-    else if (tag == "PARAMS_SE3OFFSET")
-      id(), m_graph.bMc = pose();
+    else if (tag == "PARAMS_SE3OFFSET") {
+      const std::int64_t name = id();
+      m_graph.bMc = m_offset_of[name] = pose();
+    }
     else if (tag == "LOSS")
       readLoss();
     else
-      fail("tag = " + tag + ", must be one of those of <bole/graph.h>");
+      fail("tag = " + tag + ", must be VERTEX_SE3:QUAT, VERTEX_SE2, VERTEX_TRUNK, EDGE_SE3:QUAT, EDGE_SE2, " +
+           "EDGE_SE3_PRIOR:QUAT, EDGE_SE3_PRIOR, EDGE_TRUNK_SUMMARY, EDGE_DIRECTION, FIX, PARAMS_SE3OFFSET or LOSS");
     if (m_next != m_fields.size())
       fail(fmt::format("{}: {} fields, must be {}", tag, m_fields.size(), m_next));
   }
@@ -170,11 +212,11 @@ private:
       fail(fmt::format("id = {}, must not be that of line {}", name, at->second));
     return name;
   }
-  void readPose()
+  template <typename ReadPose> void readPose(const ReadPose &read)
   {
     const std::int64_t name = newId();
     m_pose_of[name] = m_graph.poses.size();
-    m_graph.poses.push_back({name, pose()});
+    m_graph.poses.push_back({name, read()});
   }
   void readTrunk()
   {
@@ -189,28 +231,51 @@ private:
     m_trunk_of[name] = m_graph.trunks.size();
     m_graph.trunks.push_back(vertex);
   }
-  void readOdometry()
+  template <typename ReadPose, typename ReadCovariance>
+  void readOdometry(const ReadPose &read_pose, const ReadCovariance &read_covariance)
   {
     Graph::OdometryEdge edge;
     const std::int64_t a = id(), b = id();
     if (a == b)
-      fail("EDGE_SE3:QUAT: must be between two poses");
-    edge.odometry.aMb = pose();
-    edge.odometry.covariance = covariance();
+      fail(m_fields[0] + ": must be between two poses");
+    edge.odometry.aMb = read_pose();
+    edge.odometry.covariance = read_covariance();
     m_graph.odometry.push_back(edge);
     later([this, a, b, i = m_graph.odometry.size() - 1] {
       m_graph.odometry[i].a = find(m_pose_of, a, "pose");
       m_graph.odometry[i].b = find(m_pose_of, b, "pose");
     });
   }
-  void readPosePrior()
+  /// \p is_of_sensor: of what the pose carries at the PARAMS_SE3OFFSET that is named after it.
+  void readPosePrior(bool is_of_sensor)
   {
     Graph::PosePriorEdge edge;
     const std::int64_t a = id();
+    std::optional<std::int64_t> parameter;
+    if (is_of_sensor)
+      parameter = id();
     edge.prior.mean = pose();
     edge.prior.covariance = covariance();
     m_graph.pose_priors.push_back(edge);
-    later([this, a, i = m_graph.pose_priors.size() - 1] { m_graph.pose_priors[i].pose = find(m_pose_of, a, "pose"); });
+    later([this, a, parameter, i = m_graph.pose_priors.size() - 1] {
+      Graph::PosePriorEdge &read = m_graph.pose_priors[i];
+      read.pose = find(m_pose_of, a, "pose");
+      if (!parameter)
+        return;
+      const auto offset = m_offset_of.find(*parameter);
+      if (offset == m_offset_of.end())
+        fail(fmt::format("EDGE_SE3_PRIOR: parameter {}, must be that of a PARAMS_SE3OFFSET", *parameter));
+      const Matrix6d Ad = adjoint(offset->second);
+      read.prior.mean = read.prior.mean * offset->second.inverse();
+      read.prior.covariance = Ad * read.prior.covariance * Ad.transpose();
+    });
+  }
+  void readFixed()
+  {
+    do {
+      const std::int64_t name = id();
+      later([this, name] { m_fixed.push_back(find(m_pose_of, name, "pose")); });
+    } while (m_next < m_fields.size());
   }
   void readSummary()
   {
@@ -277,6 +342,8 @@ private:
       m_line = line;
       resolve();
     }
+    for (const std::size_t pose : m_fixed)
+      hold(pose);
   }
   std::size_t find(const std::unordered_map<std::int64_t, std::size_t> &names, std::int64_t name,
                    const char *kind) const
@@ -293,6 +360,8 @@ private:
   std::vector<std::string> m_fields;
   Graph m_graph;
   std::unordered_map<std::int64_t, std::size_t> m_line_of, m_pose_of, m_trunk_of;
+  std::unordered_map<std::int64_t, Pose> m_offset_of;
+  std::vector<std::size_t> m_fixed;
   std::vector<std::pair<std::size_t, std::function<void()>>> m_later;
 };
 } // namespace

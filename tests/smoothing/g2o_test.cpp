@@ -2,6 +2,7 @@
 #include "support/flight.h"
 
 #include <bole/graph.h>
+#include <clocale>
 
 #include <cmath>
 #include <filesystem>
@@ -174,13 +175,76 @@ TEST(G2o, NamesTheLineOfAnIndefiniteSummary)
   EXPECT_THAT(errorOf(kPose + trunk + edge), HasSubstr("file.g2o:3: EDGE_TRUNK_SUMMARY: F"));
 }
 
+Graph graphOf(const std::string &text)
+{
+  std::istringstream in(text);
+  return readG2o(in, "file.g2o");
+}
+
 TEST(G2o, NamesTheLineOfAPoseThatIsNotTiedToTheWorld)
 {
   const std::string second = "VERTEX_SE3:QUAT 5 1 0 0 0 0 0 1\n";
-  EXPECT_THAT(errorOf(kPose), HasSubstr("file.g2o:1: pose 0, must be tied to the world"));
   EXPECT_THAT(errorOf(std::string(kPose) + kPrior + second),
               HasSubstr("file.g2o:3: pose 5, must be tied to the world"));
+  EXPECT_THAT(errorOf(kPose + second), HasSubstr("file.g2o:2: pose 5, must be tied to the world"));
   EXPECT_EQ(errorOf(std::string(kPose) + kPrior), "none");
+}
+
+TEST(G2o, WithoutAPriorTheFirstPoseIsHeldAndTheReaderSaysSo)
+{
+  const Graph graph = graphOf(kPose);
+  ASSERT_EQ(graph.pose_priors.size(), 1u);
+  EXPECT_THAT(graph.assumed, HasSubstr("pose 0 stays where it is"));
+  EXPECT_EQ(graphOf(std::string(kPose) + kPrior).assumed, "");
+  const Graph fixed = graphOf("FIX 0\n" + std::string(kPose));
+  EXPECT_EQ(fixed.assumed, "");
+  ASSERT_EQ(fixed.pose_priors.size(), 1u);
+  EXPECT_LT(fixed.pose_priors[0].prior.covariance.norm(), 1e-11);
+  EXPECT_THAT(errorOf("FIX 7\n" + std::string(kPose)), HasSubstr("file.g2o:1: id = 7"));
+}
+
+TEST(G2o, RefusesAFileWithoutAPose)
+{
+  for (const char *text : {"", "\n\n", "# nothing\n", "LOSS summary huber 3\n"})
+    EXPECT_THAT(errorOf(text), HasSubstr("file.g2o: no pose")) << text;
+  EXPECT_THROW(readG2o(std::string("/dev/null")), vpException);
+  EXPECT_THROW(readG2o(testing::TempDir()), vpException);
+}
+
+TEST(G2o, ReadsPosesInThePlane)
+{
+  Graph graph = graphOf("\xEF\xBB\xBFVERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 +1.0 0.1 1.5\n"
+                        "EDGE_SE2 0 1 1 0 1.57 100 0 0 100 0 400\n");
+  ASSERT_EQ(graph.poses.size(), 2u);
+  EXPECT_NEAR(graph.poses[1].wMb.R(1, 0), std::sin(1.5), 1e-12);
+  EXPECT_NEAR(cost(graph), 0.5 * (100 * 0.1 * 0.1 + 400 * 0.07 * 0.07), 1e-9); // that of g2o's own error
+  Smoother smoother(graph, SmootherOptions());
+  smoother.optimize();
+  EXPECT_NEAR(smoother.cost(), 0, 1e-9);
+  EXPECT_NEAR(smoother.pose(1).t.z(), 0, 1e-9);
+}
+
+TEST(G2o, ReadsThePriorOfWhatAPoseCarries)
+{
+  const std::string rest = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4 0 0 4 0 4\n";
+  const Graph graph =
+      graphOf(std::string("PARAMS_SE3OFFSET 3 0 0 2 0 0 0 1\n") + kPose + "EDGE_SE3_PRIOR 0 3 5 0 2 0 0 0 1" + rest);
+  ASSERT_EQ(graph.pose_priors.size(), 1u);
+  EXPECT_LT((graph.pose_priors[0].prior.mean.t - Eigen::Vector3d(5, 0, 0)).norm(), 1e-12);
+  EXPECT_NEAR(graph.pose_priors[0].prior.covariance(0, 0), 5, 1e-9) << "a turn of a radian moves it by the offset";
+  EXPECT_THAT(errorOf(kPose + ("EDGE_SE3_PRIOR 0 3 5 0 2 0 0 0 1" + rest)),
+              HasSubstr("file.g2o:2: EDGE_SE3_PRIOR: parameter 3"));
+}
+
+TEST(G2o, NumbersDoNotDependOnTheLocale)
+{
+  const char *const before = std::setlocale(LC_NUMERIC, nullptr);
+  const std::string old = before ? before : "C";
+  if (!std::setlocale(LC_NUMERIC, "de_DE.UTF-8"))
+    GTEST_SKIP() << "no locale with a comma is installed";
+  const Graph graph = graphOf("VERTEX_SE3:QUAT 0 0.5 0 0 0 0 0 1\n");
+  std::setlocale(LC_NUMERIC, old.c_str());
+  EXPECT_EQ(graph.poses[0].wMb.t.x(), 0.5);
 }
 
 TEST(G2o, NamesTheLineOfAnInformationMatrixThatIsNone)
