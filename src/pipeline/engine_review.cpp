@@ -53,10 +53,12 @@ FrameReport Engine::review(std::size_t index) const
       continue;
     const HorizontalView from = horizontalView(view.wMc, trunk.trunk);
     const RelativeTrunk relative = relativeTrunk(view.wMc, Pose(), trunk.trunk);
-    if (!relative.isFinite() || relative.cRt(2, 0) <= 0 || (view.has_ranges && from.range > m_units.flow.track_range))
+    const bool is_seen = isSeen(trunk, index); // also beyond track_range: the final pass looks there, too
+    if (!relative.isFinite() || relative.cRt(2, 0) <= 0 ||
+        (view.has_ranges && !is_seen && from.range > m_units.flow.track_range))
       continue;
     const ElevationRange part = elevationOf(relative, trunk.trunk, view, m_units);
-    report.trunks.push_back({trunk.id, TrunkStatus::confirmed, isSeen(trunk, index), "", relative, part.low, part.high,
+    report.trunks.push_back({trunk.id, TrunkStatus::confirmed, is_seen, "", relative, part.low, part.high,
                              view.has_ranges ? from.range : 0});
     const Eigen::Vector2d across(-from.offset.y() / from.range, from.offset.x() / from.range);
     const double variance = across.dot(trunk.place_covariance * across) / (from.range * from.range);

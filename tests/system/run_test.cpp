@@ -114,7 +114,7 @@ TEST(Run, HasAPictureAndViewsOfEachTrunk)
     EXPECT_TRUE(fs::exists(fmt::format("{}/views/{}.jpg", folder, trunk.id))) << trunk.id;
     const auto views = std::count_if(trace.views.begin(), trace.views.end(),
                                      [&](const bole::TrunkTrace &view) { return view.id == trunk.id; });
-    EXPECT_GT(2 * views, trunk.observations) << trunk.id; // a frame gives it one, however many hypotheses became it
+    EXPECT_GE(views, trunk.observations) << trunk.id; // a frame from where another was taken is a view, but no factor
   }
 }
 
