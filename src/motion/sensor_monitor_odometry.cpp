@@ -165,14 +165,14 @@ void SensorMonitor::checkTilt(const Frame &frame)
   const auto between = [](const Step &a, const Step &b) {
     return Velocity{(a.stamp_ns + b.stamp_ns) / 2, (b.wMb.t - a.wMb.t) / secondsOf(b.stamp_ns - a.stamp_ns)};
   };
-  const auto is_after = [](double time_s) {
+  const auto isAfter = [](double time_s) {
     return [time_s](const Step &step) { return secondsOf(step.stamp_ns) > time_s - 1e-3; };
   };
   const Step &first = m_steps.front(), &last = m_steps.back();
   const auto first_end =
-      std::find_if(m_steps.begin() + 1, m_steps.end(), is_after(secondsOf(first.stamp_ns) + kVelocity_s));
+      std::find_if(m_steps.begin() + 1, m_steps.end(), isAfter(secondsOf(first.stamp_ns) + kVelocity_s));
   const auto last_begin =
-      std::find_if(m_steps.begin(), m_steps.end() - 1, is_after(secondsOf(last.stamp_ns) - kVelocity_s));
+      std::find_if(m_steps.begin(), m_steps.end() - 1, isAfter(secondsOf(last.stamp_ns) - kVelocity_s));
   const Velocity begin = between(first, *first_end), end = between(*last_begin, last);
   Vector3d sum = Vector3d::Zero();
   int count = 0;
