@@ -88,6 +88,12 @@ struct RelativeTrunk
 RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose = nullptr,
                             Matrix45d *J_trunk = nullptr);
 
+/// The upright relative trunk whose borders have the bearings \p q_left > \p q_right [tan, to the left] in the level
+/// frame l (x ahead, z up) that \p cRl turns into the camera's.
+///
+/// Law (a test): its borderDirection()s have these bearings.
+RelativeTrunk betweenBorders(const Eigen::Matrix3d &cRl, double q_left, double q_right);
+
 /// The upright trunk of radius \p radius [m] that gives the relative trunk \p relative from the camera
 /// pose \p wMc: the inverse of relativeTrunk() once the radius is known (lean is set to zero).
 Trunk trunkFromRelative(const Pose &wMc, const RelativeTrunk &relative, double radius);

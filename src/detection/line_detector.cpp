@@ -63,15 +63,6 @@ bool isDivided(const LevelProfile &profile, const Line &left, const Line &right)
     return peak.q > right.q + margin && peak.q < left.q - margin && std::abs(peak.contrast) > weaker;
   });
 }
-
-RelativeTrunk relativeOf(const LevelProfile &grid, double q_left, double q_right)
-{
-  const double left = std::atan(q_left), right = std::atan(q_right);
-  RelativeTrunk relative;
-  relative.cRt = grid.cRl * Eigen::AngleAxisd(0.5 * (left + right), Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  relative.log_ratio = std::log(std::sin(0.5 * (left - right)));
-  return relative;
-}
 } // namespace
 
 std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<float> *p_background,
@@ -118,7 +109,7 @@ std::vector<LineDetection> detectLines(const Gradient &gradient, const vpImage<f
         }))
       continue;
     taken.push_back({right.q, left.q});
-    found.push_back({relativeOf(lines, left.q, right.q), left.p, right.p});
+    found.push_back({betweenBorders(lines.cRl, left.q, right.q), left.p, right.p});
   }
   return found;
 }

@@ -50,6 +50,15 @@ Vector3d RelativeTrunk::borderNormal(Border border) const
   return cRt * Vector3d(-s, side * std::sqrt(1 - s * s), 0);
 }
 
+RelativeTrunk betweenBorders(const Matrix3d &cRl, double q_left, double q_right)
+{
+  const double left = std::atan(q_left), right = std::atan(q_right);
+  RelativeTrunk relative;
+  relative.cRt = cRl * Eigen::AngleAxisd(0.5 * (left + right), Vector3d::UnitZ()).toRotationMatrix();
+  relative.log_ratio = std::log(std::sin(0.5 * (left - right)));
+  return relative;
+}
+
 RelativeTrunk relativeTrunk(const Pose &wMb, const Pose &bMc, const Trunk &trunk, Matrix46d *J_pose, Matrix45d *J_trunk)
 {
   const Vector3d wpc = wMb * bMc.t;

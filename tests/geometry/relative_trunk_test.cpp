@@ -46,6 +46,16 @@ template <int N> Eigen::Matrix<double, 4, N> differences(double h)
   return J;
 }
 
+TEST(RelativeTrunk, BetweenTwoBordersHasThem)
+{
+  const Eigen::Matrix3d cRl = expSo3({0.3, -0.1, 0.2});
+  const RelativeTrunk relative = betweenBorders(cRl, 0.4, 0.1);
+  const Eigen::Vector3d left = cRl.transpose() * relative.borderDirection(Border::left, 0.2),
+                        right = cRl.transpose() * relative.borderDirection(Border::right, -0.3);
+  EXPECT_NEAR(left.y() / left.x(), 0.4, 1e-12);
+  EXPECT_NEAR(right.y() / right.x(), 0.1, 1e-12);
+}
+
 TEST(RelativeTrunk, JacobiansAgreeWithCentralDifferences)
 {
   Matrix46d J_pose;

@@ -63,15 +63,6 @@ std::vector<Line> maximaOf(const std::vector<double> &p, const LevelProfile &gri
   }
   return lines;
 }
-
-RelativeTrunk relativeOf(const LevelProfile &grid, double q_left, double q_right)
-{
-  const double left = std::atan(q_left), right = std::atan(q_right);
-  RelativeTrunk relative;
-  relative.cRt = grid.cRl * Eigen::AngleAxisd(0.5 * (left + right), Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  relative.log_ratio = std::log(std::sin(0.5 * (left - right)));
-  return relative;
-}
 } // namespace
 
 double probabilityOf(double value, double quartile)
@@ -126,7 +117,7 @@ std::vector<NewTree> detectTrees(const SplitGradient &gradient, const vpImage<fl
     if (std::any_of(taken.begin(), taken.end(), isIn)) // a border belongs to one tree
       continue;
     taken.push_back({right.q, left.q});
-    found.push_back({relativeOf(falling, left.q, right.q), left.p, right.p});
+    found.push_back({betweenBorders(falling.cRl, left.q, right.q), left.p, right.p});
   }
   return found;
 }
