@@ -427,7 +427,7 @@ void addFollow(CLI::App &app)
                       "Horizontal, where there is no camera file [degrees]");
   command
       ->add_option("--camera-height", arguments->camera_height,
-                   "Height of the camera over the ground [m], which gives a video without odometry its scale")
+                   "Mean height of the camera over the ground [m], which gives a video without odometry its scale")
       ->check(within(0.1, 100));
   command->add_option("--rate", arguments->source.frame_rate_hz,
                       "Frames a second of numbered images; else the camera file's rate_hz, else 25");

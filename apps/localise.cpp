@@ -94,7 +94,7 @@ void addLocalise(CLI::App &app)
   command->add_option("--camera", arguments->source.camera_path, "Camera file, as for `bole track`");
   command
       ->add_option("--camera-height", arguments->camera_height,
-                   "Height of the camera over the ground [m], which gives a video without odometry its scale")
+                   "Mean height of the camera over the ground [m], which gives a video without odometry its scale")
       ->check(within(0.1, 100));
   command->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors");
   command->footer(

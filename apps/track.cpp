@@ -254,6 +254,9 @@ void track(const TrackArguments &asked_for)
   widen(options.odometry, calibration);
   if (!made.note.empty() && !arguments.is_quiet)
     std::fprintf(stderr, "bole: %s\n", made.note.c_str());
+  for (const std::string &sensor : arguments.without)
+    if (!arguments.is_quiet && !(sensor == "gyro" ? source->hasGyro() : source->hasOdometry()))
+      std::fprintf(stderr, "bole: --without %s has no effect: there is none\n", sensor.c_str());
 
   Pipeline pipeline(source->camera(), source->bMc(), options);
   const bool is_shown_again = !is_live && !arguments.is_online && options.map.lag == 0;

@@ -161,17 +161,20 @@ Trajectory readPoses(const fs::path &sensor)
   return poses;
 }
 
-/// Size of the images: that of the first one that can be read, which must be the camera's.
-void requireCameraSize(const std::vector<ImageRow> &rows, const CameraModel &model, const std::string &camera_path)
+/// The camera for images of the size of the first one that can be read.
+MountedCamera cameraFor(const std::vector<ImageRow> &rows, const std::string &camera_path)
 {
   ImageFile file;
   const ImageRow *row = firstReadable(rows, file);
   if (row == nullptr)
     throw ioError("none of the {} images can be read; {}", rows.size(), file.message);
   const int width = static_cast<int>(file.image.getWidth()), height = static_cast<int>(file.image.getHeight());
-  if (width != model.pinhole.width || height != model.pinhole.height)
-    throw dimensionError("{}: image of {}x{} px, must be {}x{} as {} says", row->path, width, height,
-                         model.pinhole.width, model.pinhole.height, camera_path);
+  const MountedCamera camera = readCamera(camera_path, width, height);
+  const PinholeCamera &pinhole = camera.model.pinhole;
+  if (width != pinhole.width || height != pinhole.height)
+    throw dimensionError("{}: image of {}x{} px, must be {}x{} as {} says", row->path, width, height, pinhole.width,
+                         pinhole.height, camera_path);
+  return camera;
 }
 } // namespace
 
@@ -185,8 +188,7 @@ AslSource::AslSource(const std::string &folder, const SourceOptions &options)
   m_rows = readImageRows(root / "cam0");
   const std::string camera_path =
       options.camera_path.empty() ? (root / "cam0" / "sensor.yaml").string() : options.camera_path;
-  const MountedCamera camera = readCamera(camera_path);
-  requireCameraSize(m_rows, camera.model, camera_path);
+  const MountedCamera camera = cameraFor(m_rows, camera_path);
 
   Recording recording;
   recording.odometry = options.odometry_path.empty() ? readPoses(root / "odom0") : readOdometry(options);

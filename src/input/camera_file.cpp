@@ -248,8 +248,8 @@ MountedCamera readXmlCamera(const std::string &path, int width, int height)
     ++fitting;
   }
   if (fitting != 1)
-    throw ioError("{}: {} of its cameras are for images of {}x{} px, must be one: {}", path, fitting, width, height,
-                  names);
+    throw ioError("{}: {} of its cameras are for images of {}, must be one: {}", path, fitting,
+                  width > 0 ? fmt::format("{}x{} px", width, height) : "a size that is not known yet", names);
   if (pinhole.width == 0 || pinhole.height == 0) {
     pinhole.width = width;
     pinhole.height = height;

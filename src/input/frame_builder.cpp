@@ -114,6 +114,8 @@ MountedCamera cameraFor(const SourceOptions &options, int width, int height, std
     const double view_deg = options.field_of_view_deg.value_or(kUsual_deg);
     const double f = 0.5 * width / std::tan(0.5 * view_deg * M_PI / 180);
     note = fmt::format("no camera file: assuming a field of view of {:g} degrees (f = {:.0f} px)", view_deg, f);
+    if (std::abs(pixel_aspect - 1) > 1e-3)
+      note += fmt::format("; a pixel is {:.3g} times as wide as high, as the video says", pixel_aspect);
     CameraModel model;
     model.pinhole = {f, f * pixel_aspect, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
     const MountedCamera guess = {model, forwardCamera()};

@@ -35,8 +35,12 @@ std::string dumped(const YAML::Node &node)
 /// False where one is none.
 bool appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
 {
-  if (node.IsMap() && node["data"])
-    return appendNumbers(node["data"], numbers);
+  if (node.IsMap() && node["data"]) { // a matrix as OpenCV and ROS write it
+    const auto side = [&](const char *key) { return parseNumber<double>(node[key].as<std::string>("")).value_or(0); };
+    const std::size_t before = numbers.size();
+    const bool are_numbers = appendNumbers(node["data"], numbers);
+    return are_numbers && (!node["rows"] || side("rows") * side("cols") == static_cast<double>(numbers.size() - before));
+  }
   if (node.IsSequence())
     return std::all_of(node.begin(), node.end(), [&](const auto &entry) { return appendNumbers(entry, numbers); });
   const auto value = node.IsScalar() ? parseNumber<double>(node.Scalar()) : std::nullopt;
@@ -98,7 +102,7 @@ std::vector<double> SensorYaml::numbers(const std::string &key) const
 {
   std::vector<double> values;
   if (!appendNumbers(node(key), values))
-    fail(key, "finite numbers");
+    fail(key, "finite numbers, of a matrix rows times cols");
   return values;
 }
 

@@ -88,6 +88,12 @@ Trajectory readAslTrajectory(const std::string &path)
   Trajectory trajectory;
   CsvReader csv(path, {8});
   while (csv.next()) {
+    if (!csv.header().empty() && csv.header()[0] == "%time")
+      csv.fail("the columns are those of `rostopic echo -p`, must be stamp [ns],x,y,z,qw,qx,qy,qz");
+    if (csv.text(0).find('.') != std::string::npos)
+      csv.fail(fmt::format("timestamp = {} looks like seconds: between commas the columns must be stamp "
+                           "[ns],x,y,z,qw,qx,qy,qz, between blanks t [s] x y z qx qy qz qw",
+                           csv.text(0)));
     const std::int64_t stamp_ns = csv.risingStampNs(0);
     append(trajectory, {stamp_ns, readPose(csv, {4, 5, 6, 7})}, csv);
   }
