@@ -72,7 +72,7 @@ struct Options
     double merge_distance = 0.3;      ///< trunks with less than this between their bark are one [m]
     double candidate_memory = 5;      ///< a candidate not seen for longer is no longer looked for, a trunk only
                                       ///< while its bearing is known to its width [s]
-    double lag = 0;                   ///< poses older than this are marginalised [s]; 0: all stay open
+    double lag = 0;                   ///< poses older than this are fixed and forgotten [s]; 0: never
   } map;                              ///< how trunks are kept
 
   struct Odometry ///< noise of the pose filter, a step: between two frames

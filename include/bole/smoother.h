@@ -4,14 +4,12 @@
 /// The smoother: all poses and all trunks from odometry and summary factors (paper, Section 4, Eq.
 /// 2), at a cost a frame that does not grow with the flight.
 ///
-/// Idea: Gauss-Newton on the sparse normal equations, eliminated one variable at a time in the
-/// order of the flight, each trunk right after the last pose that saw it. What every elimination
-/// leaves to its later neighbours is kept, so a new frame eliminates again only the variables it
-/// touches and those after them; the change then runs back down the elimination tree until it is
-/// too small to matter. Far back in the flight it waits for a deeper pass; each is twice as deep as the one before and
-/// a quarter as frequent. A variable whose estimate has left its point of linearisation gets a new point, and its
-/// factors are linearised there; only the images stay as they were summarised. The older a variable, the less often it
-/// gets a new point. When a trunk of long ago is seen again, the part of the flight between is eliminated again.
+/// Idea: two parts over one elimination of sparse normal equations (multifrontal Cholesky). In flight, update()
+/// optimises a window: the newest poses, the trunks that they see, and those seen last before. What leaves the window
+/// becomes a quadratic on what stays (Schur complement), linearised there and then; whatever it touches has its
+/// Jacobians at the same point from then on (first estimates). For the whole, optimize() is Levenberg-Marquardt on all
+/// factors, in an order of little fill; it also runs where something changes that left the window: two visits of a
+/// trunk are tied, or one is given up.
 ///
 /// Frames: poses wMb, camera at wMb * bMc. Tangents (and the rows of covariances): Pose (rho [m],
 /// phi [rad]), Trunk (x [m], y [m], log r, lean x, lean y), RelativeTrunk (phi_x, phi_y, phi_z
@@ -23,11 +21,10 @@
 /// outcome and returns a status. One object is for one thread at a time; const functions use its
 /// work space too.
 ///
-/// Cost: update() about a millisecond in steady flight past six trunks at a time (some 40
-/// eliminations of a front of 50 columns, 250 back-substitutions), see the benchmark
-/// smoothing_flat; covariances O(number of eliminations between the variable and the newest pose).
-/// Limit: fronts hold all trunks that come back later; and now and then a pass goes through the
-/// whole flight. The fixed lag bounds both; memory is then a pose a frame (104 bytes).
+/// Cost: update() some milliseconds at most, whatever the length of the flight, see the benchmark smoothing_flat; of
+/// the whole, O(length of the flight) an iteration where it does not return, more where it closes many loops.
+/// Limit: a trunk that is not among those seen last is not in the window; where it is seen again all the same, the
+/// whole is solved, or, where what left the window is forgotten, nothing but its radius and lean is known of it.
 ///
 /// Deviations from the paper: trunks may lean; robust loss on summary factors; the paper sums
 /// energies, we drop the part of them that no variable can change.
@@ -55,24 +52,6 @@ struct SmootherOptions
   /// Camera in the body frame. Default: forward-looking (z of the camera along x of the body).
   Pose bMc = forwardCamera();
 
-  // Linearisation. A variable that moved less than this (its position against its neighbour's, since
-  // a common shift bends nothing) from where its linearisation was last found good is not looked
-  // at: > 0. Defaults: far below what curves a relative trunk, whose scale is the distance
-  // (metres) and a radian.
-  double relinearise_position = 0.02;   ///< [m], poses and trunks
-  double relinearise_rotation = 0.005;  ///< [rad]
-  double relinearise_log_radius = 0.02; ///< relative
-  double relinearise_lean = 0.005;      ///< tan
-  /// One that moved farther is linearised again when some factor's true residual is off its linear
-  /// model by more than this, in standard deviations (> 0). So a correction that shifts a whole
-  /// stretch of the flight, and changes no view in it, costs nothing. Default: views stay within a
-  /// tenth of their standard deviation of the batch optimum (rms).
-  double linearisation_tolerance = 0.1;
-  /// A variable is solved again when it stands farther than this from its solution given the
-  /// variables eliminated after it, in standard deviations of that solution: >= 0. Half the square
-  /// bounds what one variable adds to the cost of the linearised graph. 0 passes every change, to
-  /// the first pose. Default: no view notices.
-  double propagation_threshold = 0.1;
   /// Gauss-Newton iterations in one update(), >= 1. Default: the next frame goes on with
   /// what has not settled.
   int max_iterations = 2;
@@ -89,9 +68,15 @@ struct SmootherOptions
   double prior_lean_sigma = 0.035;     ///< tan, > 0: 2 degrees; 1e-4 switches lean off
   double prior_position_sigma = 50;    ///< [m], > 0: about the first guess; only keeps unseen trunks somewhere
 
-  /// Poses kept open behind the newest; older ones are marginalised into a linear prior and keep
-  /// their estimate. 0: all stay open. Otherwise >= 2.
-  int fixed_lag = 0;
+  /// The window: poses that are optimised in each update, >= 2. Older ones keep their estimate. Default: four seconds
+  /// of ten frames each, in which a trunk that is passed is seen from a few metres apart.
+  int window = 40;
+  /// Trunks out of sight that the window remembers, those seen last, >= 0: they tie the visits of a place together.
+  /// Each costs 5 columns of a dense quadratic, so tens.
+  int remembered = 24;
+  /// Whether nothing is kept of what left the window but the prior that it became: memory is then a pose a frame
+  /// (96 bytes), and there is no whole.
+  bool forgets = false;
 
   /// Camera that looks along the body's x axis, without a lever arm.
   static Pose forwardCamera();
@@ -102,7 +87,7 @@ struct SmootherOptions
 /// How an update went.
 enum class UpdateStatus
 {
-  ok,              ///< settled: no variable is further than the thresholds from its linearisation
+  ok,              ///< settled: a further step would not matter
   iteration_limit, ///< still moving after max_iterations; the next update() goes on
   degenerate       ///< a direction of some variable had no information beyond rounding and was held
 };
@@ -114,13 +99,10 @@ struct UpdateResult
 {
   UpdateStatus status = UpdateStatus::ok; ///< ok, or why not
   int iterations = 0;                     ///< Gauss-Newton steps taken
-  double cost = 0;                        ///< of the linearised graph at its minimum
-  std::size_t relinearised = 0;           ///< variables moved to a new point of linearisation
-  std::size_t eliminated = 0;             ///< variables eliminated again
-  std::size_t resolved = 0;               ///< variables whose estimate was computed again
+  double cost = 0;                        ///< of update(): of the window with its prior; of optimize(): of the whole
 };
 
-/// Poses and trunks from odometry, point features and summary factors (Eq. 2), solved incrementally.
+/// Poses and trunks from odometry, point features and summary factors (Eq. 2), solved in flight and as a whole.
 class Smoother
 {
 public:
@@ -137,7 +119,7 @@ public:
   /// As given to the constructor.
   const SmootherOptions &options() const;
 
-  // Growing the graph. Ids count from 0; with a fixed lag that of a removed trunk is given again.
+  // Growing the graph. Ids count from 0; where the window forgets, that of a removed trunk is given again.
 
   /// The pose that all others hang on. \return 0
   std::size_t addFirstPose(const Pose &wMb, const Matrix6d &covariance);
@@ -153,9 +135,9 @@ public:
   SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
   /// Takes back what \p pose saw of \p trunk; estimates stay until the next solve.
   void removeObservation(std::size_t pose, std::size_t trunk);
-  /// Not added where the fixed lag has marginalised one of the poses.
+  /// Not added where one of the poses was forgotten.
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
-  /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one is marginalised.
+  /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one was forgotten.
   void addOdometry(std::size_t a, std::size_t b, const Odometry &odometry);
   /// An absolute measurement of a pose.
   void addPosePrior(std::size_t pose, const PosePrior &prior);
@@ -164,19 +146,17 @@ public:
   void removeTrunk(std::size_t trunk);
   /// What was seen of \p gone was \p keep all along; \p gone is forgotten, its prior too.
   void mergeTrunks(std::size_t keep, std::size_t gone);
-  /// Whether a trunk stays open however long ago it was seen: under the fixed lag it then ties the visits of a place
-  /// together as all poses between them would. What the lag closes is a dense quadratic on all that are kept: each
-  /// costs 5 columns of it, so keep tens.
+  /// Whether what leaves the window says something of this trunk (default), or its views are left out of the prior, as
+  /// for a hypothesis that may be given up: then that is as if they had never been.
   void keepTrunk(std::size_t trunk, bool is_kept);
 
   // Solving.
 
-  /// Takes in what was added or removed since, at a cost that does not depend on the length of the
-  /// flight.
+  /// Takes in what was added or removed since: a few iterations on the window.
   UpdateResult update();
   /// The optimum of the whole graph: Levenberg-Marquardt with everything linearised anew, until the
   /// cost falls by less than \p tolerance (relative). It never rises, and nothing ever leaves the finite numbers.
-  /// O(length of the flight) an iteration.
+  /// Where the window forgets, the optimum of the window.
   UpdateResult optimize(double tolerance = 1e-9, int max_iterations = 100);
 
   // Estimates, as of the last update().
@@ -185,17 +165,16 @@ public:
   Pose pose(std::size_t pose) const;
   /// Estimate of a trunk, in the world.
   Trunk trunk(std::size_t trunk) const;
-  /// Poses added so far, closed ones included.
+  /// Poses added so far, forgotten ones included.
   std::size_t poseCount() const;
   std::size_t observationCount() const; ///< summary factors in the graph
   /// Views of a trunk.
   std::size_t observationCount(std::size_t trunk) const;
-  /// Exact cost of the open part of the graph at the estimates, as cost(graph()). O(graph).
+  /// Exact cost of the graph at the estimates, as cost(graph()); where the window forgets, of the window. O(graph).
   double cost() const;
 
-  // Marginal covariances of the linearised graph as of the last update(): that of what was not yet
-  // taken in is not known. For a trunk closed by the fixed lag: its last one; for a pose: that of
-  // one at most 15 poses before it, when that was closed.
+  // Marginal covariances of the linearised window as of the last update(): that of what was not yet
+  // taken in is not known. For what is not in the window: as of when it left or of the last optimize().
 
   /// Marginal covariance in the units of Trunk::minus [m, m, -, -, -].
   Matrix5d trunkCovariance(std::size_t trunk) const;
@@ -213,11 +192,9 @@ public:
   /// Of its bearing alone, its element (2, 2), cheaper.
   double bearingVariance(std::size_t trunk) const;
 
-  /// All that is open, at the estimates. Removed trunks are left out; ids: pose i is i, trunk j is
+  /// All that is held, at the estimates. Removed trunks are left out; ids: pose i is i, trunk j is
   /// poseCount() + j.
   Graph graph() const;
-  /// Bytes held for the graph, its linearisation and its factorisation.
-  std::size_t memoryBytes() const;
 
 private:
   class State;

@@ -26,8 +26,8 @@ void DetectionWindow::push(std::shared_ptr<const Gradient> gradient, std::size_t
       m_views.pop_back();
   }
   m_views.push_back(std::move(view));
-  const auto lag = static_cast<std::size_t>(options.smoothing.fixed_lag);
-  const auto isMarginalised = [&] { return lag > 0 && m_views.front().pose + lag <= pose + 1; };
+  const auto length = static_cast<std::size_t>(options.smoothing.window);
+  const auto isMarginalised = [&] { return m_views.front().pose + length <= pose + 1; };
   while (static_cast<int>(m_views.size()) > options.detection.window || isMarginalised())
     m_views.pop_front();
 }

@@ -282,25 +282,17 @@ std::vector<int> Engine::reviewMap(const std::vector<TriangulatedRay> &points, c
     m_map.record(count);
   MapUpdate update = m_map.review(view.time_s, view.has_ranges);
   apply(update);
-  if (m_units.smoothing.fixed_lag > 0)
-    keepRecentTrunks();
+  keepConfirmed();
   return std::move(update.archived);
 }
 
-/// With a fixed lag: keeps the trunks seen last in the smoother, where they tie the visits of a place together even
-/// after the poses of an earlier visit are marginalised.
-void Engine::keepRecentTrunks()
+/// What leaves the smoother's window tells of confirmed trunks alone.
+void Engine::keepConfirmed()
 {
-  constexpr std::size_t kMost = 24; // trunks: 120 columns of the prior that marginalisation leaves
-  std::vector<const MapTrunk *> trunks;
-  for (const std::size_t i : m_map.active())
-    if (m_map.trunks()[i].status != TrunkStatus::candidate)
-      trunks.push_back(&m_map.trunks()[i]);
-  std::sort(trunks.begin(), trunks.end(), [](const MapTrunk *a, const MapTrunk *b) {
-    return a->last_seen_s != b->last_seen_s ? a->last_seen_s > b->last_seen_s : a->id < b->id;
-  });
-  for (std::size_t i = 0; i < trunks.size(); ++i)
-    m_smoother.keepTrunk(trunks[i]->smoother_id, i < kMost);
+  for (const std::size_t i : m_map.active()) {
+    const MapTrunk &trunk = m_map.trunks()[i];
+    m_smoother.keepTrunk(trunk.smoother_id, trunk.status != TrunkStatus::candidate);
+  }
 }
 
 TrunkEstimate Engine::estimateOf(const MapTrunk &trunk, bool with_covariance) const

@@ -81,7 +81,7 @@ private:
   void scoreByConsistency(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
   std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
-  void keepRecentTrunks();
+  void keepConfirmed();
   TrunkEstimate estimateOf(const MapTrunk &trunk, bool with_covariance) const;
   void refreshMap(double seen_since_s);
   void refreshWholeMap();

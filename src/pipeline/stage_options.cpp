@@ -82,7 +82,6 @@ void setRange(StageOptions &o, const Options::Range &range)
   o.detection.range_max = range.detect_max;
   constexpr double kParallax = 0.04; // rad: least that two views of the window differ by at the nearest trunk
   o.flow.view_spacing = kParallax * range.detect_min;
-  o.smoothing.relinearise_position *= range.detect_min / Options::Range().detect_min;
   if (range.near > 0) {
     constexpr double kNearest = 0.5; // m
     o.saliency.near_range = std::max(range.near, kNearest);
@@ -100,8 +99,10 @@ void setMap(StageOptions &o, const Options &options)
   o.map.most_place_sigma = map.confirm_sigma;
   o.map.merge_distance = map.merge_distance;
   o.map.candidate_memory_s = map.candidate_memory;
-  const auto poses = static_cast<int>(std::lround(map.lag * rateOf(options)));
-  o.smoothing.fixed_lag = map.lag > 0 ? std::max(2, poses) : 0;
+  constexpr double kWindow_s = 4;
+  const double window_s = map.lag > 0 ? map.lag : kWindow_s;
+  o.smoothing.window = std::max(2, static_cast<int>(std::lround(window_s * rateOf(options))));
+  o.smoothing.forgets = map.lag > 0;
 }
 
 void setSensors(StageOptions &o, const Options &options)
@@ -155,8 +156,8 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   constexpr double kNarrowest = 8, kWidest = 0.35; // of what the stages can be told
   scaleToCamera(o, std::clamp(camera.fx / kFocal_px, kWidest, kNarrowest));
   if (!o.flow.final_pass)
-    o.map.memory = o.smoothing.fixed_lag > 0 ? Memory::in_sight : Memory::undecided;
-  o.map.forget_s = options.map.lag; // what was seen of it is closed by then, and stays
+    o.map.memory = o.smoothing.forgets ? Memory::in_sight : Memory::undecided;
+  o.map.forget_s = options.map.lag; // what was seen of it has left the window by then, and stays
   return o;
 }
 } // namespace bole

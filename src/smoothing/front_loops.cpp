@@ -10,7 +10,10 @@ namespace bole
 {
 namespace
 {
-int factorColumns(double *front, int ld, int columns)
+constexpr int kPanel = 6; ///< columns that are taken from the rest at a time
+
+/// \p front: from its first diagonal element on, of \p rows rows that stand \p ld apart.
+int factorPanel(double *front, int ld, int rows, int columns)
 {
   int held = 0;
   for (int c = 0; c < columns; ++c) {
@@ -19,32 +22,32 @@ int factorColumns(double *front, int ld, int columns)
     for (int k = 0; k < c; ++k) {
       const double *earlier = front + k * ld;
       const double scale = earlier[c];
-      for (int i = c; i < ld; ++i)
+      for (int i = c; i < rows; ++i)
         column[i] -= scale * earlier[i];
     }
     if (!(column[c] > 1e-13 * std::abs(before)) || !std::isfinite(column[c])) {
       ++held;
-      std::fill(column + c, column + ld, 0.0);
+      std::fill(column + c, column + rows, 0.0);
       column[c] = 1;
       continue;
     }
     const double inverse = 1 / std::sqrt(column[c]);
-    for (int i = c; i < ld; ++i)
+    for (int i = c; i < rows; ++i)
       column[i] *= inverse;
   }
   return held;
 }
 
 /// Takes the products of the first Columns columns from the others.
-template <int Columns> [[gnu::always_inline]] inline void subtractProducts(double *front, int ld)
+template <int Columns> [[gnu::always_inline]] inline void subtractProducts(double *front, int ld, int rows)
 {
-  for (int j = Columns; j < ld - 1; ++j) {
+  for (int j = Columns; j < rows - 1; ++j) {
     double w[Columns];
     for (int k = 0; k < Columns; ++k)
       w[k] = front[k * ld + j];
     double *column = front + j * ld;
 #pragma omp simd
-    for (int i = j; i < ld; ++i) {
+    for (int i = j; i < rows; ++i) {
       double sum = 0;
       for (int k = 0; k < Columns; ++k)
         sum += w[k] * front[k * ld + i];
@@ -54,32 +57,34 @@ template <int Columns> [[gnu::always_inline]] inline void subtractProducts(doubl
 }
 
 BOLE_VECTOR_CLONES
-void subtractProductsOf5(double *front, int ld) { subtractProducts<5>(front, ld); }
-
-BOLE_VECTOR_CLONES
-void subtractProductsOf6(double *front, int ld) { subtractProducts<6>(front, ld); }
-
-template <typename Number>
-[[gnu::always_inline]] inline double sumOfProducts(const Number *a, const double *b, int count)
+void subtractProductsOf(double *front, int ld, int rows, int columns)
 {
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < count; ++i)
-    sum += a[i] * b[i];
-  return sum;
+  switch (columns) {
+  case 1:
+    return subtractProducts<1>(front, ld, rows);
+  case 2:
+    return subtractProducts<2>(front, ld, rows);
+  case 3:
+    return subtractProducts<3>(front, ld, rows);
+  case 4:
+    return subtractProducts<4>(front, ld, rows);
+  case 5:
+    return subtractProducts<5>(front, ld, rows);
+  default:
+    return subtractProducts<kPanel>(front, ld, rows);
+  }
 }
 } // namespace
 
-BOLE_VECTOR_CLONES
-double product(const double *a, const double *b, int count) { return sumOfProducts(a, b, count); }
-
-BOLE_VECTOR_CLONES
-double product(const float *a, const double *b, int count) { return sumOfProducts(a, b, count); }
-
 int factorFront(double *front, int ld, int columns)
 {
-  const int held = factorColumns(front, ld, columns);
-  (columns == 6 ? subtractProductsOf6 : subtractProductsOf5)(front, ld);
+  int held = 0;
+  for (int at = 0; at < columns; at += kPanel) {
+    double *panel = front + static_cast<std::ptrdiff_t>(at) * (ld + 1);
+    const int width = std::min(kPanel, columns - at);
+    held += factorPanel(panel, ld, ld - at, width);
+    subtractProductsOf(panel, ld, ld - at, width);
+  }
   return held;
 }
 } // namespace bole

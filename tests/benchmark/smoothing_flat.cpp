@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Time a frame over a long flight: must not grow with its length; and how far the estimate is from
-// the batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg] [poses a round]: straight ahead, or
-// round after round past the same trunks.
+// Time and memory a frame over a long flight: must not grow with its length; and how far what is in sight is from the
+// batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg] [poses a round] [forget]: straight ahead,
+// or round after round past the same trunks; "forget": what leaves the window is.
 #include "support/flight.h"
 #include "support/line_chart.h"
+
+#include <Eigen/Cholesky>
 
 #include <cstdio>
 #include <ctime>
 #include <fmt/core.h>
+#include <malloc.h>
 
 namespace
 {
@@ -25,7 +28,13 @@ double quantile(std::vector<double> values, double q)
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
-/// The whole graph solved from the present estimate, and how far the estimate was from it.
+double heapMegabytes()
+{
+  const auto heap = mallinfo2();
+  return static_cast<double>(heap.uordblks + heap.hblkhd) / 1e6;
+}
+
+/// The whole graph solved from the present estimate, and how far the views of the last poses were from it.
 double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flight &flight)
 {
   bole::Smoother again(replay.smoother.graph(), replay.smoother.options());
@@ -37,7 +46,8 @@ double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flig
     return bole::relativeTrunk(smoother.pose(pose), smoother.options().bMc, smoother.trunk(trunk));
   };
   double worst = 0, squares = 0, count = 0; // of the views, in their standard deviations
-  for (std::size_t i = 0; i < static_cast<std::size_t>(replay.next); i += 5)
+  for (std::size_t i = static_cast<std::size_t>(std::max(0, replay.next - 40));
+       i < static_cast<std::size_t>(replay.next); ++i)
     for (const auto &[j, summary] : flight.views[i]) {
       const int trunk = replay.trunk_id[j];
       const bole::Vector4d apart = relative(replay.smoother, i, trunk).minus(relative(again, i, trunk));
@@ -46,10 +56,13 @@ double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flig
       squares += sigmas * sigmas;
       ++count;
     }
-  const double cost = replay.smoother.cost(), optimum = again.cost();
-  fmt::print("{:6d} poses: full re-solve {:.1f} ms; cost of the updates {:.2f}, optimum {:.2f} "
-             "(relative {:+.1e}); views off by {:.3f} (rms), {:.2f} (worst) standard deviations\n",
-             replay.next, ms, cost, optimum, cost / optimum - 1, std::sqrt(squares / count), worst);
+  const std::size_t last = replay.smoother.poseCount() - 1;
+  const bole::Vector6d off = replay.smoother.pose(last).minus(again.pose(last));
+  fmt::print(
+      "{:6d} poses: full re-solve {:.1f} ms, cost {:.9g}; views of the last 40 off by {:.3f} (rms), {:.2f} (worst) "
+      "standard deviations, the newest pose by {:.3f}\n",
+      replay.next, ms, again.cost(), std::sqrt(squares / count), worst,
+      std::sqrt(off.dot(again.currentPoseCovariance().llt().solve(off)) / 6));
   return ms;
 }
 } // namespace
@@ -60,22 +73,24 @@ int main(int argc, char **argv)
   o.poses = argc > 1 ? std::atoi(argv[1]) : 20000;
   o.lap = argc > 3 ? std::atoi(argv[3]) : 0;
   const bole::test::Flight flight = bole::test::simulateFlight(o);
-  bole::test::Replay replay(flight, bole::test::smootherFor(o));
+  bole::SmootherOptions options = bole::test::smootherFor(o);
+  options.forgets = argc > 4;
+  bole::test::Replay replay(flight, options);
+  const double before = heapMegabytes();
   std::vector<double> ms;
   std::vector<std::pair<double, double>> naive, flat, tail;
-  std::size_t relinearised = 0, eliminated = 0, resolved = 0, limit = 0, views = 0;
+  std::size_t limit = 0, views = 0;
   for (int i = 0; i < o.poses; ++i) {
     const double start = threadMs();
     const bole::UpdateResult result = replay.step();
     ms.push_back(threadMs() - start);
-    relinearised += result.relinearised;
-    eliminated += result.eliminated;
-    resolved += result.resolved;
     limit += result.status != bole::UpdateStatus::ok;
     views += flight.views[i].size();
     const int n = i + 1;
-    if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000 || n == 8000 || n == 16000 ||
-        n == o.poses)
+    if (options.forgets) // there is no whole to compare with
+      ;
+    else if (n == 125 || n == 250 || n == 500 || n == 1000 || n == 2000 || n == 4000 || n == 8000 || n == 16000 ||
+             n == o.poses)
       naive.emplace_back(n, compareWithBatch(replay, flight));
     if ((i + 1) % std::max(1, o.poses / 20) == 0) {
       const std::size_t window = std::min<std::size_t>(500, ms.size());
@@ -83,16 +98,13 @@ int main(int argc, char **argv)
       flat.emplace_back(i + 1, quantile(last, 0.5));
       tail.emplace_back(i + 1, quantile(last, 0.99));
       fmt::print("{:6d} poses: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms, {:.1f} MB\n", i + 1, quantile(last, 0.5),
-                 quantile(last, 0.99), quantile(last, 1), static_cast<double>(replay.smoother.memoryBytes()) / 1e6);
+                 quantile(last, 0.99), quantile(last, 1), heapMegabytes() - before);
       std::fflush(stdout);
     }
   }
   const double n = o.poses;
-  fmt::print("{} poses, {} trunks, {:.1f} views a pose; a frame: {:.2f} relinearised, {:.1f} "
-             "eliminated, {:.1f} solved; "
-             "{} frames unsettled\n",
-             o.poses, flight.trunks.size(), static_cast<double>(views) / n, static_cast<double>(relinearised) / n,
-             static_cast<double>(eliminated) / n, static_cast<double>(resolved) / n, limit);
+  fmt::print("{} poses, {} trunks, {:.1f} views a pose; {} frames unsettled\n", o.poses, flight.trunks.size(),
+             static_cast<double>(views) / n, limit);
   fmt::print("all frames: median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n", quantile(ms, 0.5), quantile(ms, 0.99),
              quantile(ms, 1));
   const auto windowMedian = [&](int from, int to) { return quantile({ms.begin() + from, ms.begin() + to}, 0.5); };
@@ -103,7 +115,7 @@ int main(int argc, char **argv)
                windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600), quantile(ms, 0.99) / quantile(ms, 0.5));
   if (argc > 2 && *argv[2] != '\0') {
     bole::test::LineChart chart;
-    chart.title = "Adding one frame: incremental update and full re-solve";
+    chart.title = "Adding one frame: update of the window and full re-solve";
     chart.x_name = "poses in the graph";
     chart.y_name = "ms of one thread";
     chart.log_x = chart.log_y = true;

@@ -43,7 +43,8 @@ TEST(StageOptions, OfTheDefaultsAreTheStagesDefaultsForACameraOf200Px)
   EXPECT_EQ(made.tracking.scan_max_px, defaults.tracking.scan_max_px);
   EXPECT_EQ(made.flow.view_spacing, defaults.flow.view_spacing);
   EXPECT_EQ(made.points.frames_back, defaults.points.frames_back);
-  EXPECT_EQ(made.smoothing.fixed_lag, 0);
+  EXPECT_FALSE(made.smoothing.forgets);
+  EXPECT_EQ(made.smoothing.window, 40);
   EXPECT_NEAR(made.map.confirm_odds, defaults.map.confirm_odds, 1e-3);
   EXPECT_EQ(valuesOf(made.saliency), valuesOf(defaults.saliency));
 }
@@ -86,7 +87,8 @@ TEST(StageOptions, WhatIsCountedInFramesFollowsTheRate)
   const StageOptions fast = stageOptions(options, cameraWith(200));
   EXPECT_THAT(fast.points.frames_back, testing::ElementsAre(3, 9));
   EXPECT_EQ(fast.points.every, 3);
-  EXPECT_EQ(fast.smoothing.fixed_lag, 900);
+  EXPECT_EQ(fast.smoothing.window, 900);
+  EXPECT_TRUE(fast.smoothing.forgets);
   EXPECT_EQ(fast.saliency.max_frames_apart, 15);
   options.camera.rate = 15;
   EXPECT_THAT(stageOptions(options, cameraWith(200)).points.frames_back, testing::ElementsAre(1, 4));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Removing, merging, outliers and the lag.
+// Removing, merging, outliers and what leaves the window.
 #include "support/dense_reference.h"
 #include "support/flight.h"
 
@@ -117,43 +117,45 @@ TEST(Changes, WronglyAssociatedViewsDoNotBendTheMap)
   EXPECT_LT(error(robust), 0.5 * error(plain));
 }
 
-TEST(Changes, TheLagClosesOldPosesAndStaysNearTheFullSmoother)
+SmootherOptions forgetting(const FlightOptions &o, int window)
+{
+  SmootherOptions options = smootherFor(o);
+  options.window = window;
+  options.forgets = true;
+  return options;
+}
+
+TEST(Changes, AWindowThatForgetsStaysNearTheWhole)
 {
   FlightOptions o;
   o.poses = 200;
   const Flight flight = simulateFlight(o);
-  SmootherOptions lagged = smootherFor(o);
-  lagged.fixed_lag = 60;
-  Replay full(flight, smootherFor(o)), window(flight, lagged);
+  Replay full(flight, smootherFor(o)), window(flight, forgetting(o, 40));
   full.run();
+  full.smoother.optimize();
   window.run();
 
-  const Graph open = window.smoother.graph();
-  EXPECT_LE(open.poses.size(), 62u);
+  EXPECT_EQ(window.smoother.graph().poses.size(), 40u);
   const Vector6d apart = window.smoother.pose(199).minus(full.smoother.pose(199));
   const Matrix6d C = full.smoother.currentPoseCovariance();
   for (int i = 0; i < 6; ++i)
     EXPECT_LT(std::abs(apart(i)), std::sqrt(C(i, i))) << i;
-  for (const std::size_t pose : {40u, 90u, 130u}) { // closed when 60 frames had come after them
-    const double closed = window.smoother.poseCovariance(pose).topLeftCorner<2, 2>().trace(),
-                 open_still = full.smoother.poseCovariance(pose).topLeftCorner<2, 2>().trace();
-    EXPECT_NEAR(std::sqrt(closed / open_still), 1, 0.35) << pose;
-  }
-  EXPECT_NEAR(std::sqrt(window.smoother.currentPoseCovariance()(0, 0) / C(0, 0)), 1, 0.1);
+  const Eigen::ArrayXd sigma = window.smoother.currentPoseCovariance().diagonal().array().sqrt();
+  EXPECT_LT((sigma / C.diagonal().array().sqrt() - 1).abs().maxCoeff(), 0.1);
 }
 
-/// What a pull at the last pose costs in the end is what the graph resists, with all poses open and with the closed
-/// ones as a quadratic.
-TEST(Changes, WhatTheLagClosedResistsAsItDidBefore)
+/// What a pull at the last pose costs in the end is what the graph resists, with all poses at hand and with those
+/// that were forgotten as a quadratic.
+TEST(Changes, WhatLeftTheWindowResistsAsItDidBefore)
 {
   constexpr double kPull = 0.05, kSure = 0.02; // [m]
   FlightOptions o;
   o.poses = 90;
   const Flight flight = simulateFlight(o);
   std::vector<double> cost, moved;
-  for (const int lag : {0, 40}) {
-    SmootherOptions options = smootherFor(o);
-    options.fixed_lag = lag;
+  for (const bool forgets : {false, true}) {
+    SmootherOptions options = forgetting(o, 40);
+    options.forgets = forgets;
     Replay replay(flight, options);
     replay.run();
     replay.smoother.optimize(1e-12);
@@ -164,55 +166,22 @@ TEST(Changes, WhatTheLagClosedResistsAsItDidBefore)
     pull.covariance = kSure * kSure * Matrix6d::Identity();
     replay.smoother.addPosePrior(89, pull);
     const UpdateResult pulled = replay.smoother.optimize(1e-12);
-    EXPECT_EQ(pulled.status, UpdateStatus::ok) << lag;
-    EXPECT_NEAR(pulled.cost, replay.smoother.cost(), 1e-6 * pulled.cost) << lag;
+    EXPECT_EQ(pulled.status, UpdateStatus::ok) << forgets;
+    EXPECT_NEAR(pulled.cost, replay.smoother.cost(), 1e-6 * std::abs(pulled.cost)) << forgets;
     cost.push_back(replay.smoother.cost() - before);
     moved.push_back(replay.smoother.pose(89).minus(at)(1));
   }
   EXPECT_GT(cost[0], 0.1);
-  EXPECT_NEAR(cost[1], cost[0], 0.05 * cost[0]);
+  EXPECT_NEAR(cost[1], cost[0], 0.15 * cost[0]); // radii were less known where they were linearised
   EXPECT_NEAR(moved[1], moved[0], 0.1 * moved[0]);
 }
 
-TEST(Changes, ALongLagClosesPosesAlsoWhereOldTrunksReturn)
-{
-  FlightOptions o;
-  o.poses = 600;
-  o.lap = 120;
-  const Flight flight = simulateFlight(o);
-  SmootherOptions lagged = smootherFor(o);
-  lagged.fixed_lag = 200;
-  Replay window(flight, lagged);
-  window.run();
-  EXPECT_LE(window.smoother.graph().poses.size(), 202u);
-}
-
-TEST(Changes, WorkAFrameDoesNotGrowWithRoundsPastTheSameTrunks)
-{
-  FlightOptions o;
-  o.lap = 120;
-  o.poses = 20 * o.lap;
-  const Flight flight = simulateFlight(o);
-  Replay replay(flight, smootherFor(o));
-  std::vector<double> eliminated(20, 0.0); // a round
-  for (int i = 0; i < o.poses; ++i)
-    eliminated[static_cast<std::size_t>(i / o.lap)] += static_cast<double>(replay.step().eliminated);
-  const double early = eliminated[3] + eliminated[4] + eliminated[5];
-  const double late = eliminated[17] + eliminated[18] + eliminated[19];
-  EXPECT_LT(late, 2 * early);
-  Smoother batch(replay.smoother.graph(), replay.smoother.options());
-  batch.optimize();
-  EXPECT_LT(replay.smoother.cost(), 1.03 * batch.cost());
-}
-
-TEST(Changes, AFactorWithAMarginalisedEndIsNotAdded)
+TEST(Changes, AFactorWithAForgottenEndIsNotAdded)
 {
   FlightOptions o;
   o.poses = 100;
   const Flight flight = simulateFlight(o);
-  SmootherOptions lagged = smootherFor(o);
-  lagged.fixed_lag = 20;
-  Replay window(flight, lagged);
+  Replay window(flight, forgetting(o, 20));
   window.run();
   const Graph before = window.smoother.graph();
 
@@ -223,14 +192,14 @@ TEST(Changes, AFactorWithAMarginalisedEndIsNotAdded)
   EXPECT_EQ(window.smoother.graph().odometry.size(), before.odometry.size());
 }
 
-TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
+TEST(Changes, ATrunkThatWasForgottenStandsWhereItWasWhenItIsSeenAgain)
 {
   FlightOptions o;
   o.poses = 260;
   const Flight flight = simulateFlight(o);
-  SmootherOptions lagged = smootherFor(o);
-  lagged.fixed_lag = 20;
-  Replay window(flight, lagged);
+  SmootherOptions options = forgetting(o, 20);
+  options.remembered = 0;
+  Replay window(flight, options);
   window.run();
   const Trunk before = window.smoother.trunk(0);
   SummaryFactor view;
@@ -241,7 +210,72 @@ TEST(Changes, ATrunkClosedByTheLagOpensAgainOnItsLastCovariance)
   window.smoother.update();
 
   EXPECT_LT(window.smoother.trunk(0).minus(before).norm(), 0.05);
+  EXPECT_GT(std::sqrt(window.smoother.trunkCovariance(0).topLeftCorner<2, 2>().trace()), 0.3)
+      << "one view tells no range";
 }
+
+/// Two halves of a trunk that both left a window that forgets: each says of the one trunk what it said before.
+TEST(Changes, TrunksThatLeftTheWindowAreMergedInItsPrior)
+{
+  FlightOptions o;
+  o.lap = 120;
+  o.poses = 2 * o.lap;
+  const Flight flight = simulateFlight(o);
+  Replay whole(flight, forgetting(o, 30)), halves(flight, forgetting(o, 30));
+  whole.run();
+  std::vector<int> first;
+  for (int i = 0; i < o.poses; ++i) {
+    if (i == o.lap) { // from here on every trunk counts as new
+      first = halves.trunk_id;
+      halves.trunk_id.assign(flight.trunks.size(), -1);
+    }
+    halves.step();
+  }
+  const auto apart = [&] {
+    return halves.smoother.pose(o.poses - 1).minus(whole.smoother.pose(o.poses - 1)).head<2>().norm();
+  };
+  const double before = apart();
+
+  for (std::size_t j = 0; j < first.size(); ++j)
+    if (first[j] >= 0 && halves.trunk_id[j] >= 0)
+      halves.smoother.mergeTrunks(first[j], halves.trunk_id[j]);
+  halves.smoother.update();
+
+  const double sigma = std::sqrt(whole.smoother.currentPoseCovariance().topLeftCorner<2, 2>().trace());
+  EXPECT_LT(apart(), 0.5 * sigma);
+  EXPECT_LT(apart(), before);
+  const double merged = std::sqrt(halves.smoother.currentPoseCovariance().topLeftCorner<2, 2>().trace());
+  EXPECT_NEAR(merged / sigma, 1, 0.15);
+}
+
+TEST(Changes, AHypothesisThatIsGivenUpAfterItsViewsLeftTheWindowIsAsIfItHadNeverBeen)
+{
+  FlightOptions o;
+  o.poses = 120;
+  const Flight flight = simulateFlight(o);
+  Replay with(flight, forgetting(o, 30)), without(flight, forgetting(o, 30));
+  std::size_t wrong = 0;
+  for (int i = 0; i < o.poses; ++i) {
+    without.step();
+    with.add();
+    SummaryFactor view = flight.views[static_cast<std::size_t>(i)].front().second;
+    view.optimum = view.optimum.plus(Vector4d(0, 0, 0.1, 0.3));
+    if (i == 20) {
+      wrong = with.smoother.addTrunk(
+          trunkFromRelative(with.smoother.pose(20) * with.smoother.options().bMc, view.optimum, 0.15));
+      with.smoother.keepTrunk(wrong, false);
+    }
+    if (i >= 20 && i < 60)
+      with.smoother.addObservation(static_cast<std::size_t>(i), wrong, view);
+    if (i == 80)
+      with.smoother.removeTrunk(wrong);
+    with.smoother.update();
+  }
+  const Vector6d apart = with.smoother.pose(119).minus(without.smoother.pose(119));
+  EXPECT_LT((apart.array() / without.smoother.currentPoseCovariance().diagonal().array().sqrt()).abs().maxCoeff(), 0.5);
+  EXPECT_TRUE(with.smoother.currentPoseCovariance().isApprox(without.smoother.currentPoseCovariance(), 0.05));
+}
+
 TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
 {
   FlightOptions o;
@@ -271,109 +305,63 @@ TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
   }
 }
 
-/// Bytes by which a smoother grows from the 100th to the 200th frame, with trunks that are given up a frame later.
-double growth(int candidates, int fixed_lag)
-{
-  FlightOptions o;
-  o.poses = 200;
-  const Flight flight = simulateFlight(o);
-  SmootherOptions options = smootherFor(o);
-  options.fixed_lag = fixed_lag;
-  Replay replay(flight, options);
-  std::size_t at_half = 0;
-  std::vector<std::size_t> given_up;
-  for (int i = 0; i < o.poses; ++i) {
-    if (i == 100)
-      at_half = replay.smoother.memoryBytes();
-    replay.add();
-    for (const std::size_t trunk : given_up)
-      replay.smoother.removeTrunk(trunk);
-    given_up.clear();
-    for (int k = 0; k < candidates && i > 20; ++k) {
-      const SummaryFactor &summary = flight.views[i].front().second;
-      const Pose wMc = replay.smoother.pose(i) * options.bMc;
-      given_up.push_back(replay.smoother.addTrunk(trunkFromRelative(wMc, summary.optimum, 0.15)));
-      for (int back = 0; back < 10; ++back)
-        replay.smoother.addObservation(i - back, given_up.back(), summary);
-    }
-    replay.smoother.update();
-  }
-  return static_cast<double>(replay.smoother.memoryBytes()) - static_cast<double>(at_half);
-}
-
-TEST(Changes, TrunksThatAreGivenUpGiveTheirMemoryBack) { EXPECT_LT(growth(3, 0), 1.5 * growth(0, 0)); }
-
-TEST(Changes, AnOptimisationKeepsNoMoreThanTheUpdates)
-{
-  FlightOptions o;
-  o.poses = 300;
-  const Flight flight = simulateFlight(o);
-  Replay replay(flight, smootherFor(o));
-  replay.run();
-  const std::size_t online = replay.smoother.memoryBytes();
-  replay.smoother.optimize();
-  EXPECT_LT(replay.smoother.memoryBytes(), 1.1 * online);
-}
-
-/// Of the last pose of eight rounds past the same trunks, of which the lag spans half a round.
+/// Of the last pose of eight rounds past the same trunks, of which the window spans a quarter of a round.
 struct Return
 {
   Vector6d apart; ///< from all that is open, in its standard deviations
   Vector6d sigma; ///< over that of all that is open
 };
 
-Return afterRounds(bool is_kept)
+Return afterRounds(int remembered)
 {
   FlightOptions o;
   o.lap = 120;
   o.poses = 8 * o.lap;
   const Flight flight = simulateFlight(o);
-  SmootherOptions lagged = smootherFor(o);
-  lagged.fixed_lag = o.lap / 2;
-  Replay full(flight, smootherFor(o)), window(flight, lagged);
+  SmootherOptions options = forgetting(o, o.lap / 4);
+  options.remembered = remembered;
+  Replay full(flight, smootherFor(o)), window(flight, options);
   full.run();
-  for (int i = 0; i < o.poses; ++i) {
-    window.step();
-    if (is_kept)
-      for (const auto &[j, summary] : flight.views[static_cast<std::size_t>(i)])
-        window.smoother.keepTrunk(window.trunk_id[j], true);
-  }
+  full.smoother.optimize();
+  window.run();
   const std::size_t last = static_cast<std::size_t>(o.poses) - 1;
   const Eigen::ArrayXd exact = full.smoother.currentPoseCovariance().diagonal().array().sqrt();
   const Eigen::ArrayXd sigma = window.smoother.currentPoseCovariance().diagonal().array().sqrt();
   return {window.smoother.pose(last).minus(full.smoother.pose(last)).array() / exact, sigma / exact};
 }
 
-TEST(Changes, KeptTrunksTieTheRoundsTogetherThatTheLagHasClosed)
+TEST(Changes, RememberedTrunksTieTheRoundsTogetherThatTheWindowHasLeft)
 {
-  const Return with = afterRounds(true), without = afterRounds(false);
+  const Return with = afterRounds(24), without = afterRounds(0);
   EXPECT_LT(with.apart.cwiseAbs().maxCoeff(), 1);
   EXPECT_LT((with.sigma - Vector6d::Ones()).cwiseAbs().maxCoeff(), 0.1);
-  EXPECT_GT((without.sigma - Vector6d::Ones()).cwiseAbs().maxCoeff(), 0.2); // a closed trunk counts twice what it knows
+  EXPECT_GT((without.sigma - Vector6d::Ones()).maxCoeff(), 0.2); // what is not tied drifts, and says so
 }
 
-/// Bytes a frame that twelve rounds under a lag keep after the fourth, with trunks that are given up a frame later.
-double keptAFrame(bool is_kept)
+/// Bytes of the heap a frame that twelve rounds keep after the fourth, with trunks that are given up a frame later.
+double keptAFrame(int remembered)
 {
   FlightOptions o;
   o.lap = 100;
   o.poses = 12 * o.lap;
   const Flight flight = simulateFlight(o);
-  SmootherOptions options = smootherFor(o);
-  options.fixed_lag = 40;
+  SmootherOptions options = forgetting(o, 40);
+  options.remembered = remembered;
   Replay replay(flight, options);
+  const auto held = [] {
+    const auto heap = mallinfo2();
+    return static_cast<double>(heap.uordblks + heap.hblkhd);
+  };
   double before = 0;
   std::vector<std::size_t> given_up;
   for (int i = 0; i < o.poses; ++i) {
     if (i == 4 * o.lap)
-      before = static_cast<double>(replay.smoother.memoryBytes());
+      before = held();
     replay.add();
     for (const std::size_t trunk : given_up)
       replay.smoother.removeTrunk(trunk);
     given_up.clear();
     const auto &views = flight.views[static_cast<std::size_t>(i)];
-    for (const auto &[j, summary] : views)
-      replay.smoother.keepTrunk(replay.trunk_id[j], is_kept);
     for (int k = 0; k < 2 && i > 0 && !views.empty(); ++k) {
       const SummaryFactor &summary = views.front().second;
       const Pose wMc = replay.smoother.pose(static_cast<std::size_t>(i)) * options.bMc;
@@ -382,59 +370,17 @@ double keptAFrame(bool is_kept)
     }
     replay.smoother.update();
   }
-  return (static_cast<double>(replay.smoother.memoryBytes()) - before) / (8 * o.lap);
+  return (held() - before) / (8 * o.lap);
 }
 
-TEST(Changes, ALongFlightUnderALagKeepsAPoseAFrameAndNothingElse)
-{
-  constexpr double kPose = 160; // bytes: the pose, and its part of the covariances
-  EXPECT_LT(keptAFrame(true), kPose);
-  EXPECT_LT(keptAFrame(false), kPose);
-}
-
-/// By what the heap grows by while a flight is solved.
-TEST(Changes, TheBytesToldAreThoseThatAreHeld)
+TEST(Changes, AWindowThatForgetsKeepsAPoseAFrameAndNothingElse)
 {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizer's heap is not the one that mallinfo2() tells of";
 #endif
-  FlightOptions o;
-  o.poses = 400;
-  const Flight flight = simulateFlight(o);
-  const auto held = [] {
-    const auto heap = mallinfo2();
-    return static_cast<double>(heap.uordblks + heap.hblkhd);
-  };
-  const double before = held();
-  Replay replay(flight, smootherFor(o));
-  replay.run();
-  const double grown = held() - before;
-  EXPECT_NEAR(static_cast<double>(replay.smoother.memoryBytes()) / grown, 1, 0.15);
+  constexpr double kMost = 300; // bytes: a pose, in a list that grows by doubling
+  EXPECT_LT(keptAFrame(24), kMost);
+  EXPECT_LT(keptAFrame(0), kMost);
 }
-
-/// Neither the views of a trunk nor the poses that they were taken from are solved again for a view that says nothing
-/// new: the change is too small to run down the tree.
-TEST(Changes, AViewAsExpectedIsTakenInWithoutSolvingTheFlightAgain)
-{
-  FlightOptions o;
-  o.poses = 100;
-  const Flight flight = simulateFlight(o);
-  Replay replay(flight, smootherFor(o));
-  replay.run();
-  Smoother &smoother = replay.smoother;
-  smoother.optimize();
-  const std::size_t trunk = static_cast<std::size_t>(replay.trunk_id[flight.views.back().front().first]);
-  SummaryFactor view = flight.views.back().front().second;
-  view.optimum = smoother.predictedRelative(trunk);
-  smoother.addObservation(smoother.poseCount() - 1, trunk, view);
-
-  const UpdateResult result = smoother.update();
-
-  EXPECT_EQ(result.status, UpdateStatus::ok);
-  EXPECT_EQ(result.relinearised, 0u);
-  EXPECT_EQ(result.resolved, result.eliminated);
-}
-
-TEST(Changes, TheLagGivesMemoryBack) { EXPECT_LT(growth(0, 40), 0.2 * growth(0, 0)); }
 } // namespace
 } // namespace bole

@@ -335,7 +335,7 @@ Options ServoTrialOptions::defaultPipeline()
 {
   Options pipeline;
   pipeline.stages.servoing = true;
-  pipeline.map.lag = 15;
+  pipeline.map.lag = 5;
   return pipeline;
 }
 

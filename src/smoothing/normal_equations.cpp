@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "smoothing/normal_equations.h"
+
+#include "smoothing/front_loops.h"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+
+#include <algorithm>
+#include <numeric>
+
+namespace bole
+{
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+NormalEquations::NormalEquations(const std::vector<int> &dims)
+    : m_dims(dims), m_offset(dims.size()), m_columns(dims.size()), m_node_of(dims.size()), m_row(dims.size())
+{
+  int at = 0;
+  for (std::size_t v = 0; v < dims.size(); ++v) {
+    m_offset[v] = at;
+    at += dims[v];
+    find(static_cast<int>(v), static_cast<int>(v));
+  }
+  m_g.setZero(at);
+}
+
+void NormalEquations::clear()
+{
+  std::fill(m_values.begin(), m_values.end(), 0.0);
+  m_g.setZero();
+}
+
+/// Where the numbers of a block begin; a new one is zero.
+std::size_t NormalEquations::find(int row, int column)
+{
+  std::vector<Block> &blocks = m_columns[column];
+  for (const Block &block : blocks)
+    if (block.row == row)
+      return block.at;
+  blocks.push_back({row, m_values.size()});
+  m_values.resize(m_values.size() + static_cast<std::size_t>(m_dims[row] * m_dims[column]), 0.0);
+  return blocks.back().at;
+}
+
+void NormalEquations::add(const std::vector<int> &variables, const MatrixXd &H, const VectorXd &g)
+{
+  int c = 0;
+  for (const int column : variables) {
+    int r = 0;
+    for (const int row : variables) {
+      if (row >= column) {
+        const std::size_t at = find(row, column); // may move the values
+        Eigen::Map<MatrixXd>(m_values.data() + at, m_dims[row], m_dims[column]) +=
+            H.block(r, c, m_dims[row], m_dims[column]);
+      }
+      r += m_dims[row];
+    }
+    m_g.segment(m_offset[column], m_dims[column]) += g.segment(c, m_dims[column]);
+    c += m_dims[column];
+  }
+}
+
+std::vector<int> NormalEquations::orderOfLittleFill() const
+{
+  const int n = static_cast<int>(m_dims.size());
+  std::vector<Eigen::Triplet<double>> pairs;
+  for (int column = 0; column < n; ++column)
+    for (const Block &block : m_columns[column]) {
+      pairs.emplace_back(block.row, column, 1.0);
+      if (block.row != column)
+        pairs.emplace_back(column, block.row, 1.0);
+    }
+  Eigen::SparseMatrix<double> pattern(n, n);
+  pattern.setFromTriplets(pairs.begin(), pairs.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic> place;
+  Eigen::AMDOrdering<int>()(pattern, place);
+  return {place.indices().data(), place.indices().data() + n};
+}
+
+/// The later neighbours of each place in the order, as places; \p children: how many.
+std::vector<std::vector<int>> NormalEquations::eliminationStructure(const std::vector<int> &order, int together,
+                                                                    std::vector<int> &children) const
+{
+  const int n = static_cast<int>(order.size());
+  std::vector<int> place(order.size());
+  for (int p = 0; p < n; ++p)
+    place[order[p]] = p;
+  std::vector<std::vector<int>> later(order.size()), below(order.size());
+  for (int column = 0; column < n; ++column)
+    for (const Block &block : m_columns[column])
+      if (block.row != column)
+        later[std::min(place[column], place[block.row])].push_back(std::max(place[column], place[block.row]));
+  children.assign(order.size(), 0);
+  std::vector<int> seen(order.size(), -1);
+  for (int p = 0; p < n; ++p) {
+    std::vector<int> all;
+    const auto take = [&](const std::vector<int> &list) {
+      for (const int q : list)
+        if (q > p && seen[q] != p) {
+          seen[q] = p;
+          all.push_back(q);
+        }
+    };
+    if (p >= n - together) {
+      all.resize(static_cast<std::size_t>(n - p - 1));
+      std::iota(all.begin(), all.end(), p + 1);
+    }
+    else {
+      take(later[p]);
+      for (const int child : below[p])
+        take(later[child]);
+      std::sort(all.begin(), all.end());
+    }
+    later[p] = std::move(all);
+    if (!later[p].empty()) {
+      below[later[p].front()].push_back(p);
+      ++children[later[p].front()];
+    }
+  }
+  return later;
+}
+
+void NormalEquations::plan(const std::vector<int> &order, int together)
+{
+  const int n = static_cast<int>(order.size());
+  std::vector<int> children, place(order.size()), node_at(order.size());
+  const std::vector<std::vector<int>> later = eliminationStructure(order, together, children);
+  m_nodes.clear();
+  for (int p = 0; p < n; ++p) {
+    place[order[p]] = p;
+    const int before = p == 0 ? -1 : node_at[p - 1];
+    const bool is_in_last = p > n - together;
+    const bool is_only_child = p > 0 && children[p] == 1 && !later[p - 1].empty() && later[p - 1].front() == p &&
+                               later[p - 1].size() == later[p].size() + 1;
+    if (is_in_last || (is_only_child && p != n - together)) {
+      m_nodes[before].variables.push_back(p);
+      node_at[p] = before;
+    }
+    else {
+      node_at[p] = static_cast<int>(m_nodes.size());
+      m_nodes.emplace_back();
+      m_nodes.back().variables.push_back(p);
+    }
+  }
+  for (std::size_t k = 0; k < m_nodes.size(); ++k) {
+    Node &node = m_nodes[k];
+    node.eliminated = node.variables.size();
+    const std::vector<int> &neighbours = later[node.variables.back()];
+    if (!neighbours.empty()) {
+      node.parent = node_at[neighbours.front()];
+      m_nodes[node.parent].children.push_back(static_cast<int>(k));
+    }
+    node.variables.insert(node.variables.end(), neighbours.begin(), neighbours.end());
+    for (std::size_t i = 0; i < node.variables.size(); ++i) {
+      node.variables[i] = order[node.variables[i]];
+      node.rows += m_dims[node.variables[i]];
+      if (i < node.eliminated) {
+        node.columns += m_dims[node.variables[i]];
+        m_node_of[node.variables[i]] = static_cast<int>(k);
+      }
+    }
+  }
+  for (int column = 0; column < n; ++column)
+    for (const Block &block : m_columns[column]) {
+      const bool is_transposed = place[block.row] < place[column];
+      const int first = is_transposed ? block.row : column, second = is_transposed ? column : block.row;
+      m_nodes[m_node_of[first]].own.push_back({first, second, block.at, is_transposed});
+    }
+}
+
+/// Notes where each variable stands in the front.
+int NormalEquations::rowsOf(const Node &node)
+{
+  int rows = 0;
+  for (const int v : node.variables) {
+    m_row[v] = rows;
+    rows += m_dims[v];
+  }
+  return rows;
+}
+
+/// The children's variables stand in the same order, so lower triangles stay lower ones.
+void NormalEquations::assembleChild(Node &child, int ld)
+{
+  m_map.clear();
+  for (std::size_t i = child.eliminated; i < child.variables.size(); ++i)
+    for (int k = 0; k < m_dims[child.variables[i]]; ++k)
+      m_map.push_back(m_row[child.variables[i]] + k);
+  const int m = static_cast<int>(m_map.size());
+  m_map.push_back(ld - 1); // the right-hand side
+  const double *from = child.contribution.data();
+  for (int c = 0; c < m; ++c) {
+    double *column = m_front.data() + static_cast<std::ptrdiff_t>(m_map[c]) * ld;
+    for (int r = c; r <= m; ++r)
+      column[m_map[r]] += *from++;
+  }
+  std::vector<double>().swap(child.contribution);
+}
+
+void NormalEquations::assemble(const Node &node, double damping)
+{
+  const int ld = rowsOf(node) + 1;
+  const std::size_t size = static_cast<std::size_t>(ld) * static_cast<std::size_t>(node.rows);
+  m_front.resize(std::max(m_front.size(), size));
+  std::fill(m_front.begin(), m_front.begin() + static_cast<std::ptrdiff_t>(size), 0.0);
+  Eigen::Map<MatrixXd> F(m_front.data(), ld, node.rows);
+  for (const Own &own : node.own) {
+    const int rows = m_dims[own.other], columns = m_dims[own.variable];
+    const double *from = m_values.data() + own.at;
+    auto to = F.block(m_row[own.other], m_row[own.variable], rows, columns);
+    if (own.is_transposed)
+      to += Eigen::Map<const MatrixXd>(from, columns, rows).transpose();
+    else
+      to += Eigen::Map<const MatrixXd>(from, rows, columns);
+    if (own.variable == own.other) {
+      to.diagonal() *= 1 + damping;
+      F.row(ld - 1).segment(m_row[own.variable], columns) = m_g.segment(m_offset[own.variable], columns).transpose();
+    }
+  }
+  for (const int child : node.children)
+    assembleChild(m_nodes[child], ld);
+}
+
+int NormalEquations::factorise(double damping)
+{
+  int held = 0;
+  for (Node &node : m_nodes) {
+    assemble(node, damping);
+    const int ld = node.rows + 1;
+    held += factorFront(m_front.data(), ld, node.columns);
+    node.panel.assign(m_front.begin(), m_front.begin() + static_cast<std::ptrdiff_t>(ld) * node.columns);
+    const int m = node.rows - node.columns;
+    node.contribution.resize(static_cast<std::size_t>(m) * static_cast<std::size_t>(m + 3) / 2);
+    double *to = node.contribution.data();
+    for (int c = node.columns; c < node.rows; ++c) {
+      const double *column = m_front.data() + static_cast<std::ptrdiff_t>(c) * ld;
+      to = std::copy(column + c, column + ld, to);
+    }
+  }
+  return held;
+}
+
+void NormalEquations::schur(MatrixXd &H, VectorXd &g)
+{
+  Node root = std::move(m_nodes.back());
+  m_nodes.pop_back();
+  factorise();
+  assemble(root, 0);
+  const Eigen::Map<const MatrixXd> F(m_front.data(), root.rows + 1, root.rows);
+  H = F.topRows(root.rows).selfadjointView<Eigen::Lower>();
+  g = F.bottomRows<1>().transpose();
+  m_nodes.push_back(std::move(root));
+}
+
+double NormalEquations::decrease() const
+{
+  double sum = 0;
+  for (const Node &node : m_nodes)
+    sum += 0.5 * panelOf(node).bottomRows<1>().squaredNorm();
+  return sum;
+}
+
+VectorXd NormalEquations::solve() const
+{
+  VectorXd x = VectorXd::Zero(m_g.size()), later;
+  for (auto node = m_nodes.rbegin(); node != m_nodes.rend(); ++node) {
+    const int c = node->columns, m = node->rows - c;
+    later.resize(m);
+    int row = 0;
+    for (std::size_t i = node->eliminated; i < node->variables.size(); ++i) {
+      const int v = node->variables[i];
+      later.segment(row, m_dims[v]) = x.segment(m_offset[v], m_dims[v]);
+      row += m_dims[v];
+    }
+    const Panel L = panelOf(*node);
+    VectorXd own = L.bottomRows<1>().transpose();
+    own.noalias() -= L.middleRows(c, m).transpose() * later;
+    L.topRows(c).triangularView<Eigen::Lower>().transpose().solveInPlace(own);
+    row = 0;
+    for (std::size_t i = 0; i < node->eliminated; ++i) {
+      const int v = node->variables[i];
+      x.segment(m_offset[v], m_dims[v]) = own.segment(row, m_dims[v]);
+      row += m_dims[v];
+    }
+  }
+  return x;
+}
+
+/// Takahashi's recursion: with Z = L_sv L_vv^-1 and the covariance S of the neighbours, which stands in that of the
+/// node above, the cross covariance is -S Z and the node's own (L_vv L_vv^T)^-1 + Z^T S Z.
+void NormalEquations::sparseInverse(const std::function<void(const std::vector<int> &, const MatrixXd &)> &use) const
+{
+  std::vector<MatrixXd> inverse(m_nodes.size());
+  std::vector<std::size_t> pending(m_nodes.size());
+  std::vector<int> row(m_dims.size()), map;
+  for (std::size_t k = m_nodes.size(); k-- > 0;) {
+    const Node &node = m_nodes[k];
+    const int c = node.columns, m = node.rows - c;
+    MatrixXd &C = inverse[k];
+    C.resize(node.rows, node.rows);
+    if (node.parent >= 0) {
+      int at = 0;
+      for (const int v : m_nodes[node.parent].variables) {
+        row[v] = at;
+        at += m_dims[v];
+      }
+      map.clear();
+      for (std::size_t i = node.eliminated; i < node.variables.size(); ++i)
+        for (int d = 0; d < m_dims[node.variables[i]]; ++d)
+          map.push_back(row[node.variables[i]] + d);
+      const MatrixXd &above = inverse[node.parent];
+      for (int j = 0; j < m; ++j)
+        for (int i = 0; i < m; ++i)
+          C(c + i, c + j) = above(map[i], map[j]);
+      if (--pending[node.parent] == 0)
+        inverse[node.parent].resize(0, 0);
+    }
+    const Panel L = panelOf(node);
+    MatrixXd own = MatrixXd::Identity(c, c);
+    L.topRows(c).triangularView<Eigen::Lower>().solveInPlace(own);
+    const MatrixXd Z = L.middleRows(c, m) * own;
+    C.bottomLeftCorner(m, c).noalias() = -C.bottomRightCorner(m, m) * Z;
+    C.topRightCorner(c, m) = C.bottomLeftCorner(m, c).transpose();
+    C.topLeftCorner(c, c).noalias() = own.transpose() * own;
+    C.topLeftCorner(c, c).noalias() -= Z.transpose() * C.bottomLeftCorner(m, c);
+    use(node.variables, C);
+    pending[k] = node.children.size();
+    if (node.children.empty())
+      C.resize(0, 0);
+  }
+}
+
+/// |L^-1 X^T|^2, which is zero outside the paths from the variables to the roots.
+MatrixXd NormalEquations::covariance(const std::vector<std::pair<int, MatrixXd>> &X) const
+{
+  const Eigen::Index count = X.front().second.rows();
+  MatrixXd b = MatrixXd::Zero(m_g.size(), count), form = MatrixXd::Zero(count, count), own;
+  std::vector<int> path;
+  for (const auto &[variable, columns] : X) {
+    b.middleRows(m_offset[variable], m_dims[variable]) += columns.transpose();
+    for (int k = m_node_of[variable]; k >= 0; k = m_nodes[k].parent)
+      path.push_back(k);
+  }
+  std::sort(path.begin(), path.end());
+  path.erase(std::unique(path.begin(), path.end()), path.end());
+  for (const int k : path) {
+    const Node &node = m_nodes[k];
+    const Panel L = panelOf(node);
+    own.resize(node.columns, count);
+    int row = 0;
+    for (std::size_t i = 0; i < node.variables.size(); ++i) {
+      const int v = node.variables[i], d = m_dims[v];
+      if (i < node.eliminated)
+        own.middleRows(row, d) = b.middleRows(m_offset[v], d);
+      else
+        b.middleRows(m_offset[v], d).noalias() -= L.middleRows(row, d) * own;
+      row += d;
+      if (i + 1 == node.eliminated) {
+        L.topRows(node.columns).triangularView<Eigen::Lower>().solveInPlace(own);
+        form.noalias() += own.transpose() * own;
+      }
+    }
+  }
+  return form;
+}
+} // namespace bole
