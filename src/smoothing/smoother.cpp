@@ -63,7 +63,7 @@ std::size_t Smoother::State::newTrunk(const Trunk &guess, const TrunkPrior &prio
 
 /// Notes a view. What was forgotten of a trunk but its place is a prior now: how far the path has drifted since is not
 /// known any more.
-void Smoother::State::openTrunkFor(std::size_t pose, std::size_t trunk)
+void Smoother::State::noteView(std::size_t pose, std::size_t trunk)
 {
   TrunkState &seen = trunks[trunk];
   if (seen.is_absorbed) {
@@ -230,7 +230,7 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, cons
   SquareRootSummary root;
   const SummaryStatus status = squareRoot(summary, root);
   if (status == SummaryStatus::ok || status == SummaryStatus::projected) {
-    m_state->openTrunkFor(pose, trunk);
+    m_state->noteView(pose, trunk);
     m_state->factorsOf(pose).views.push_back({trunk, root});
   }
   return status;

@@ -112,7 +112,7 @@ public:
   bool isHeld(std::size_t pose) const { return pose >= first_held; }
   std::size_t newPose(const Pose &wMb);
   std::size_t newTrunk(const Trunk &guess, const TrunkPrior &prior);
-  void see(std::size_t pose, std::size_t trunk);
+  void noteView(std::size_t pose, std::size_t trunk);
   void removeTrunk(std::size_t trunk);
   void mergeTrunks(std::size_t keep, std::size_t gone);
   void mergeInPrior(std::size_t keep, std::size_t gone);
