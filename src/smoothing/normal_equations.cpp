@@ -124,6 +124,7 @@ std::vector<std::vector<int>> NormalEquations::eliminationStructure(const std::v
 
 void NormalEquations::plan(const std::vector<int> &order, int together)
 {
+  constexpr std::size_t kChain = 5; // variables of a chain that are one node: some zeros cost less than a front each
   const int n = static_cast<int>(order.size());
   std::vector<int> children, place(order.size()), node_at(order.size());
   const std::vector<std::vector<int>> later = eliminationStructure(order, together, children);
@@ -132,9 +133,10 @@ void NormalEquations::plan(const std::vector<int> &order, int together)
     place[order[p]] = p;
     const int before = p == 0 ? -1 : node_at[p - 1];
     const bool is_in_last = p > n - together;
-    const bool is_only_child = p > 0 && children[p] == 1 && !later[p - 1].empty() && later[p - 1].front() == p &&
-                               later[p - 1].size() == later[p].size() + 1;
-    if (is_in_last || (is_only_child && p != n - together)) {
+    const bool is_only_child = p > 0 && children[p] == 1 && !later[p - 1].empty() && later[p - 1].front() == p;
+    const bool is_dense = is_only_child && later[p - 1].size() == later[p].size() + 1;
+    if (is_in_last ||
+        (p != n - together && (is_dense || (is_only_child && m_nodes[before].variables.size() < kChain)))) {
       m_nodes[before].variables.push_back(p);
       node_at[p] = before;
     }
@@ -205,18 +207,20 @@ void NormalEquations::assemble(const Node &node, double damping)
   const std::size_t size = static_cast<std::size_t>(ld) * static_cast<std::size_t>(node.rows);
   m_front.resize(std::max(m_front.size(), size));
   std::fill(m_front.begin(), m_front.begin() + static_cast<std::ptrdiff_t>(size), 0.0);
-  Eigen::Map<MatrixXd> F(m_front.data(), ld, node.rows);
   for (const Own &own : node.own) {
     const int rows = m_dims[own.other], columns = m_dims[own.variable];
     const double *from = m_values.data() + own.at;
-    auto to = F.block(m_row[own.other], m_row[own.variable], rows, columns);
-    if (own.is_transposed)
-      to += Eigen::Map<const MatrixXd>(from, columns, rows).transpose();
-    else
-      to += Eigen::Map<const MatrixXd>(from, rows, columns);
-    if (own.variable == own.other) {
-      to.diagonal() *= 1 + damping;
-      F.row(ld - 1).segment(m_row[own.variable], columns) = m_g.segment(m_offset[own.variable], columns).transpose();
+    double *to = m_front.data() + static_cast<std::ptrdiff_t>(m_row[own.variable]) * ld;
+    const int along = own.is_transposed ? columns : 1, across = own.is_transposed ? 1 : rows;
+    for (int c = 0; c < columns; ++c, to += ld)
+      for (int r = 0; r < rows; ++r)
+        to[m_row[own.other] + r] = from[r * along + c * across];
+    if (own.variable != own.other)
+      continue;
+    to -= static_cast<std::ptrdiff_t>(columns) * ld;
+    for (int c = 0; c < columns; ++c, to += ld) {
+      to[m_row[own.variable] + c] *= 1 + damping;
+      to[ld - 1] = m_g[m_offset[own.variable] + c];
     }
   }
   for (const int child : node.children)
@@ -358,8 +362,13 @@ MatrixXd NormalEquations::covariance(const std::vector<std::pair<int, MatrixXd>>
         b.middleRows(m_offset[v], d).noalias() -= L.middleRows(row, d) * own;
       row += d;
       if (i + 1 == node.eliminated) {
-        L.topRows(node.columns).triangularView<Eigen::Lower>().solveInPlace(own);
-        form.noalias() += own.transpose() * own;
+        Eigen::Index first = 0; // above it b is zero, and so is the solution
+        while (first < own.rows() && own.row(first).isZero(0))
+          ++first;
+        const Eigen::Index rest = own.rows() - first;
+        auto solved = own.bottomRows(rest);
+        L.block(first, first, rest, rest).triangularView<Eigen::Lower>().solveInPlace(solved);
+        form.noalias() += solved.transpose() * solved;
       }
     }
   }

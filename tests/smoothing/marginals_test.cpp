@@ -102,6 +102,7 @@ TEST(Marginals, APlaceAsSeenIsAsWellKnownHoweverFarThePathHasDrifted)
   SmootherOptions options = smootherFor(o);
   Replay whole(flight, options);
   whole.run();
+  whole.smoother.optimize();
   options.window = 60;
   options.forgets = true;
   Replay window(flight, options);
