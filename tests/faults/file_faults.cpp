@@ -157,7 +157,7 @@ std::vector<Fault> pictureFiles()
       thing("fifo", "without a writer", [](const fs::path &path) { mkfifo(path.c_str(), 0600); }),
       thing("device", "/dev/zero", [](const fs::path &path) { fs::create_symlink("/dev/zero", path); }),
       thing("folder", "", [](const fs::path &path) { fs::create_directory(path); }),
-      {"picture files", "jpeg", "in all, under the old names", Duty::survive,
+      {"picture files", "jpeg", "in all, as .png", Duty::survive,
        [](SpoiltFlight &flight) {
          for (std::size_t i = 0; i < flight.frames(); ++i)
            flight.setBytes(i, encoded(flight.image(i), ".jpg"));
@@ -200,20 +200,19 @@ Fault option(const std::string &arguments, const std::string &says)
 std::vector<Fault> options()
 {
   return {
-      option("--odometry-offset 1e30", "--odometry-offset: 1e30, must be in [-1e+10, 1e+10]"),
-      option("--camera-height nan", "--camera-height: nan, must be in [0.1, 100]"),
-      option("--give-up -1", "--give-up: -1, must be in [0.1, 86400]"),
-      option("--frames -1", "--frames: -1, must be in [0, 1e+09]"),
-      option("--rate nan", "frame_rate_hz = nan, must be in [0.001, 10000]"),
-      option("--max-width -3", "max_width_px = -3, must be in [64, 16384]"),
-      option("--field-of-view 1e9", "field_of_view_deg = 1e+09, must be in [10, 150]"),
-      option("--set map.lag=nan", "map.lag = nan, must be a number in [0, 100000]"),
-      option("--set trunks.radius=1e30", "trunks.radius = 1e30, must be a number in [0.001, 10]"),
-      option("--set detection.window=1e9", "detection.window = 1e9, must be a whole number in [4, 100]"),
-      option("--set trunks.radius_min=3",
-             "trunks.radius_min = 3, must be a number in [0.005, trunks.radius_max = 0.6]"),
-      option("--config /dev/zero", "/dev/zero: no such file"),
-      option("--camera /none.yaml", "/none.yaml: no such file"),
+      option("--odometry-offset 1e30", "must be in [-1e+10, 1e+10]"),
+      option("--camera-height nan", "must be in [0.1, 100]"),
+      option("--give-up -1", "must be in [0.1, 86400]"),
+      option("--frames -1", "must be in [0, 1e+09]"),
+      option("--rate nan", "must be in [0.001, 10000]"),
+      option("--max-width -3", "must be in [64, 16384]"),
+      option("--field-of-view 1e9", "must be in [10, 150]"),
+      option("--set map.lag=nan", "must be a number in [0, 100000]"),
+      option("--set trunks.radius=1e30", "must be a number in [0.001, 10]"),
+      option("--set detection.window=1e9", "must be a whole number in [4, 100]"),
+      option("--set trunks.radius_min=3", "must be a number in [0.005, trunks.radius_max = 0.6]"),
+      option("--config /dev/zero", "no such file"),
+      option("--camera /none.yaml", "no such file"),
   };
 }
 } // namespace

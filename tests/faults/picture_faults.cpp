@@ -192,10 +192,9 @@ std::vector<Fault> readoutFaults()
       changed("cropped_5", "by 1.3", 5, [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
       changed("cropped", "by 1.3", kToTheEnd, [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
       changed("shifted_5", "by 30 px", 5, [](const cv::Mat &I, std::size_t) { return cropped(I, 1, 30); }),
-      changed("smear_1", "of one column over the right half", 1,
-              [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
+      changed("smear_1", "over the right half", 1, [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
       changed("smear_20", "", 20, [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
-      changed("torn_10", "with the lower half upside down", 10,
+      changed("torn_10", "in the lower half", 10,
               [](const cv::Mat &I, std::size_t) {
                 cv::Mat out = I.clone();
                 flipped(I, -1).rowRange(I.rows / 2, I.rows).copyTo(out.rowRange(I.rows / 2, I.rows));
@@ -245,11 +244,11 @@ std::vector<Fault> orderFaults()
       reordered("swapped_2", "", 2, [](std::size_t i) { return i == kAt ? kAt + 1 : kAt; }),
       reordered("reversed_5", "", 5, [](std::size_t i) { return 2 * kAt + 4 - i; }),
       reordered("reversed_20", "", 20, [](std::size_t i) { return 2 * kAt + 19 - i; }),
-      reordered("elsewhere_5", "in the flight", 5, [](std::size_t i) { return i - 40; }),
+      reordered("elsewhere_5", "", 5, [](std::size_t i) { return i - 40; }),
       reordered("late_by_one", "frame", kToTheEnd, [](std::size_t i) { return i - 1; }),
       reordered("late_by_three", "frames", kToTheEnd, [](std::size_t i) { return i - 3; }),
-      jittered("stamps_15ms", "of noise (sigma)", 0.015),
-      jittered("stamps_30ms", "of noise (sigma)", 0.03),
+      jittered("stamps_15ms", "sigma", 0.015),
+      jittered("stamps_30ms", "sigma", 0.03),
       {"pictures", "stamps_ahead", "by 0.5 s", Duty::survive,
        [](SpoiltFlight &flight) {
          for (std::size_t i = kAt; i < flight.frames(); ++i)

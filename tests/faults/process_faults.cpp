@@ -74,7 +74,7 @@ Fault process(const std::string &name, const std::string &what, const std::funct
 
 Fault interrupted(const std::string &name, int signal)
 {
-  return process(name, "after 50 frames", [signal](const Shop &shop) {
+  return process(name, "", [signal](const Shop &shop) {
     const std::string run = shop.folder + "/run";
     const int status = runUntil(shop, run, signal);
     const std::size_t poses = posesIn(run);
@@ -154,7 +154,7 @@ std::vector<Fault> processFaults()
           interrupted("SIGTERM", SIGTERM),
           interrupted("SIGHUP", SIGHUP),
           interrupted("SIGPIPE", SIGPIPE),
-          process("kill -9", "after 50 frames", killedAndResumed),
+          process("kill -9", "", killedAndResumed),
           process("nohup", "and SIGHUP", noHangup),
           process("full_disk", "at 256 kB a file", fullDisk),
           process("stack_64k", "", smallStack),

@@ -88,7 +88,7 @@ std::vector<Fault> lies()
              for (const std::size_t axis : {1, 2, 3})
                table.rows[i][axis] = "0";
            }),
-      gyro("gyro_bias", "of 0.05 rad/s about z",
+      gyro("gyro_bias", "of 0.05 rad/s",
            [](Table &table, std::size_t i) { table.set(i, 3, table.number(i, 3) + 0.05); }),
       {"sensors", "gyro_spike", "of 30 rad/s for a second", Duty::survive,
        [](SpoiltFlight &flight) {
@@ -181,7 +181,7 @@ std::vector<Fault> conventions()
   return {
       poses("odometry_optical", "axes: x right, y down, z ahead", frame(optical)),
       poses("odometry_down", "axes: x ahead, y right, z down", frame(Vector3d(1, -1, -1).asDiagonal())),
-      poses("odometry_xyzw", "order of quaternions",
+      poses("odometry_xyzw", "quaternions",
             [](Vector3d &, Quaterniond &q) { q = Quaterniond(q.x(), q.y(), q.z(), q.w()); }),
       poses("odometry_level", "by yaw alone",
             [](Vector3d &, Quaterniond &q) {
@@ -195,7 +195,7 @@ std::vector<Fault> conventions()
                    [](SpoiltFlight &flight) {
                      everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t + 2'000'000'000); });
                    }),
-      samples("imu_axes", "in the order y, z, x",
+      samples("imu_axes", "y, z, x",
               [](Vector3d &rate, Vector3d &force) {
                 rate = Vector3d(rate.y(), rate.z(), rate.x());
                 force = Vector3d(force.y(), force.z(), force.x());
