@@ -11,11 +11,14 @@ namespace bole::apps
 {
 namespace
 {
+std::string afterValue(const std::string &unit) { return unit.empty() ? "" : " " + unit; }
+
 void printMarkdown()
 {
-  fmt::print("| option | unit | range | default | effect |\n|---|---|---|---|---|\n");
+  fmt::print("| option | range | default | effect |\n|---|---|---|---|\n");
   for (const OptionDescription &option : describeOptions())
-    fmt::print("| `{}` | {} | {} | {} | {} |\n", option.key, option.unit, option.range, option.value, option.effect);
+    fmt::print("| `{}` | {} | {}{} | {} |\n", option.key, option.range, option.value, afterValue(option.unit),
+               option.effect);
 }
 
 void printTable()
@@ -26,8 +29,8 @@ void printTable()
     if (its != section && !section.empty())
       fmt::print("\n");
     section = its;
-    const std::string unit = option.unit.empty() ? "" : " " + option.unit;
-    fmt::print("{:<26} {:<8} {}; {}{}\n", option.key, option.value, option.effect, option.range, unit);
+    fmt::print("{:<26} {:<8} {}; {}{}\n", option.key, option.value, option.effect, option.range,
+               afterValue(option.unit));
   }
 }
 } // namespace

@@ -80,27 +80,25 @@ std::vector<OptionEntry> optionTable(Options &o)
 {
   return {
       {"camera.height", &o.camera.height, 0, 100, "m",
-       "camera over the ground in the mean of the flight, 0 unknown: the scale of a video without odometry"},
+       "mean height over the ground, 0 unknown: the scale of a video without odometry"},
       {"camera.focal_sigma", &o.camera.focal_sigma, 0, 1, "",
-       "standard deviation of the logarithm of the focal length; 0: calibrated"},
-      {"camera.rate", &o.camera.rate, 0, 100, "1/s",
-       "frames a second, by which pairs of frames are chosen; 0: measured"},
+       "standard deviation of the log focal length; 0: calibrated"},
+      {"camera.rate", &o.camera.rate, 0, 100, "1/s", "frames a second, for the choice of pairs of frames; 0: measured"},
       {"camera.compressed", &o.camera.compressed, 0, 1, "",
        "the pictures went through a lossy codec: points are believed less"},
 
       {"stages.points", &o.stages.points, 0, 1, "", "relative poses from point features"},
       {"stages.saliency", &o.stages.saliency, 0, 1, "", "motion saliency; off: what is far may be taken for a trunk"},
       {"stages.calibration", &o.stages.calibration, 0, 1, "",
-       "`bole track` finds constant errors of gyro, odometry and clocks in the first seconds of a recording and takes "
-       "them out"},
+       "constant errors of gyro, odometry and clocks are found in the first seconds of a recording and taken out "
+       "(`bole track`)"},
       {"stages.final_pass", &o.stages.final_pass, 0, 1, "",
-       "at the end every hypothesis is judged by all frames; off: the map as it was known in flight"},
+       "every hypothesis is judged by all frames at the end; off: the map as known in flight"},
       {"stages.servoing", &o.stages.servoing, 0, 1, "",
-       "the camera is steered by the trunks: it may rest before one or circle it"},
+       "the trunks steer the camera: it may rest before one or circle it"},
 
-      {"trunks.radius", &o.trunks.radius, 0.001, 10, "m", "median radius of the trunks to be found"},
-      {"trunks.radius_sigma", &o.trunks.radius_sigma, 0.01, 3, "",
-       "standard deviation of its logarithm: how far a radius may be from it"},
+      {"trunks.radius", &o.trunks.radius, 0.001, 10, "m", "median radius of the trunks"},
+      {"trunks.radius_sigma", &o.trunks.radius_sigma, 0.01, 3, "", "standard deviation of its logarithm"},
       {"trunks.radius_min", &o.trunks.radius_min, 0.005, OptionBound(o.trunks.radius_max, "trunks.radius_max"), "m",
        "thinner trunks are not looked for"},
       {"trunks.radius_max", &o.trunks.radius_max, OptionBound(o.trunks.radius_min, "trunks.radius_min"), 5, "m",
@@ -110,15 +108,13 @@ std::vector<OptionEntry> optionTable(Options &o)
        "lower end of the part that is tracked, over the ground"},
       {"trunks.high", &o.trunks.high, OptionBound(o.trunks.low, "trunks.low"), 20, "m", "upper end of it"},
 
-      {"range.track", &o.range.track, 1, 100, "m", "known trunks farther than this are not tracked"},
+      {"range.track", &o.range.track, 1, 100, "m", "known trunks beyond it are not tracked"},
       {"range.detect_min", &o.range.detect_min, 0.3, OptionBound(o.range.detect_max, "range.detect_max"), "m",
        "nearest new trunk"},
       {"range.detect_max", &o.range.detect_max, OptionBound(o.range.detect_min, "range.detect_min"), 50, "m",
        "farthest new trunk; farther costs precision"},
-      {"range.near", &o.range.near, 0, 100, "m",
-       "nearer than this a trunk must be foreground in the saliency; 0: it need not"},
-      {"range.through", &o.range.through, 0, 100, "m",
-       "nearer than this points seen through a trunk count against it; 0: never"},
+      {"range.near", &o.range.near, 0, 100, "m", "nearer a trunk must be foreground in the saliency; 0: it need not"},
+      {"range.through", &o.range.through, 0, 100, "m", "nearer points seen through a trunk count against it; 0: never"},
 
       {"detection.window", &o.detection.window, 4, 100, "frames", "looked at together for new trunks"},
       {"detection.elevation_low", &o.detection.elevation_low, -5,
@@ -128,16 +124,13 @@ std::vector<OptionEntry> optionTable(Options &o)
        OptionBound(o.detection.elevation_low, "detection.elevation_low"), 5, "tan", "upper end of it"},
 
       {"map.confirm_probability", &o.map.confirm_probability, 1e-6, 1 - 1e-6, "",
-       "that a candidate is a trunk, at which it is confirmed, in flight and at the end; higher: fewer, and fewer "
-       "false "
-       "ones"},
+       "probability of a trunk at which a candidate is confirmed; higher: fewer trunks, fewer false ones"},
       {"map.confirm_sigma", &o.map.confirm_sigma, 0, 10, "m",
-       "leaves out trunks whose place from where they were seen has a larger standard deviation; 0: none"},
+       "trunks whose place, from where they were seen, has a larger standard deviation are left out; 0: none"},
       {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
       {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
-       "a candidate not seen for longer is no longer looked for, a trunk only while its bearing is known to its width"},
-      {"map.lag", &o.map.lag, 0, 1e5, "s",
-       "older poses are fixed and forgotten, which bounds the memory of a long flight; 0: never"},
+       "a candidate not seen for longer is dropped, a trunk looked for only while its bearing is known to its width"},
+      {"map.lag", &o.map.lag, 0, 1e5, "s", "older poses are fixed and forgotten, which bounds the memory; 0: never"},
 
       {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal walk of the pose filter in 0.1 s"},
       {"odometry.step_vertical", &o.odometry.step_vertical, 1e-4, 1, "m",
@@ -146,7 +139,7 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"odometry.height", &o.odometry.height, 1e-3, 10, "m", "noise of its height about the truth"},
       {"odometry.tilt", &o.odometry.tilt, 1e-4, 1, "rad", "noise of its roll and pitch about the truth"},
       {"odometry.turn", &o.odometry.turn, 1e-5, 1, "rad",
-       "noise of its rotation between two frames, used where there is no gyro"},
+       "noise of its rotation between two frames, where there is no gyro"},
 
       {"gyro.noise", &o.gyro.noise, 1e-7, 1, "rad/s/sqrt(Hz)", "white noise of the rate"},
       {"gyro.bias", &o.gyro.bias, 0, 1, "rad/s", "standard deviation of the bias at the start"},

@@ -40,10 +40,11 @@ struct Seen
 
 struct Fault
 {
-  std::string group, name, what;
+  std::string group, name;
+  std::string what; ///< goes on where the name ends
   Duty duty = Duty::survive;
   std::function<void(SpoiltFlight &)> spoil = {};
-  std::string says = {};      ///< part of the line of a refusal
+  std::string says = {};      ///< part of the line of a refusal, which stands in the table
   std::string arguments = {}; ///< of `bole track`
   std::function<Seen(const Shop &)> process = {};
   double since_s = kAt / kRate_hz; ///< begins then

@@ -16,6 +16,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <sstream>
 #include <visp3/core/vpException.h>
@@ -57,6 +58,15 @@ struct Result
   std::string names;      ///< how they and the sensors are named
 };
 
+/// \p text without what is in brackets, and without since when, against what, how exactly and what must be.
+std::string shortened(const std::string &text)
+{
+  std::string out = std::regex_replace(text, std::regex(R"( \([^)]*\))"), "");
+  for (const char *const end : {" since ", " against", ", must", ", by ", ", +-"})
+    out.resize(std::min(out.size(), out.find(end)));
+  return out;
+}
+
 /// Frames that frames.csv calls anything but ok.
 void readFrames(const fs::path &run, double since_s, Result &result)
 {
@@ -78,7 +88,8 @@ void readFrames(const fs::path &run, double since_s, Result &result)
     const std::string reason = fields.size() > 9 && !fields[9].empty() ? fields[9] : fields[2];
     std::string name = fields[2];
     if (name == "doubtful") { // without the figures in which frames differ
-      name = reason.substr(0, reason.find_first_of(":0123456789"));
+      name = shortened(reason);
+      name.resize(std::min(name.size(), name.find_first_of(":0123456789")));
       for (const std::string end : {" ", " of", " by"})
         if (name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
           name.resize(name.size() - end.size());
@@ -95,13 +106,14 @@ void readSummary(const fs::path &run, Result &result)
 {
   const auto add = [&result](double since_s, const std::string &text) {
     result.named_s = result.named_s < 0 ? since_s : std::min(result.named_s, since_s);
-    result.names += (result.names.empty() ? "" : ", ") + text;
+    if (result.names.find(text) == std::string::npos)
+      result.names += (result.names.empty() ? "" : ", ") + text;
   };
   const auto summary = nlohmann::json::parse(bytesOf(run / "summary.json"));
   for (const auto &gap : summary.at("gaps"))
     add(gap.at("begin_s"), fmt::format("no picture for {:.1f} s", gap.at("length_s").get<double>()));
   for (const auto &sensor : summary.at("sensors"))
-    add(sensor.at("since_s"), sensor.at("text"));
+    add(sensor.at("since_s"), shortened(sensor.at("text")));
 }
 
 Result judgeRun(const fs::path &run, const std::string &flight, double since_s, int status)
@@ -130,7 +142,7 @@ Result judgeRun(const fs::path &run, const std::string &flight, double since_s, 
 struct Line
 {
   const Fault *fault;
-  std::string seen, figures = "| | ";
+  std::string seen = {}, figures = {}; ///< no figures where there is no map to measure
   bool is_good = false;
 };
 
@@ -185,17 +197,12 @@ private:
 
   static std::string firstLine(const std::string &text) { return text.substr(0, text.find('\n')); }
 
-  void judgeRefusal(const Fault &fault, const test::Outcome &outcome, const fs::path &run, Line &line) const
+  static void judgeRefusal(const Fault &fault, const test::Outcome &outcome, const fs::path &run, Line &line)
   {
-    std::string said = firstLine(outcome.text);
-    for (const std::string &folder : {(m_work / "copy").string() + "/mav0/", (m_work / "copy").string() + "/"})
-      for (std::size_t at = said.find(folder); at != std::string::npos; at = said.find(folder))
-        said.erase(at, folder.size());
-    line.seen = fmt::format("`{}`", said.size() > 160 ? said.substr(0, 157) + "..." : said);
     line.is_good = (outcome.status == 1 || outcome.status == 2) && outcome.text.find(fault.says) != std::string::npos &&
                    !fs::exists(run / "trunks.csv");
-    if (outcome.status != 1 && outcome.status != 2)
-      line.seen = fmt::format("EXIT {}: {}", outcome.status, line.seen);
+    line.seen = line.is_good ? fmt::format("`{}`", fault.says)
+                             : fmt::format("EXIT {}: `{}`", outcome.status, firstLine(outcome.text).substr(0, 160));
   }
 
   void judgeReading(const fs::path &run, const test::Outcome &outcome, Line &line) const
@@ -204,6 +211,15 @@ private:
     for (const char *file : {"trunks.csv", "trajectory.tum"})
       line.is_good = line.is_good && bytesOf(run / file) == bytesOf(m_clean_run / file);
     line.seen = line.is_good ? "the same bytes" : fmt::format("exit {}: {}", outcome.status, firstLine(outcome.text));
+  }
+
+  /// How many frames were named, and how late the first of them where that was not at once.
+  static std::string framesOf(const Result &result, double since_s)
+  {
+    if (result.frames == 0)
+      return "";
+    const double late_s = result.named_s - since_s;
+    return late_s < 0.05 ? fmt::format(" ({})", result.frames) : fmt::format(" ({}, {:.1f} s)", result.frames, late_s);
   }
 
   void judgeSurvival(const Fault &fault, const test::Outcome &outcome, const fs::path &run, Line &line) const
@@ -218,12 +234,8 @@ private:
     else if (result.names.empty())
       line.seen = is_kept ? "nothing lost" : "SILENT";
     else
-      line.seen = fmt::format(
-          "{}{}{}", result.names, result.frames > 0 ? fmt::format(" ({} frames", result.frames) : "",
-          result.frames == 0   ? ""
-          : result.named_s < 0 ? ")"
-                               : fmt::format(", {:.1f} s after)", std::max(0.0, result.named_s - fault.since_s)));
-    line.figures = fmt::format("{:.3f} | {:.2f} | {:.2f}", result.ate, result.recall, result.precision);
+      line.seen = result.names + framesOf(result, fault.since_s);
+    line.figures = fmt::format("{:.3f}, {:.2f}, {:.2f}", result.ate, result.recall, result.precision);
   }
 
   std::string m_bole, m_flight;
@@ -232,26 +244,29 @@ private:
 
 std::vector<Fault> allFaults() { return joined({pictureFaults(), sensorFaults(), fileFaults(), processFaults()}); }
 
-std::string rowOf(const Line &line)
+std::string rowOf(const Line &line, bool has_figures)
 {
-  const bool is_known = kKnown.count(line.fault->name) > 0;
-  return fmt::format("| `{}` | {} | {} | {} | {} |\n", line.fault->name, line.fault->what, line.seen, line.figures,
-                     line.is_good ? "yes"
-                     : is_known   ? "no"
-                                  : "**NO**");
+  const Fault &fault = *line.fault;
+  const char *const verdict = line.is_good ? "" : kKnown.count(fault.name) > 0 ? "not held: " : "**NOT HELD**: ";
+  std::string row =
+      fmt::format("| `{}`{}{} | {}{} |", fault.name, fault.what.empty() ? "" : " ", fault.what, verdict, line.seen);
+  if (has_figures)
+    row += fmt::format("{}{} |", line.figures.empty() ? "" : " ", line.figures);
+  return row + "\n";
 }
 
+/// A table for each group.
 std::string tableOf(const std::vector<Line> &lines, const Result &clean)
 {
-  std::string text, group;
-  text += fmt::format("Without a fault: ATE {:.3f} m, recall {:.2f}, precision {:.2f}, {} frames named.\n", clean.ate,
-                      clean.recall, clean.precision, clean.frames);
-  for (const Line &line : lines) {
-    if (line.fault->group != group)
-      text += fmt::format("\n| {} | what it is | what is seen | ATE [m] | recall | precision | held |\n"
-                          "|---|---|---|---|---|---|---|\n",
-                          group = line.fault->group);
-    text += rowOf(line);
+  std::string text = fmt::format("No fault: {:.3f}, {:.2f}, {:.2f}.\n", clean.ate, clean.recall, clean.precision);
+  for (auto begin = lines.begin(); begin != lines.end();) {
+    const std::string &group = begin->fault->group;
+    const auto end = std::find_if(begin, lines.end(), [&](const Line &line) { return line.fault->group != group; });
+    const bool has_figures = std::any_of(begin, end, [](const Line &line) { return !line.figures.empty(); });
+    text += fmt::format("\n| {} | said |{}\n|---|---|{}\n", group, has_figures ? " figures |" : "",
+                        has_figures ? "---|" : "");
+    for (; begin != end; ++begin)
+      text += rowOf(*begin, has_figures);
   }
   return text;
 }
@@ -290,7 +305,7 @@ int run(const std::vector<std::string> &words)
     if (!only.empty() ? only.count(fault.name) == 0 : fault.duty != Duty::refuse && runs++ % part != 0)
       continue;
     lines.push_back(trial.judge(fault));
-    fmt::print("{}", rowOf(lines.back()));
+    fmt::print("{}", rowOf(lines.back(), true));
     std::fflush(stdout);
     short_of += lines.back().is_good || kKnown.count(fault.name) > 0 ? 0 : 1;
   }

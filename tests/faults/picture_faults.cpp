@@ -130,22 +130,18 @@ Fault jittered(const std::string &name, const std::string &what, double sigma_s)
 std::vector<Fault> lightFaults()
 {
   return {
-      changed("black_5", "5 black pictures", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, 0); }),
-      changed("white_5", "5 white pictures", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, 0, 255); }),
-      changed("dim_10", "10 at a tenth of the light", 10, [](const cv::Mat &I, std::size_t) { return scaled(I, 0.1); }),
-      changed("overexposed_10", "10 four times too bright", 10,
-              [](const cv::Mat &I, std::size_t) { return scaled(I, 4, 60); }),
-      changed("half_light", "half the light from then on", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return scaled(I, 0.5); }),
-      changed("double_light", "double the light from then on", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return scaled(I, 2); }),
-      changed("flicker", "every second one at half the light", kToTheEnd,
+      changed("black_5", "", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, 0); }),
+      changed("white_5", "", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, 0, 255); }),
+      changed("dim_10", "to a tenth", 10, [](const cv::Mat &I, std::size_t) { return scaled(I, 0.1); }),
+      changed("overexposed_10", "fourfold", 10, [](const cv::Mat &I, std::size_t) { return scaled(I, 4, 60); }),
+      changed("half_light", "", kToTheEnd, [](const cv::Mat &I, std::size_t) { return scaled(I, 0.5); }),
+      changed("double_light", "", kToTheEnd, [](const cv::Mat &I, std::size_t) { return scaled(I, 2); }),
+      changed("flicker", "to half the light", kToTheEnd,
               [](const cv::Mat &I, std::size_t k) { return scaled(I, k % 2 ? 1 : 0.5); }),
-      changed("dark_band", "a dark band that runs down, as from mains light", kToTheEnd,
-              [](const cv::Mat &I, std::size_t k) { return withBand(I, k); }),
-      changed("inverted_5", "5 negatives", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, -1, 255); }),
-      noised("noise_10", "10 with noise of 40 grey levels", 10, 40),
-      changed("static_5", "5 of nothing but noise", 5,
+      changed("dark_band", "that runs down", kToTheEnd, [](const cv::Mat &I, std::size_t k) { return withBand(I, k); }),
+      changed("inverted_5", "", 5, [](const cv::Mat &I, std::size_t) { return scaled(I, -1, 255); }),
+      noised("noise_10", "of 40 grey levels", 10, 40),
+      changed("static_5", "of nothing but noise", 5,
               [](const cv::Mat &I, std::size_t k) {
                 std::mt19937 random(static_cast<unsigned>(k));
                 return noisy(scaled(I, 0, 128), 80, random);
@@ -163,26 +159,25 @@ std::vector<Fault> lensFaults()
     };
   };
   return {
-      changed("blur_20", "20 out of focus by 5 px", 20, blurred(5)),
-      changed("motion_blur_10", "10 smeared sideways by 25 px", 10,
+      changed("blur_20", "by 5 px", 20, blurred(5)),
+      changed("motion_blur_10", "of 25 px", 10,
               [](const cv::Mat &I, std::size_t) {
                 cv::Mat out;
                 cv::blur(I, out, {25, 1});
                 return out;
               }),
-      changed("drop", "a drop of water on the lens from then on", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return withDrop(I); }),
-      changed("dirt", "an upright stripe on the lens from then on", kToTheEnd,
+      changed("drop", "of water", kToTheEnd, [](const cv::Mat &I, std::size_t) { return withDrop(I); }),
+      changed("dirt", "in an upright stripe", kToTheEnd,
               [](const cv::Mat &I, std::size_t) {
                 cv::Mat out = I.clone();
                 out.colRange(150, 172) = 25;
                 return out;
               }),
-      changed("propeller", "two propeller blades in view from then on", kToTheEnd,
+      changed("propeller", "of two blades", kToTheEnd,
               [](const cv::Mat &I, std::size_t k) { return withBlades(I, k); }),
-      changed("rolling_20", "20 skewed by up to 10 px, as from a shaken rolling shutter", 20,
+      changed("rolling_20", "shutter of 10 px", 20,
               [](const cv::Mat &I, std::size_t k) { return rolled(I, 10 * std::sin(2 * M_PI * k / 7.3)); }),
-      changed("rolling", "the same from then on", kToTheEnd,
+      changed("rolling", "shutter of 10 px", kToTheEnd,
               [](const cv::Mat &I, std::size_t k) { return rolled(I, 10 * std::sin(2 * M_PI * k / 7.3)); }),
   };
 }
@@ -190,28 +185,22 @@ std::vector<Fault> lensFaults()
 std::vector<Fault> readoutFaults()
 {
   return {
-      changed("mirrored_5", "5 mirrored left to right", 5, [](const cv::Mat &I, std::size_t) { return flipped(I, 1); }),
-      changed("mirrored", "mirrored from then on", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return flipped(I, 1); }),
-      changed("upside_down_5", "5 turned by 180 degrees", 5,
-              [](const cv::Mat &I, std::size_t) { return flipped(I, -1); }),
-      changed("upside_down", "turned by 180 degrees from then on", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return flipped(I, -1); }),
-      changed("cropped_5", "5 zoomed by 1.3", 5, [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
-      changed("cropped", "zoomed by 1.3 from then on: another mode of the sensor", kToTheEnd,
-              [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
-      changed("shifted_5", "5 cut 30 px farther right", 5,
-              [](const cv::Mat &I, std::size_t) { return cropped(I, 1, 30); }),
-      changed("smear_1", "one whose right half repeats one column", 1,
-              [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
-      changed("smear_20", "20 of these", 20, [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
-      changed("torn_10", "10 whose lower half is that of the picture turned upside down", 10,
+      changed("mirrored_5", "", 5, [](const cv::Mat &I, std::size_t) { return flipped(I, 1); }),
+      changed("mirrored", "", kToTheEnd, [](const cv::Mat &I, std::size_t) { return flipped(I, 1); }),
+      changed("upside_down_5", "", 5, [](const cv::Mat &I, std::size_t) { return flipped(I, -1); }),
+      changed("upside_down", "", kToTheEnd, [](const cv::Mat &I, std::size_t) { return flipped(I, -1); }),
+      changed("cropped_5", "by 1.3", 5, [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
+      changed("cropped", "by 1.3", kToTheEnd, [](const cv::Mat &I, std::size_t) { return cropped(I, 1.3, 0); }),
+      changed("shifted_5", "by 30 px", 5, [](const cv::Mat &I, std::size_t) { return cropped(I, 1, 30); }),
+      changed("smear_1", "over the right half", 1, [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
+      changed("smear_20", "", 20, [](const cv::Mat &I, std::size_t) { return smeared(I.clone()); }),
+      changed("torn_10", "in the lower half", 10,
               [](const cv::Mat &I, std::size_t) {
                 cv::Mat out = I.clone();
                 flipped(I, -1).rowRange(I.rows / 2, I.rows).copyTo(out.rowRange(I.rows / 2, I.rows));
                 return out;
               }),
-      changed("blocks_10", "10 in blocks of 16 px, as from a starved codec", 10,
+      changed("blocks_10", "of 16 px", 10,
               [](const cv::Mat &I, std::size_t) {
                 cv::Mat small, out;
                 cv::resize(I, small, {}, 1 / 16.0, 1 / 16.0, cv::INTER_AREA);
@@ -244,32 +233,32 @@ std::vector<Fault> orderFaults()
                  }};
   };
   return {
-      reordered("frozen_10", "the last picture 10 times", 10, [](std::size_t) { return kAt - 1; }),
-      frozen("frozen_counter_10", "the same with a counter in a corner", 0),
-      frozen("frozen_noise_10", "the same under fresh noise", 2),
-      {"pictures", "stutter", "every third picture is the one before, encoded anew", Duty::survive,
+      reordered("frozen_10", "", 10, [](std::size_t) { return kAt - 1; }),
+      frozen("frozen_counter_10", "", 0),
+      frozen("frozen_noise_10", "", 2),
+      {"pictures", "stutter", "of every third picture", Duty::survive,
        [](SpoiltFlight &flight) {
          for (std::size_t i = kAt; i < flight.frames(); i += 3)
            flight.set(i, noisy(flight.image(i - 1), 1, flight.random));
        }},
-      reordered("swapped_2", "two pictures exchanged", 2, [](std::size_t i) { return i == kAt ? kAt + 1 : kAt; }),
-      reordered("reversed_5", "5 pictures in the opposite order", 5, [](std::size_t i) { return 2 * kAt + 4 - i; }),
-      reordered("reversed_20", "20 pictures in the opposite order", 20, [](std::size_t i) { return 2 * kAt + 19 - i; }),
-      reordered("elsewhere_5", "5 pictures of another part of the flight", 5, [](std::size_t i) { return i - 40; }),
-      reordered("late_by_one", "each picture one frame late", kToTheEnd, [](std::size_t i) { return i - 1; }),
-      reordered("late_by_three", "each picture three frames late", kToTheEnd, [](std::size_t i) { return i - 3; }),
-      jittered("stamps_15ms", "stamps off by 15 ms (sigma)", 0.015),
-      jittered("stamps_30ms", "stamps off by 30 ms (sigma)", 0.03),
-      {"pictures", "stamps_ahead", "stamps 0.5 s ahead from then on", Duty::survive,
+      reordered("swapped_2", "", 2, [](std::size_t i) { return i == kAt ? kAt + 1 : kAt; }),
+      reordered("reversed_5", "", 5, [](std::size_t i) { return 2 * kAt + 4 - i; }),
+      reordered("reversed_20", "", 20, [](std::size_t i) { return 2 * kAt + 19 - i; }),
+      reordered("elsewhere_5", "", 5, [](std::size_t i) { return i - 40; }),
+      reordered("late_by_one", "frame", kToTheEnd, [](std::size_t i) { return i - 1; }),
+      reordered("late_by_three", "frames", kToTheEnd, [](std::size_t i) { return i - 3; }),
+      jittered("stamps_15ms", "sigma", 0.015),
+      jittered("stamps_30ms", "sigma", 0.03),
+      {"pictures", "stamps_ahead", "by 0.5 s", Duty::survive,
        [](SpoiltFlight &flight) {
          for (std::size_t i = kAt; i < flight.frames(); ++i)
            flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) + 500'000'000);
        }},
-      kept("gap_1s", "10 pictures not in the table", [](std::size_t i) { return i >= 10; }),
-      kept("gap_2s", "20 of them", [](std::size_t i) { return i >= 20; }),
-      kept("half_rate", "every second picture not in the table from then on", [](std::size_t i) { return i % 2 == 0; }),
-      kept("bursts", "a second of pictures, a second without", [](std::size_t i) { return i / 10 % 2 == 0; }),
-      fromTheFirst({"pictures", "rows_twice", "each picture once more 50 ms later", Duty::survive,
+      kept("gap_1s", "", [](std::size_t i) { return i >= 10; }),
+      kept("gap_2s", "", [](std::size_t i) { return i >= 20; }),
+      kept("half_rate", "", [](std::size_t i) { return i % 2 == 0; }),
+      kept("bursts", "of a second", [](std::size_t i) { return i / 10 % 2 == 0; }),
+      fromTheFirst({"pictures", "rows_twice", "50 ms apart", Duty::survive,
                     [](SpoiltFlight &flight) {
                       std::vector<SpoiltFlight::Row> rows;
                       for (const SpoiltFlight::Row &row : flight.camera.rows)
@@ -277,7 +266,7 @@ std::vector<Fault> orderFaults()
                           rows.push_back({std::to_string(std::stoll(row[0]) + later_ns), row[1]});
                       flight.camera.rows = std::move(rows);
                     }}),
-      fromTheFirst({"pictures", "stamps_drift", "a clock that is 1 % slow", Duty::survive,
+      fromTheFirst({"pictures", "stamps_drift", "by 1 %", Duty::survive,
                     [](SpoiltFlight &flight) {
                       for (std::size_t i = 0; i < flight.frames(); ++i)
                         flight.camera.rows[i][0] = std::to_string(flight.camera.stamp(i) / 100 * 101);

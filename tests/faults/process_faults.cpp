@@ -74,7 +74,7 @@ Fault process(const std::string &name, const std::string &what, const std::funct
 
 Fault interrupted(const std::string &name, int signal)
 {
-  return process(name, name + " after 50 frames or more", [signal](const Shop &shop) {
+  return process(name, "", [signal](const Shop &shop) {
     const std::string run = shop.folder + "/run";
     const int status = runUntil(shop, run, signal);
     const std::size_t poses = posesIn(run);
@@ -154,11 +154,11 @@ std::vector<Fault> processFaults()
           interrupted("SIGTERM", SIGTERM),
           interrupted("SIGHUP", SIGHUP),
           interrupted("SIGPIPE", SIGPIPE),
-          process("kill -9", "killed after 50 frames or more, then resumed", killedAndResumed),
-          process("nohup", "SIGHUP where it is ignored", noHangup),
-          process("full_disk", "no file may be larger than 256 kB", fullDisk),
-          process("stack_64k", "a stack of 64 kB", smallStack),
-          process("closed_output", "nobody reads its output", noReader),
-          process("two_at_once", "two runs into one folder", twoAtOnce)};
+          process("kill -9", "", killedAndResumed),
+          process("nohup", "and SIGHUP", noHangup),
+          process("full_disk", "at 256 kB a file", fullDisk),
+          process("stack_64k", "", smallStack),
+          process("closed_output", "", noReader),
+          process("two_at_once", "in one folder", twoAtOnce)};
 }
 } // namespace bole::faults

@@ -72,39 +72,38 @@ std::string replaced(std::string text, char from, const std::string &to)
 std::vector<Fault> lies()
 {
   return {
-      odometry("odometry_stands", "the pose filter stands from then on",
+      odometry("odometry_stands", "",
                [](Table &table, std::size_t i) {
                  const std::string stamp = table.rows[i][0];
                  table.rows[i] = table.rows[i - 1];
                  table.rows[i][0] = stamp;
                }),
-      odometry("odometry_jumps_5m", "the pose filter jumps 5 m sideways",
+      odometry("odometry_jumps_5m", "sideways",
                [](Table &table, std::size_t i) { table.set(i, 2, table.number(i, 2) + 5); }),
-      odometry("odometry_long", "lengths of the pose filter 30 % too long",
+      odometry("odometry_long", "by 30 %",
                [](Table &table, std::size_t i) { table.set(i, 1, 1.3 * table.number(i, 1)); }),
-      {"sensors", "odometry_ends", "no pose filter from then on", Duty::survive,
-       [](SpoiltFlight &flight) { flight.odometry.rows.resize(kAt); }},
-      gyro("gyro_zero", "the gyro says 0 from then on",
+      {"sensors", "odometry_ends", "", Duty::survive, [](SpoiltFlight &flight) { flight.odometry.rows.resize(kAt); }},
+      gyro("gyro_zero", "",
            [](Table &table, std::size_t i) {
              for (const std::size_t axis : {1, 2, 3})
                table.rows[i][axis] = "0";
            }),
-      gyro("gyro_bias", "the gyro off by 0.05 rad/s about z",
+      gyro("gyro_bias", "of 0.05 rad/s",
            [](Table &table, std::size_t i) { table.set(i, 3, table.number(i, 3) + 0.05); }),
-      {"sensors", "gyro_spike", "the gyro off by 30 rad/s about x for a second", Duty::survive,
+      {"sensors", "gyro_spike", "of 30 rad/s for a second", Duty::survive,
        [](SpoiltFlight &flight) {
          const std::int64_t begin = beginOf(flight), end = begin + 1'000'000'000;
          for (std::size_t i = 0; i < flight.imu.rows.size(); ++i)
            if (flight.imu.stamp(i) >= begin && flight.imu.stamp(i) < end)
              flight.imu.set(i, 1, flight.imu.number(i, 1) + 30);
        }},
-      {"sensors", "gyro_ends", "no gyro from then on", Duty::survive,
+      {"sensors", "gyro_ends", "", Duty::survive,
        [](SpoiltFlight &flight) {
          auto &rows = flight.imu.rows;
          while (flight.imu.stamp(rows.size() - 1) >= beginOf(flight))
            rows.pop_back();
        }},
-      {"sensors", "gyro_holes", "nine of ten samples of the gyro lost", Duty::survive,
+      {"sensors", "gyro_holes", "of nine samples in ten", Duty::survive,
        [](SpoiltFlight &flight) {
          std::vector<SpoiltFlight::Row> left;
          for (SpoiltFlight::Row &row : flight.imu.rows)
@@ -180,34 +179,33 @@ std::vector<Fault> conventions()
   Eigen::Matrix3d optical;
   optical << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   return {
-      poses("odometry_optical", "its axes are x right, y down, z ahead", frame(optical)),
-      poses("odometry_down", "its axes are x ahead, y right, z down", frame(Vector3d(1, -1, -1).asDiagonal())),
-      poses("odometry_xyzw", "quaternions with w at the end",
+      poses("odometry_optical", "axes: x right, y down, z ahead", frame(optical)),
+      poses("odometry_down", "axes: x ahead, y right, z down", frame(Vector3d(1, -1, -1).asDiagonal())),
+      poses("odometry_xyzw", "quaternions",
             [](Vector3d &, Quaterniond &q) { q = Quaterniond(q.x(), q.y(), q.z(), q.w()); }),
-      poses("odometry_level", "yaw alone, no roll and no pitch",
+      poses("odometry_level", "by yaw alone",
             [](Vector3d &, Quaterniond &q) {
               const Eigen::Matrix3d R = q.toRotationMatrix();
               q = Quaterniond(Eigen::AngleAxisd(std::atan2(R(1, 0), R(0, 0)), Vector3d::UnitZ()));
             }),
-      poses("odometry_cm", "poses in centimetres", [](Vector3d &t, Quaterniond &) { t *= 100; }),
-      poses("odometry_sea", "heights over the sea", [](Vector3d &t, Quaterniond &) { t.z() += 500; }),
-      thinned("odometry_1hz", "a pose a second", &SpoiltFlight::odometry, 10),
-      fromTheFirst("odometry_late_2s", "its clock 2 s late",
+      poses("odometry_cm", "", [](Vector3d &t, Quaterniond &) { t *= 100; }),
+      poses("odometry_sea", "heights", [](Vector3d &t, Quaterniond &) { t.z() += 500; }),
+      thinned("odometry_1hz", "", &SpoiltFlight::odometry, 10),
+      fromTheFirst("odometry_late_2s", "",
                    [](SpoiltFlight &flight) {
                      everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t + 2'000'000'000); });
                    }),
-      samples("imu_axes", "y, z, x for x, y, z",
+      samples("imu_axes", "y, z, x",
               [](Vector3d &rate, Vector3d &force) {
                 rate = Vector3d(rate.y(), rate.z(), rate.x());
                 force = Vector3d(force.y(), force.z(), force.x());
               }),
-      samples("gyro_scale", "rates 10 % too large", [](Vector3d &rate, Vector3d &) { rate *= 1.1; }),
-      samples("gyro_saturated", "no rate above 0.2 rad/s",
+      samples("gyro_scale", "10 % too large", [](Vector3d &rate, Vector3d &) { rate *= 1.1; }),
+      samples("gyro_saturated", "at 0.2 rad/s",
               [](Vector3d &rate, Vector3d &) { rate = rate.cwiseMin(0.2).cwiseMax(-0.2); }),
-      samples("force_down", "an accelerometer that says -9.81 at rest",
-              [](Vector3d &, Vector3d &force) { force = -force; }),
-      thinned("imu_20hz", "20 samples a second", &SpoiltFlight::imu, 10),
-      fromTheFirst("imu_drift", "its clock 1 % slow",
+      samples("force_down", "at rest", [](Vector3d &, Vector3d &force) { force = -force; }),
+      thinned("imu_20hz", "", &SpoiltFlight::imu, 10),
+      fromTheFirst("imu_drift", "by 1 %",
                    [](SpoiltFlight &flight) {
                      everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(t / 100 * 101); });
                    }),
@@ -217,44 +215,43 @@ std::vector<Fault> conventions()
 std::vector<Fault> units()
 {
   return {
-      refused("odometry_1e9", "a pose 1e9 m away", "data.csv:52: position",
+      refused("odometry_1e9", "", "data.csv:52: position = 1e+09 m from the origin",
               [](SpoiltFlight &flight) { flight.odometry.rows[kAt][1] = "1e9"; }),
-      refused("odometry_nan", "a pose that is no number", "data.csv:52: x = \"nan\"",
+      refused("odometry_nan", "", "data.csv:52: x = \"nan\", must be a finite number",
               [](SpoiltFlight &flight) { flight.odometry.rows[kAt][1] = "nan"; }),
-      refused("odometry_mm", "poses in millimetres", "must be at most 300 m/s",
+      refused("odometry_mm", "", "speed = 118 m in 0.1 s, must be at most 300 m/s",
               [](SpoiltFlight &flight) {
                 multiply(flight.odometry, {1, 2, 3}, 1000);
               }),
-      refused("odometry_ms", "its stamps in milliseconds", "data.csv",
+      refused("odometry_ms", "in stamps", "stamps must be in nanoseconds",
               [](SpoiltFlight &flight) {
                 everyStamp(flight.odometry, [](std::int64_t t) { return std::to_string(t / 1'000'000); });
               }),
-      refused("odometry_semicolons", "columns separated by semicolons", "semicolons",
+      refused("odometry_semicolons", "", "separated by semicolons, must be by commas",
               [](SpoiltFlight &flight) { flight.replace(kOdometry, replaced(flight.text(kOdometry), ',', ";")); }),
-      refused("gyro_degrees", "a gyro in degrees a second", "looks like degrees per second",
+      refused("gyro_degrees", "", "looks like degrees per second",
               [](SpoiltFlight &flight) {
                 multiply(flight.imu, {1, 2, 3}, 180 / M_PI);
               }),
-      refused("force_in_g", "an accelerometer in g", "looks like g",
+      refused("force_in_g", "", "looks like g",
               [](SpoiltFlight &flight) {
                 multiply(flight.imu, {4, 5, 6}, 1 / 9.80665);
               }),
-      refused("imu_ms", "stamps of the gyro in milliseconds", "imu0/data.csv",
+      refused("imu_ms", "in stamps", "stamps must be in nanoseconds",
               [](SpoiltFlight &flight) {
                 everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(t / 1'000'000); });
               }),
-      refused("imu_seconds", "stamps of the gyro in seconds", "timestamp",
+      refused("imu_seconds", "in stamps", "timestamp = \"0.000000\", must be a whole number",
               [](SpoiltFlight &flight) {
                 everyStamp(flight.imu, [](std::int64_t t) { return std::to_string(1e-9 * static_cast<double>(t)); });
               }),
-      refused("imu_empty", "a table without a line", "no sample in it",
-              [](SpoiltFlight &flight) { flight.imu.rows.clear(); }),
-      refused("imu_commas", "decimals written with commas", "written with a comma",
+      refused("imu_empty", "", "no sample in it", [](SpoiltFlight &flight) { flight.imu.rows.clear(); }),
+      refused("imu_commas", "", "written with a comma, must have a point",
               [](SpoiltFlight &flight) { flight.replace(kImu, replaced(flight.text(kImu), '.', ",")); }),
-      refused("imu_back", "a stamp that goes back", "must be later than",
+      refused("imu_back", "in time", "data.csv:103: timestamp = 500000000 ns, must be later",
               [](SpoiltFlight &flight) { std::swap(flight.imu.rows[100], flight.imu.rows[101]); }),
       refused(
-          "imu_utf16", "a table in UTF-16", "UTF-16",
+          "imu_utf16", "", "is text in UTF-16, must be in UTF-8",
           [](SpoiltFlight &flight) { flight.replace(kImu, "\xFF\xFE" + replaced(flight.text(kImu), '\n', "\n\1")); }),
   };
 }
@@ -262,17 +259,17 @@ std::vector<Fault> units()
 std::vector<Fault> dialects()
 {
   return {
-      dialect("byte_order_mark", "tables that begin with the mark of UTF-8",
+      dialect("byte_order_mark", "",
               [](SpoiltFlight &flight) {
                 for (const char *file : {kOdometry, kImu})
                   flight.replace(file, "\xEF\xBB\xBF" + flight.text(file));
               }),
-      dialect("header_plain", "headers without #",
+      dialect("header_plain", "without #",
               [](SpoiltFlight &flight) {
                 for (Table *table : {&flight.camera, &flight.odometry, &flight.imu})
                   table->header.erase(0, table->header.find_first_not_of("# "));
               }),
-      dialect("windows_lines", "lines that end as on Windows",
+      dialect("windows_lines", "",
               [](SpoiltFlight &flight) {
                 for (const char *file : {kOdometry, kImu, "mav0/cam0/data.csv"})
                   flight.replace(file, replaced(flight.text(file), '\n', "\r\n"));
