@@ -105,12 +105,13 @@ std::vector<std::size_t> stereoPartners(const Seen &seen, const std::vector<Seen
 double across(const Vector2d &direction, const Vector2d &a) { return direction.x() * a.y() - direction.y() * a.x(); }
 
 /// What a trunk covers in a view [tan of the bearing]; nothing where it is not in sight.
-std::pair<double, double> coveredBy(const Trunk &trunk, const ColumnView &view)
+std::pair<double, double> coveredBy(const Trunk &trunk, const ColumnView &view, double margin_px)
 {
   const auto at = locate(trunk, view, std::numeric_limits<double>::infinity());
   if (!at)
     return {0, 0};
-  return {std::tan(at->bearing - at->half_angle), std::tan(at->bearing + at->half_angle)};
+  const double half = at->half_angle + margin_px * view.image->step;
+  return {std::tan(at->bearing - half), std::tan(at->bearing + half)};
 }
 
 /// How \p view sees what stands at a range along \p direction from \p from and leans by \p lean [tan].
@@ -147,7 +148,8 @@ OtherColumns numbersOf(const ColumnImage &image)
 /// \p add: takes the kind of a column, which of the ranges, the difference.
 template <std::size_t Tried, typename Add>
 void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &columns, const std::vector<Seen> &all,
-             const std::vector<ColumnView> &views, const std::array<double, Tried> &scales, const Add &add)
+             const std::vector<ColumnView> &views, const std::array<double, Tried> &scales, const Add &add,
+             double margin_px = 0)
 {
   constexpr double kGround = -0.35; // tan of the elevation below which the ground stands beside a trunk, as near as it
   constexpr double kUnit = 0.25;    // of the contrast of the image: how much one place differs between two frames
@@ -166,7 +168,7 @@ void compare(const Trunk &trunk, const Seen &seen, const std::vector<Column> &co
   for (const std::size_t p : stereoPartners(seen, all, views)) {
     const double unit = std::max(kUnit * 0.5 * (view.image->contrast + views[p].image->contrast), kLeast);
     partners.push_back(
-        {&views[p], coveredBy(trunk, views[p]), numbersOf(*views[p].image), static_cast<float>(1 / unit)});
+        {&views[p], coveredBy(trunk, views[p], margin_px), numbersOf(*views[p].image), static_cast<float>(1 / unit)});
   }
   constexpr std::size_t kTogether = 8, kPadded = (Tried + kTogether - 1) / kTogether * kTogether;
   std::array<float, kPadded> ranges{}, differences{};
@@ -314,6 +316,35 @@ std::optional<PhotoConsistency> photoConsistency(const Trunk &trunk, const std::
     if (const auto here = curvesOf(trunk, seen, all, views))
       curves.add(*here);
   return consistencyOf(curves);
+}
+
+double freeBeside(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
+{
+  constexpr std::array<double, 4> kScalesBeside = {1, 2, 3, 1000};
+  constexpr double kOff_px = 3, kNarrowest_px = 6, kWidest_px = 16; // of a strip, else as wide as the trunk
+  constexpr std::size_t kColumns = 6;
+  const std::vector<Seen> all = locateAll(trunk, views, farthest);
+  ConsistencyCurves curves;
+  for (const Seen &seen : evenSubset(all)) {
+    const double px = views[seen.view].image->step, half = seen.at.half_angle;
+    const double width = std::clamp(2 * half, kNarrowest_px * px, kWidest_px * px);
+    std::vector<Column> columns;
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      const double off = half + kOff_px * px + width * static_cast<double>(i) / (kColumns - 1);
+      columns.push_back({seen.at.bearing + off, seen.at.range, kBesideLeft, true});
+      columns.push_back({seen.at.bearing - off, seen.at.range, kBesideRight, true});
+    }
+    ConsistencyCurves here;
+    compare(
+        trunk, seen, columns, all, views, kScalesBeside,
+        [&here](std::size_t kind, std::size_t k, double d) { here.add(kind, k, d); }, kOff_px);
+    curves.add(here);
+  }
+  double most = -std::numeric_limits<double>::infinity();
+  for (const std::size_t side : {kBesideLeft, kBesideRight})
+    if (const double by = curves.mean(side, 0) - curves.least(side, 1, kScalesBeside.size()); std::isfinite(by))
+      most = std::max(most, by);
+  return std::isfinite(most) ? most : 0;
 }
 
 std::optional<PhotoConsistency> consistencyOf(const ConsistencyCurves &curves)

@@ -87,6 +87,11 @@ std::optional<PhotoConsistency> consistencyOf(const ConsistencyCurves &curves);
 std::optional<PhotoConsistency> photoConsistency(const Trunk &trunk, const std::vector<ColumnView> &views,
                                                  double farthest);
 
+/// By how much what is beside the borders of \p trunk agrees better behind it, at twice its range and more, than at its
+/// range: beside the border where it does so more, in units of PhotoConsistency. Below 0 both strips lie in one surface
+/// with it. They begin three pixels off, so that the border itself is not in them. 0 where nothing can be compared.
+double freeBeside(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest);
+
 /// Logarithm of the range at which the columns inside \p trunk differ least between its views, over that where it
 /// stands. What they show is texture, which stands on the bark and turns away with it, and shade, which keeps to the
 /// outline as if it stood in the plane of the axis: both are tried, and weighed by how well they fit (by texture alone

@@ -103,9 +103,11 @@ void TrunkMap::record(const TrunkMeasurement &measurement)
 
 void TrunkMap::record(const PointCount &points)
 {
-  MapTrunk &trunk = at(points.id);
-  trunk.points_on += points.on;
-  trunk.points_behind += points.behind;
+  PointCount &sum = at(points.id).points;
+  sum.on += points.on;
+  sum.behind += points.behind;
+  sum.beside += points.beside;
+  sum.behind_beside += points.behind_beside;
 }
 
 void TrunkMap::record(const ConsistencyScore &odds)

@@ -74,6 +74,14 @@ struct MapOptions
   double radius_max = 0.95;        ///< thicker is no trunk [m]
 };
 
+/// Points of the scene at a trunk.
+struct PointCount
+{
+  int id = 0;
+  int on = 0, behind = 0;            ///< inside its borders: at its range, and beyond it
+  int beside = 0, behind_beside = 0; ///< just outside of them: at its range, and beyond it
+};
+
 /// Extremes of a bearing in the world.
 struct BearingSpread
 {
@@ -108,10 +116,10 @@ struct MapTrunk
   double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
   double foreground = 0;                               ///< mean of 1 - p(background) inside it
   int foreground_count = 0;
-  int points_on = 0, points_behind = 0; ///< points of the scene seen inside its borders, over all frames
-  double consistency_odds = 0;          ///< log-odds by the columns of the last frames,
-  int consistency_views = 0;            ///< and in how many of them it was compared
-  bool is_silhouette = false;           ///< the background was seen beside both its borders
+  PointCount points;                ///< over all frames
+  double consistency_odds = 0;      ///< log-odds by the columns of the last frames,
+  int consistency_views = 0;        ///< and in how many of them it was compared
+  bool is_silhouette = false;       ///< the background was seen beside both its borders
   std::optional<double> final_odds; ///< log-odds by all frames, where they were judged: see TrunkMap::applyDecisions()
   bool removed = false;             ///< out of the smoother
   bool inactive = false;            ///< a candidate that is not looked for any more
@@ -122,10 +130,13 @@ struct MapTrunk
   /// Covariance of the axis at the height \p z [m], the log radius and the lean.
   Matrix5d covarianceAt(double z) const;
   /// Points behind it for each point on its bark. 0 for up to 3 points behind it: a slipped track may cause as many.
-  double seeThroughRatio() const { return points_behind > 3 ? points_behind / (1.0 + points_on) : 0; }
+  double seeThroughRatio() const { return points.behind > 3 ? points.behind / (1.0 + points.on) : 0; }
+  /// Log-odds by the points beside it that it stands free and is no strip of a surface. The same points come again in
+  /// many frames, so that their number counts by its logarithm.
+  double pointsBeside() const { return std::log1p(points.behind_beside) - std::log1p(points.beside); }
   /// Whether points are seen through it in every second frame, as between two trunks: a track that slipped from the
   /// border of a dark trunk is seen behind it for some frames only.
-  bool isGap() const { return 2 * points_behind > hits + misses; }
+  bool isGap() const { return 2 * points.behind > hits + misses; }
 };
 
 /// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.
@@ -159,13 +170,6 @@ struct TrunkMeasurement
   bool is_flipped = false;          ///< borders of the other sign stand where it was expected
   double range = 0;                 ///< [m]
   std::optional<double> foreground; ///< mean of 1 - p(background) inside it
-};
-
-/// Points of the scene that one frame shows inside the borders of a trunk.
-struct PointCount
-{
-  int id = 0;
-  int on = 0, behind = 0; ///< at its range, and beyond it
 };
 
 /// Views compared before columns decide.

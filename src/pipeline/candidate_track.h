@@ -57,6 +57,7 @@ struct Hypothesis
   int id = 0; ///< in the map
   Trunk trunk;
   double online = 0;                      ///< log-odds by TrunkMap::evidence
+  double points_beside = 0;               ///< MapTrunk::pointsBeside()
   Matrix5d covariance = Matrix5d::Zero(); ///< of the place, given the poses: how far its borders are looked for
 };
 

@@ -41,6 +41,7 @@ public:
   const std::vector<ScoredHypothesis> &scored() const { return m_scored; }
 
 private:
+  std::optional<ScoredHypothesis> score(const Hypothesis &hypothesis, const std::vector<ColumnView> &views) const;
   std::vector<ScoredHypothesis> scoreAll(const std::vector<ColumnView> &views,
                                          const std::vector<ScoredHypothesis> &before = {}) const;
   template <typename Frames> std::vector<ColumnView> columnViews(const Frames &frames) const;

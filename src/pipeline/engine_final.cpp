@@ -10,6 +10,8 @@ namespace bole
 {
 namespace
 {
+constexpr double kLikely = -1.5; ///< log-odds above which a hypothesis is tracked again
+
 std::vector<int> idsOf(const std::vector<ScoredHypothesis> &scored, double least)
 {
   std::vector<int> ids;
@@ -19,17 +21,27 @@ std::vector<int> idsOf(const std::vector<ScoredHypothesis> &scored, double least
   return ids;
 }
 
-Hypothesis hypothesisOf(const ScoredHypothesis &one) { return {one.id, one.trunk, one.online}; }
+Hypothesis hypothesisOf(const ScoredHypothesis &one) { return {one.id, one.trunk, one.online, one.points_beside}; }
 
 bool isOf(const ScoredHypothesis &one, const Hypothesis &hypothesis)
 {
-  return one.id == hypothesis.id && one.trunk.minus(hypothesis.trunk).isZero(0) && one.online == hypothesis.online;
+  return one.id == hypothesis.id && one.trunk.minus(hypothesis.trunk).isZero(0) && one.online == hypothesis.online &&
+         one.points_beside == hypothesis.points_beside;
 }
 } // namespace
 
 Viewpoint Engine::viewpointOf(const Keyframe &frame) const
 {
   return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
+}
+
+/// Scores \p hypothesis against chance, and, where it is worth the work, against a strip of a surface.
+std::optional<ScoredHypothesis> Engine::score(const Hypothesis &hypothesis, const std::vector<ColumnView> &views) const
+{
+  auto scored = scoreHypothesis(hypothesis, views, farthestScored());
+  if (scored && scored->log_odds > kLikely)
+    weighAgainstSurface(*scored, views, farthestScored());
+  return scored;
 }
 
 /// Scores all hypotheses of the map. One that has not changed since \p before keeps its score from there.
@@ -40,10 +52,10 @@ std::vector<ScoredHypothesis> Engine::scoreAll(const std::vector<ColumnView> &vi
   for (const MapTrunk &trunk : m_map.trunks()) {
     if (trunk.observations < kLeastViews || trunk.reject_reason == RejectReason::unranged)
       continue;
-    const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk)};
+    const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk), trunk.pointsBeside()};
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const ScoredHypothesis &one) { return isOf(one, hypothesis); });
-    if (auto one = known != before.end() ? *known : scoreHypothesis(hypothesis, views, farthestScored())) {
+    if (auto one = known != before.end() ? *known : score(hypothesis, views)) {
       one->first_seen_s = trunk.first_seen_s;
       one->last_seen_s = trunk.last_seen_s;
       all.push_back(*one);
@@ -111,7 +123,7 @@ std::vector<Engine::RetrackedHypothesis> Engine::retrackLikely(const std::vector
     std::vector<CandidateTrack> followed = trackThroughKeyframes(hypotheses, map, gradients);
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       const auto refit =
-          scoreHypothesis({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online}, views, farthestScored());
+          score({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online, hypotheses[i].points_beside}, views);
       RetrackedHypothesis result;
       result.is_seen = !followed[i].views.empty();
       if (refit && followed[i].views.size() >= kLeastViews) {
@@ -201,8 +213,7 @@ bool Engine::isPlaced(const Eigen::Matrix2d &covariance) const
 /// which no two share a place or lines.
 void Engine::runFinalPass()
 {
-  constexpr double kLikely = -1.5; // log-odds above which a hypothesis is tracked again
-  constexpr double kHides = 0.5;   // log-odds above which a hypothesis may occlude a leaning trunk behind it
+  constexpr double kHides = 0.5; // log-odds above which a hypothesis may occlude a leaning trunk behind it
   const std::vector<ColumnView> views = columnViews(m_keyframes.frames());
   const std::vector<ScoredHypothesis> before = scoreAll(views);
   KeyframeGradients gradients(m_keyframes.frames(), m_units.gradient);

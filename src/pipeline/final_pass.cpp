@@ -68,8 +68,21 @@ std::optional<ScoredHypothesis> scoreHypothesis(const Hypothesis &hypothesis, co
 
 ScoredHypothesis scoreFrom(const PhotoConsistency &evidence, const Hypothesis &hypothesis)
 {
-  return {hypothesis.id, hypothesis.trunk, hypothesis.online, evidence,
-          oddsWeights().dot(oddsTerms(evidence, hypothesis.online))};
+  return {hypothesis.id,     hypothesis.trunk,
+          hypothesis.online, hypothesis.points_beside,
+          evidence,          oddsWeights().dot(oddsTerms(evidence, hypothesis.online))};
+}
+
+/// The weights were chosen on ten path-traced woods, 16 simulated ones (seeds 900001 to 900016), a path-traced street
+/// and a real one: of 236 right trunks 2 are lost, of 25 strips of walls and shops 7 stay.
+void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest)
+{
+  constexpr double kBias = 0.5; // log-odds where nothing beside it tells
+  constexpr double kBeside = 6; // of a unit of freeBeside()
+  constexpr double kMost = 1;   // units: one border alone does not decide
+  const double against =
+      kBias + scored.points_beside + kBeside * std::clamp(freeBeside(scored.trunk, views, farthest), -kMost, kMost);
+  scored.log_odds = -std::log(std::exp(-scored.log_odds) + std::exp(-against));
 }
 
 bool isBackgroundInside(const PhotoConsistency &evidence)
@@ -172,7 +185,8 @@ std::optional<BorderProposal> proposeBorders(const Hypothesis &hypothesis, const
   if (radius < borders->px || radius > radius_max)
     return std::nullopt;
   const Eigen::Vector2d leftwards = meanLineOfSight(trunk, views, farthest).unitOrthogonal();
-  Hypothesis guess{hypothesis.id, withBordersMoved(trunk, move, leftwards), hypothesis.online};
+  Hypothesis guess{hypothesis.id, withBordersMoved(trunk, move, leftwards), hypothesis.online,
+                   hypothesis.points_beside};
   guess.covariance.topLeftCorner<3, 3>() = covarianceByBorders({variance, variance}, leftwards, radius);
   return BorderProposal{guess, logOddsAgainst(trunk, *borders)};
 }
@@ -200,7 +214,8 @@ std::optional<Hypothesis> proposeRange(const Hypothesis &hypothesis, const std::
   if (!by_bark || std::abs(*by_bark) < kLeast || hypothesis.trunk.radius() * std::exp(*by_bark) > radius_max)
     return std::nullopt;
   const Eigen::Vector2d toward = meanLineOfSight(hypothesis.trunk, views, farthest);
-  Hypothesis guess{hypothesis.id, movedAlong(toward, hypothesis.trunk, *by_bark), hypothesis.online};
+  Hypothesis guess{hypothesis.id, movedAlong(toward, hypothesis.trunk, *by_bark), hypothesis.online,
+                   hypothesis.points_beside};
   Eigen::Vector3d along; // as the range grows by its logarithm
   along << toward, 1;
   guess.covariance.topLeftCorner<3, 3>() = kSigma * kSigma * along * along.transpose();

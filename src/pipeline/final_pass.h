@@ -60,7 +60,7 @@ struct ScoredHypothesis
 {
   int id = 0; ///< in the map
   Trunk trunk;
-  double online = 0;
+  double online = 0, points_beside = 0; ///< as of the Hypothesis
   PhotoConsistency evidence;
   double log_odds = 0; ///< that it is a trunk
   double first_seen_s = -std::numeric_limits<double>::infinity(),
@@ -77,7 +77,11 @@ OddsTerms oddsWeights();
 std::optional<ScoredHypothesis> scoreHypothesis(const Hypothesis &hypothesis, const std::vector<ColumnView> &views,
                                                 double farthest);
 
-/// The same from a photo-consistency that is known already.
+/// The log-odds of a trunk before a background, of which scoreHypothesis() told those against chance, now against a
+/// strip of a surface too: a window, the corner of a wall.
+void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest);
+
+/// The same as scoreHypothesis() from a photo-consistency that is known already.
 ScoredHypothesis scoreFrom(const PhotoConsistency &evidence, const Hypothesis &hypothesis);
 
 /// Whether the trunk continues beyond a border at its own range, so that the border is an edge of light and shade.

@@ -23,28 +23,38 @@ constexpr double kKnown = 0.25; ///< largest sigma of a point's inverse distance
 constexpr double kRangeSigma = 0.1; ///< of the range of the trunk, relative
 constexpr double kBehind = 2.5;     ///< sigmas behind the bark, or before it
 
-/// The part of the image that is surely inside a trunk.
-struct Inside
+// A strip beside a border begins beyond what slides along the border, and is as wide as the trunk, or as pixels that
+// hold a corner.
+constexpr double kGap_px = 3, kStrip_px = 10;
+constexpr double kFarther = 1.2;     ///< times the range of the trunk: behind it; what recedes like a wall is not
+constexpr double kKnownBeside = 0.1; ///< largest sigma of a point's inverse distance, as kKnown: half of kFarther
+
+/// The parts of the image that are surely inside a trunk, and beside it.
+struct Parts
 {
-  double half_angle = 0;
+  double half_angle = 0, strip_begin = 0, strip_end = 0; ///< [rad] from its axis
+  double range = 0;                                      ///< [m]
   ElevationRange part;
   double bark = 0; ///< inverse distance of the bark [1/m]
 };
 
-std::optional<Inside> insideOf(const MapTrunk &trunk, const Viewpoint &view, const StageOptions &options)
+std::optional<Parts> partsOf(const MapTrunk &trunk, const Viewpoint &view, const StageOptions &options)
 {
   const HorizontalView seen = horizontalView(view.wMc, trunk.trunk);
   const double radius = trunk.trunk.radius();
   const RelativeTrunk relative = relativeTrunk(view.wMc, Pose(), trunk.trunk);
-  if (seen.range > options.map.through_range || seen.range < radius + kNotInside || !relative.isFinite())
+  if (seen.range > options.flow.track_range || seen.range < radius + kNotInside || !relative.isFinite())
     return std::nullopt;
-  Inside inside;
-  inside.half_angle = std::min(kInside * seen.half_angle, seen.half_angle - kBorder_px / view.camera.fx);
-  if (inside.half_angle <= 0)
-    return std::nullopt;
-  inside.part = elevationOf(relative, trunk.trunk, view, options);
-  inside.bark = 1 / (seen.range - radius);
-  return inside;
+  Parts parts;
+  parts.half_angle = seen.range > options.map.through_range
+                         ? 0
+                         : std::min(kInside * seen.half_angle, seen.half_angle - kBorder_px / view.camera.fx);
+  parts.strip_begin = seen.half_angle + kGap_px / view.camera.fx;
+  parts.strip_end = parts.strip_begin + std::max(2 * seen.half_angle, kStrip_px / view.camera.fx);
+  parts.range = seen.range;
+  parts.part = elevationOf(relative, trunk.trunk, view, options);
+  parts.bark = 1 / (seen.range - radius);
+  return parts;
 }
 } // namespace
 
@@ -87,23 +97,30 @@ std::vector<PointCount> countPoints(const std::vector<TriangulatedRay> &points, 
     return counts;
   for (const std::size_t i : map.active()) {
     const MapTrunk &trunk = map.trunks()[i];
-    const std::optional<Inside> inside = insideOf(trunk, view, options);
-    if (!inside)
+    const std::optional<Parts> parts = partsOf(trunk, view, options);
+    if (!parts)
       continue;
-    const double range = horizontalView(view.wMc, trunk.trunk).range;
-    PointCount count{trunk.id, 0, 0};
+    PointCount count;
+    count.id = trunk.id;
     for (const TriangulatedRay &point : points) {
       const double level = point.ray.head<2>().norm(), slope = point.ray.z() / level;
-      if (slope < inside->part.low || slope > inside->part.high || point.sigma > kKnown * inside->bark * level)
+      const double inverse = point.inverse_distance / level, sigma = point.sigma / level;
+      if (slope < parts->part.low || slope > parts->part.high)
         continue;
-      const Eigen::Vector2d w = trunk.trunk.axisAt(view.wMc.t.z() + slope * range).head<2>() - view.wMc.t.head<2>();
-      const double apart = std::atan2(point.ray.y(), point.ray.x()) - std::atan2(w.y(), w.x());
-      if (std::abs(std::remainder(apart, 2 * M_PI)) > inside->half_angle)
-        continue;
-      const double beyond =
-          (inside->bark - point.inverse_distance / level) / std::hypot(point.sigma / level, kRangeSigma * inside->bark);
-      count.behind += beyond > kBehind;
-      count.on += std::abs(beyond) <= kBehind; // else before it: leaves, another trunk
+      const Eigen::Vector2d w =
+          trunk.trunk.axisAt(view.wMc.t.z() + slope * parts->range).head<2>() - view.wMc.t.head<2>();
+      const double apart =
+          std::abs(std::remainder(std::atan2(point.ray.y(), point.ray.x()) - std::atan2(w.y(), w.x()), 2 * M_PI));
+      if (apart <= parts->half_angle && sigma <= kKnown * parts->bark) {
+        const double beyond = (parts->bark - inverse) / std::hypot(sigma, kRangeSigma * parts->bark);
+        count.behind += beyond > kBehind;
+        count.on += std::abs(beyond) <= kBehind; // else before it: leaves, another trunk
+      }
+      if (apart > parts->strip_begin && apart < parts->strip_end && sigma * parts->range < kKnownBeside) {
+        const double nearness = inverse * parts->range;
+        count.behind_beside += nearness < 1 / kFarther;
+        count.beside += nearness >= 1 / kFarther && nearness <= kFarther;
+      }
     }
     counts.push_back(count);
   }

@@ -14,7 +14,7 @@ namespace bole
 std::vector<TriangulatedRay> triangulate(const PointTracker &tracker, const std::vector<Pose> &wMc,
                                          const PinholeCamera &camera);
 
-/// Points inside the borders of each active trunk within \p through_range [m], on its bark or behind it.
+/// Points inside the borders of each active trunk and just beside them, at its range or behind it.
 std::vector<PointCount> countPoints(const std::vector<TriangulatedRay> &points, const TrunkMap &map,
                                     const Viewpoint &view, const StageOptions &options);
 } // namespace bole

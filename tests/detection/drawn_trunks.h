@@ -108,6 +108,17 @@ inline std::vector<DrawnTrunk> wall()
   return trunks;
 }
 
+/// A facade that is 4 m ahead, a strip of which looks like \p strip.
+inline std::vector<DrawnTrunk> facadeAround(const DrawnTrunk &strip)
+{
+  constexpr double kHalf = 0.05;
+  std::vector<DrawnTrunk> all{strip};
+  for (int i = -40; i <= 40; ++i)
+    if (const double y = 2 * kHalf * i; std::abs(y - strip.y) > strip.radius + kHalf)
+      all.push_back({strip.x, y, 1.05 * kHalf, 120.0 + (i * 73 + 4000) % 100});
+  return all;
+}
+
 /// A trunk ahead with stripes of bark, those left of \p shadow [m, from its axis] in the sun.
 inline std::vector<DrawnTrunk> barkOf(const DrawnTrunk &trunk, double shadow)
 {

@@ -136,6 +136,16 @@ TEST(PhotoConsistency, BesideAnEdgeOfShadowTheTrunkGoesOn)
 }
 
 /// Taken view by view it is what it is taken at once; what was seen long ago fades.
+TEST(PhotoConsistency, BesideATrunkTheBackgroundAgreesAndBesideAStripOfAFacadeTheFacade)
+{
+  const DrawnTrunk one{4, 0.4, 0.15, 40};
+  const LevelFlight before_a_wall({one}, sweep()), in_a_facade(facadeAround(one), sweep());
+  EXPECT_GT(freeBeside(trunkOf(one), before_a_wall.views(), kFarthest), 0.3);
+  EXPECT_LT(freeBeside(trunkOf(one), in_a_facade.views(), kFarthest), -0.3);
+  const LevelFlight resting({one}, std::vector<Pose>(18, lookingAhead(0, 0)));
+  EXPECT_EQ(freeBeside(trunkOf(one), resting.views(), kFarthest), 0);
+}
+
 TEST(PhotoConsistency, ViewByViewItIsTheSame)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};

@@ -377,10 +377,10 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
   EXPECT_GT(after([](MapTrunk &t) { t.contrast *= 2; }), odds);
   EXPECT_GT(after([](MapTrunk &t) { t.innovation2 /= 2; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.misses += 5; }), odds);
-  EXPECT_EQ(after([](MapTrunk &t) { t.points_behind = 3; }), odds); // a slipped track or two
-  EXPECT_LT(after([](MapTrunk &t) { t.points_behind = 10; }), odds - 1);
-  EXPECT_GT(after([](MapTrunk &t) { t.points_behind = t.points_on = 10; }),
-            after([](MapTrunk &t) { t.points_behind = 10; }) + 0.5);
+  EXPECT_EQ(after([](MapTrunk &t) { t.points.behind = 3; }), odds); // a slipped track or two
+  EXPECT_LT(after([](MapTrunk &t) { t.points.behind = 10; }), odds - 1);
+  EXPECT_GT(after([](MapTrunk &t) { t.points.behind = t.points.on = 10; }),
+            after([](MapTrunk &t) { t.points.behind = 10; }) + 0.5);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius += 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.trunk.log_radius -= 1; }), odds);
   EXPECT_LT(after([](MapTrunk &t) { t.place_covariance *= 9; }), odds);
@@ -634,8 +634,8 @@ TEST_F(Life, ATrunkSeenLongIsNoGapForATrackThatSlipped)
   for (int frame = 0; frame < 100; ++frame) {
     see(trunk, 1);
     see(gap, 1);
-    m_map.record(PointCount{trunk, 0, frame < 10 ? 1 : 0});
-    m_map.record(PointCount{gap, 0, frame % 3 > 0 ? 1 : 0});
+    m_map.record(PointCount{trunk, 0, frame < 10 ? 1 : 0, 0, 0});
+    m_map.record(PointCount{gap, 0, frame % 3 > 0 ? 1 : 0, 0, 0});
   }
   EXPECT_GT(at(trunk).seeThroughRatio(), 4);
   EXPECT_FALSE(at(trunk).isGap());

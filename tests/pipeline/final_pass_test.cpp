@@ -74,6 +74,23 @@ TEST(FinalPass, TwoReadingsOfTheSameColumnsAtTwoRangesAreOne)
               testing::ElementsAre(1, 2));
 }
 
+TEST(FinalPass, AStripOfAFacadeIsNoTrunkHoweverClearItsBordersAre)
+{
+  constexpr double kFarthest = 14;
+  const test::DrawnTrunk one{4, 0.4, 0.15, 40};
+  const auto weighed = [&](const test::LevelFlight &flight, double points_beside) {
+    ScoredHypothesis scored = judgedAt(1, test::trunkOf(one), 4);
+    scored.points_beside = points_beside;
+    weighAgainstSurface(scored, flight.views(), kFarthest);
+    return scored.log_odds;
+  };
+  const test::LevelFlight free({one}, test::sweep()), facade(test::facadeAround(one), test::sweep());
+  EXPECT_GT(weighed(free, 0), 2);
+  EXPECT_LT(weighed(facade, 0), 0);
+  EXPECT_LT(weighed(free, -8), 0);  // points beside it lie at its range,
+  EXPECT_GT(weighed(facade, 6), 0); // or behind it
+}
+
 /// Only the lit part of a trunk is read.
 TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
 {

@@ -181,8 +181,9 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
   EXPECT_FALSE(post->removed);
   EXPECT_GT(slot->seeThroughRatio(), 2);
   EXPECT_TRUE(slot->isGap());
-  EXPECT_GT(post->points_on, 0);
+  EXPECT_GT(post->points.on, 0);
   EXPECT_EQ(post->seeThroughRatio(), 0);
+  EXPECT_GT(post->pointsBeside(), 1);
 }
 } // namespace
 } // namespace bole
