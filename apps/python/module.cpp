@@ -65,8 +65,6 @@ vpImage<unsigned char> imageFrom(const py::object &given)
   if (array.ndim() != 2)
     throw py::value_error(
         fmt::format("image has the shape {}, must be (height, width): a grey one", text(array.attr("shape"))));
-  if (array.size() == 0)
-    throw py::value_error(fmt::format("image has the shape {}, must have pixels", text(array.attr("shape"))));
   const auto rows = py::array_t<unsigned char, py::array::c_style>::ensure(array);
   vpImage<unsigned char> image(static_cast<unsigned>(rows.shape(0)), static_cast<unsigned>(rows.shape(1)));
   std::copy(rows.data(), rows.data() + rows.size(), image.bitmap);

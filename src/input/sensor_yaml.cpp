@@ -39,7 +39,8 @@ bool appendNumbers(const YAML::Node &node, std::vector<double> &numbers)
     const auto side = [&](const char *key) { return parseNumber<double>(node[key].as<std::string>("")).value_or(0); };
     const std::size_t before = numbers.size();
     const bool are_numbers = appendNumbers(node["data"], numbers);
-    return are_numbers && (!node["rows"] || side("rows") * side("cols") == static_cast<double>(numbers.size() - before));
+    return are_numbers &&
+           (!node["rows"] || side("rows") * side("cols") == static_cast<double>(numbers.size() - before));
   }
   if (node.IsSequence())
     return std::all_of(node.begin(), node.end(), [&](const auto &entry) { return appendNumbers(entry, numbers); });

@@ -88,7 +88,7 @@ Trajectory readAslTrajectory(const std::string &path)
   Trajectory trajectory;
   CsvReader csv(path, {8});
   while (csv.next()) {
-    if (!csv.header().empty() && csv.header()[0] == "%time")
+    if (csv.columns() != 8 && !csv.header().empty() && csv.header()[0] == "%time")
       csv.fail("the columns are those of `rostopic echo -p`, must be stamp [ns],x,y,z,qw,qx,qy,qz");
     if (csv.text(0).find('.') != std::string::npos)
       csv.fail(fmt::format("timestamp = {} looks like seconds: between commas the columns must be stamp "

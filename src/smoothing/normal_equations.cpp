@@ -8,19 +8,31 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 namespace bole
 {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-NormalEquations::NormalEquations(const std::vector<int> &dims)
-    : m_dims(dims), m_offset(dims.size()), m_columns(dims.size()), m_node_of(dims.size()), m_row(dims.size())
+NormalEquations::NormalEquations(const std::vector<int> &dims) { reset(dims); }
+
+void NormalEquations::reset(const std::vector<int> &dims)
 {
+  constexpr std::size_t kUsual = 24; // blocks of a column: what a pose sees
+  m_dims = dims;
+  m_offset.resize(dims.size());
+  m_columns.resize(std::max(m_columns.size(), dims.size()));
+  m_node_of.resize(dims.size());
+  m_row.resize(dims.size());
+  m_values.clear();
+  m_node_count = 0;
   int at = 0;
   for (std::size_t v = 0; v < dims.size(); ++v) {
     m_offset[v] = at;
     at += dims[v];
+    m_columns[v].clear();
+    m_columns[v].reserve(kUsual);
     find(static_cast<int>(v), static_cast<int>(v));
   }
   m_g.setZero(at);
@@ -79,47 +91,42 @@ std::vector<int> NormalEquations::orderOfLittleFill() const
   return {place.indices().data(), place.indices().data() + n};
 }
 
-/// The later neighbours of each place in the order, as places; \p children: how many.
-std::vector<std::vector<int>> NormalEquations::eliminationStructure(const std::vector<int> &order, int together,
-                                                                    std::vector<int> &children) const
+/// Fills m_later: the later neighbours of each place in the order, as places; \p children: how many.
+void NormalEquations::eliminationStructure(const std::vector<int> &order, int together, std::vector<int> &children)
 {
   const int n = static_cast<int>(order.size());
   std::vector<int> place(order.size());
   for (int p = 0; p < n; ++p)
     place[order[p]] = p;
-  std::vector<std::vector<int>> later(order.size()), below(order.size());
+  m_later.resize(std::max(m_later.size(), order.size()));
+  for (int p = 0; p < n; ++p)
+    m_later[p].clear();
   for (int column = 0; column < n; ++column)
     for (const Block &block : m_columns[column])
       if (block.row != column)
-        later[std::min(place[column], place[block.row])].push_back(std::max(place[column], place[block.row]));
+        m_later[std::min(place[column], place[block.row])].push_back(std::max(place[column], place[block.row]));
   children.assign(order.size(), 0);
-  std::vector<int> seen(order.size(), -1);
+  std::vector<int> seen(order.size(), -1), first_below(order.size(), -1), next_below(order.size(), -1);
   for (int p = 0; p < n; ++p) {
-    std::vector<int> all;
-    const auto take = [&](const std::vector<int> &list) {
-      for (const int q : list)
-        if (q > p && seen[q] != p) {
-          seen[q] = p;
-          all.push_back(q);
-        }
-    };
+    std::vector<int> &later = m_later[p];
     if (p >= n - together) {
-      all.resize(static_cast<std::size_t>(n - p - 1));
-      std::iota(all.begin(), all.end(), p + 1);
+      later.resize(static_cast<std::size_t>(n - p - 1));
+      std::iota(later.begin(), later.end(), p + 1);
     }
     else {
-      take(later[p]);
-      for (const int child : below[p])
-        take(later[child]);
-      std::sort(all.begin(), all.end());
+      for (const int q : later)
+        seen[q] = p;
+      for (int child = first_below[p]; child >= 0; child = next_below[child])
+        for (const int q : m_later[child])
+          if (q > p && std::exchange(seen[q], p) != p)
+            later.push_back(q);
+      std::sort(later.begin(), later.end());
     }
-    later[p] = std::move(all);
-    if (!later[p].empty()) {
-      below[later[p].front()].push_back(p);
-      ++children[later[p].front()];
+    if (!later.empty()) {
+      next_below[p] = std::exchange(first_below[later.front()], p);
+      ++children[later.front()];
     }
   }
-  return later;
 }
 
 void NormalEquations::plan(const std::vector<int> &order, int together)
@@ -127,8 +134,9 @@ void NormalEquations::plan(const std::vector<int> &order, int together)
   constexpr std::size_t kChain = 5; // variables of a chain that are one node: some zeros cost less than a front each
   const int n = static_cast<int>(order.size());
   std::vector<int> children, place(order.size()), node_at(order.size());
-  const std::vector<std::vector<int>> later = eliminationStructure(order, together, children);
-  m_nodes.clear();
+  eliminationStructure(order, together, children);
+  const std::vector<std::vector<int>> &later = m_later;
+  m_node_count = 0;
   for (int p = 0; p < n; ++p) {
     place[order[p]] = p;
     const int before = p == 0 ? -1 : node_at[p - 1];
@@ -141,12 +149,11 @@ void NormalEquations::plan(const std::vector<int> &order, int together)
       node_at[p] = before;
     }
     else {
-      node_at[p] = static_cast<int>(m_nodes.size());
-      m_nodes.emplace_back();
-      m_nodes.back().variables.push_back(p);
+      node_at[p] = static_cast<int>(m_node_count);
+      newNode().variables.push_back(p);
     }
   }
-  for (std::size_t k = 0; k < m_nodes.size(); ++k) {
+  for (std::size_t k = 0; k < m_node_count; ++k) {
     Node &node = m_nodes[k];
     node.eliminated = node.variables.size();
     const std::vector<int> &neighbours = later[node.variables.back()];
@@ -170,6 +177,20 @@ void NormalEquations::plan(const std::vector<int> &order, int together)
       const int first = is_transposed ? block.row : column, second = is_transposed ? column : block.row;
       m_nodes[m_node_of[first]].own.push_back({first, second, block.at, is_transposed});
     }
+}
+
+/// Takes the memory of one that was planned before.
+NormalEquations::Node &NormalEquations::newNode()
+{
+  if (m_node_count == m_nodes.size())
+    m_nodes.emplace_back();
+  Node &node = m_nodes[m_node_count++];
+  node.variables.clear();
+  node.children.clear();
+  node.own.clear();
+  node.parent = -1;
+  node.columns = node.rows = 0;
+  return node;
 }
 
 /// Notes where each variable stands in the front.
@@ -198,7 +219,7 @@ void NormalEquations::assembleChild(Node &child, int ld)
     for (int r = c; r <= m; ++r)
       column[m_map[r]] += *from++;
   }
-  std::vector<double>().swap(child.contribution);
+  m_spare.push_back(std::move(child.contribution));
 }
 
 void NormalEquations::assemble(const Node &node, double damping)
@@ -230,12 +251,17 @@ void NormalEquations::assemble(const Node &node, double damping)
 int NormalEquations::factorise(double damping)
 {
   int held = 0;
-  for (Node &node : m_nodes) {
+  for (std::size_t k = 0; k < m_node_count; ++k) {
+    Node &node = m_nodes[k];
     assemble(node, damping);
     const int ld = node.rows + 1;
     held += factorFront(m_front.data(), ld, node.columns);
     node.panel.assign(m_front.begin(), m_front.begin() + static_cast<std::ptrdiff_t>(ld) * node.columns);
     const int m = node.rows - node.columns;
+    if (!m_spare.empty()) {
+      node.contribution = std::move(m_spare.back());
+      m_spare.pop_back();
+    }
     node.contribution.resize(static_cast<std::size_t>(m) * static_cast<std::size_t>(m + 3) / 2);
     double *to = node.contribution.data();
     for (int c = node.columns; c < node.rows; ++c) {
@@ -248,28 +274,28 @@ int NormalEquations::factorise(double damping)
 
 void NormalEquations::schur(MatrixXd &H, VectorXd &g)
 {
-  Node root = std::move(m_nodes.back());
-  m_nodes.pop_back();
+  const Node &root = m_nodes[--m_node_count];
   factorise();
+  ++m_node_count;
   assemble(root, 0);
   const Eigen::Map<const MatrixXd> F(m_front.data(), root.rows + 1, root.rows);
   H = F.topRows(root.rows).selfadjointView<Eigen::Lower>();
   g = F.bottomRows<1>().transpose();
-  m_nodes.push_back(std::move(root));
 }
 
 double NormalEquations::decrease() const
 {
   double sum = 0;
-  for (const Node &node : m_nodes)
-    sum += 0.5 * panelOf(node).bottomRows<1>().squaredNorm();
+  for (std::size_t k = 0; k < m_node_count; ++k)
+    sum += 0.5 * panelOf(m_nodes[k]).bottomRows<1>().squaredNorm();
   return sum;
 }
 
 VectorXd NormalEquations::solve() const
 {
   VectorXd x = VectorXd::Zero(m_g.size()), later;
-  for (auto node = m_nodes.rbegin(); node != m_nodes.rend(); ++node) {
+  for (std::size_t k = m_node_count; k-- > 0;) {
+    const Node *node = &m_nodes[k];
     const int c = node->columns, m = node->rows - c;
     later.resize(m);
     int row = 0;
@@ -296,10 +322,10 @@ VectorXd NormalEquations::solve() const
 /// node above, the cross covariance is -S Z and the node's own (L_vv L_vv^T)^-1 + Z^T S Z.
 void NormalEquations::sparseInverse(const std::function<void(const std::vector<int> &, const MatrixXd &)> &use) const
 {
-  std::vector<MatrixXd> inverse(m_nodes.size());
-  std::vector<std::size_t> pending(m_nodes.size());
+  std::vector<MatrixXd> inverse(m_node_count);
+  std::vector<std::size_t> pending(m_node_count);
   std::vector<int> row(m_dims.size()), map;
-  for (std::size_t k = m_nodes.size(); k-- > 0;) {
+  for (std::size_t k = m_node_count; k-- > 0;) {
     const Node &node = m_nodes[k];
     const int c = node.columns, m = node.rows - c;
     MatrixXd &C = inverse[k];
@@ -337,22 +363,25 @@ void NormalEquations::sparseInverse(const std::function<void(const std::vector<i
 }
 
 /// |L^-1 X^T|^2, which is zero outside the paths from the variables to the roots.
-MatrixXd NormalEquations::covariance(const std::vector<std::pair<int, MatrixXd>> &X) const
+MatrixXd NormalEquations::covariance(std::initializer_list<Form> X) const
 {
-  const Eigen::Index count = X.front().second.rows();
-  MatrixXd b = MatrixXd::Zero(m_g.size(), count), form = MatrixXd::Zero(count, count), own;
-  std::vector<int> path;
-  for (const auto &[variable, columns] : X) {
-    b.middleRows(m_offset[variable], m_dims[variable]) += columns.transpose();
-    for (int k = m_node_of[variable]; k >= 0; k = m_nodes[k].parent)
-      path.push_back(k);
+  const Eigen::Index count = X.begin()->columns.rows();
+  MatrixXd form = MatrixXd::Zero(count, count);
+  m_work.assign(static_cast<std::size_t>(m_g.size() * count), 0.0);
+  Eigen::Map<MatrixXd> b(m_work.data(), m_g.size(), count);
+  m_path.clear();
+  for (const Form &one : X) {
+    b.middleRows(m_offset[one.variable], m_dims[one.variable]) += one.columns.transpose();
+    for (int k = m_node_of[one.variable]; k >= 0; k = m_nodes[k].parent)
+      m_path.push_back(k);
   }
-  std::sort(path.begin(), path.end());
-  path.erase(std::unique(path.begin(), path.end()), path.end());
-  for (const int k : path) {
+  std::sort(m_path.begin(), m_path.end());
+  m_path.erase(std::unique(m_path.begin(), m_path.end()), m_path.end());
+  for (const int k : m_path) {
     const Node &node = m_nodes[k];
     const Panel L = panelOf(node);
-    own.resize(node.columns, count);
+    m_own.resize(static_cast<std::size_t>(node.columns * count));
+    Eigen::Map<MatrixXd> own(m_own.data(), node.columns, count);
     int row = 0;
     for (std::size_t i = 0; i < node.variables.size(); ++i) {
       const int v = node.variables[i], d = m_dims[v];

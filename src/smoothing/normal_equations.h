@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include <functional>
-#include <utility>
+#include <initializer_list>
 #include <vector>
 
 namespace bole
@@ -21,6 +21,8 @@ public:
   /// \p dims: of the variables.
   explicit NormalEquations(const std::vector<int> &dims);
 
+  /// Begins anew with other variables, in the same memory.
+  void reset(const std::vector<int> &dims);
   /// Forgets the numbers; which variables are coupled stays.
   void clear();
   /// Adds a factor of residual \p r and Jacobian \p J on variable \p a.
@@ -65,8 +67,13 @@ public:
   /// The covariance of each node with its later neighbours, \p use(variables, covariance): all that are coupled by a
   /// factor stand together in one of them.
   void sparseInverse(const std::function<void(const std::vector<int> &, const Eigen::MatrixXd &)> &use) const;
-  /// X H^-1 X^T, where X is zero but for the columns of the variables given.
-  Eigen::MatrixXd covariance(const std::vector<std::pair<int, Eigen::MatrixXd>> &X) const;
+  struct Form ///< the columns of one variable in a matrix
+  {
+    int variable;
+    Eigen::Ref<const Eigen::MatrixXd> columns;
+  };
+  /// X H^-1 X^T, where X is zero but for the columns of the variables given. In a work space of its own.
+  Eigen::MatrixXd covariance(std::initializer_list<Form> X) const;
 
   int dim(int variable) const { return m_dims[variable]; }
   int offset(int variable) const { return m_offset[variable]; }
@@ -100,10 +107,10 @@ private:
     const std::size_t at = find(row, column); // may move the values
     return Eigen::Map<Eigen::Matrix<double, Rows, Columns>>(m_values.data() + at);
   }
-  std::vector<std::vector<int>> eliminationStructure(const std::vector<int> &order, int together,
-                                                     std::vector<int> &children) const;
+  void eliminationStructure(const std::vector<int> &order, int together, std::vector<int> &children);
   void assemble(const Node &node, double damping);
   void assembleChild(Node &child, int ld);
+  Node &newNode();
   int rowsOf(const Node &node);
   Panel panelOf(const Node &node) const { return {node.panel.data(), node.rows + 1, node.columns}; }
 
@@ -111,9 +118,14 @@ private:
   std::vector<std::vector<Block>> m_columns; ///< the diagonal block first
   std::vector<double> m_values;
   Eigen::VectorXd m_g;
-  std::vector<Node> m_nodes; ///< each after those below it
+  std::vector<Node> m_nodes;                ///< each after those below it,
+  std::size_t m_node_count = 0;             ///< of which so many are planned
+  std::vector<std::vector<double>> m_spare; ///< memory of contributions that were taken in
   std::vector<int> m_node_of;
-  std::vector<int> m_row, m_map; ///< of a variable in the front; of a child's rows
+  std::vector<std::vector<int>> m_later; ///< work space of plan()
+  std::vector<int> m_row, m_map;         ///< of a variable in the front; of a child's rows
   std::vector<double> m_front;
+  mutable std::vector<double> m_work, m_own;
+  mutable std::vector<int> m_path;
 };
 } // namespace bole

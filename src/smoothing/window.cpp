@@ -31,7 +31,10 @@ void Smoother::State::placeWindow()
   for (std::size_t j = 0; j < trunks.size(); ++j)
     if (isInWindow(trunks[j]))
       window_places.take({false, j}, trunks.size());
-  window.emplace(window_places.dims);
+  if (window)
+    window->reset(window_places.dims);
+  else
+    window.emplace(window_places.dims);
 }
 
 double Smoother::State::addWindow(NormalEquations *system) const

@@ -211,7 +211,7 @@ std::vector<Fault> options()
       option("--set trunks.radius=1e30", "must be a number in [0.001, 10]"),
       option("--set detection.window=1e9", "must be a whole number in [4, 100]"),
       option("--set trunks.radius_min=3", "must be a number in [0.005, trunks.radius_max = 0.6]"),
-      option("--config /dev/zero", "no such file"),
+      option("--config /dev/zero", "is a pipe, socket or device"),
       option("--camera /none.yaml", "no such file"),
   };
 }

@@ -229,7 +229,7 @@ TEST_F(CameraFile, AFisheyeIsReadAsOne)
 TEST_F(CameraFile, AMatrixThatIsNoneIsRefusedInALine)
 {
   for (const char *k : {"[200, 0, 160, 0, 200, 120, 3, 0, 5]", "[200, 0, 160, 7, 200, 120, 0, 0, 1]",
-                        "[200, 9, 160, 0, 200, 120, 0, 0, 1]", "[200, 200, 160, 120]"}) {
+                        "[200, 9, 160, 0, 200, 120, 0, 0, 1]"}) {
     const std::string message = messageOf([&] {
       readCamera(write("c.yml", "image_width: 320\nimage_height: 240\ncamera_matrix: !!opencv-matrix\n   rows: 3\n"
                                 "   cols: 3\n   dt: d\n   data: " +
@@ -238,6 +238,11 @@ TEST_F(CameraFile, AMatrixThatIsNoneIsRefusedInALine)
     EXPECT_THAT(message, HasSubstr("must be fx 0 cx, 0 fy cy, 0 0 1")) << k;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
+  EXPECT_THAT(messageOf([&] {
+                readCamera(write("c.yml", "image_width: 320\nimage_height: 240\ncamera_matrix: !!opencv-matrix\n"
+                                          "   rows: 3\n   cols: 3\n   dt: d\n   data: [200, 200, 160, 120]\n"));
+              }),
+              HasSubstr("c.yml:3: camera_matrix"));
 }
 
 TEST_F(CameraFile, OtherFormsAreToldWhichAreRead)

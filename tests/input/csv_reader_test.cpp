@@ -73,6 +73,11 @@ TEST_F(Tables, HaveOneHeaderAtMostAndNoRowIsTakenForIt)
   const char *const row = "0,0,0,1,1,0,0,0\n";
   EXPECT_EQ(refusal(std::string("time,x,y,z,qw,qx,qy,qz\n") + row), "");
   EXPECT_EQ(refusal(std::string("%time,field.x,y,z,qw,qx,qy,qz\n") + row), "");
+  EXPECT_THAT(
+      refusal("%time,field.header.seq,field.header.frame_id,field.x,y,z,qw,qx,qy,qz\n0,0,world,0,0,1,1,0,0,0\n"),
+      HasSubstr("table.csv:2: the columns are those of `rostopic echo -p`"));
+  EXPECT_THAT(refusal("0.0,0,0,1,1,0,0,0\n0.1,0,0,1,1,0,0,0\n"),
+              HasSubstr("table.csv:1: timestamp = 0.0 looks like seconds"));
   EXPECT_THAT(refusal(std::string("O,0,0,1,1,0,0,0\n") + row), HasSubstr("table.csv:1: timestamp = \"O\""));
   EXPECT_THAT(refusal(std::string("t,x,y,z,qw,qx,qy,qz\nt,x,y,z,qw,qx,qy,qz\n") + row),
               HasSubstr("table.csv:2: timestamp = \"t\""));
