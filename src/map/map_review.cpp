@@ -276,7 +276,7 @@ void TrunkMap::closeLoops(MapUpdate &update, double now_s)
     earlier.clear();
     for (const MapTrunk *trunk : out_of_sight)
       if (trunk->last_seen_s < seen.front()->first_seen_s)
-        earlier.push_back(recordOf(*trunk, 0, kBreastHeight));
+        earlier.push_back(recordOf(*trunk, 0, 0, kBreastHeight));
     if (earlier.size() < kLeast)
       seen.erase(seen.begin());
   }
@@ -284,7 +284,7 @@ void TrunkMap::closeLoops(MapUpdate &update, double now_s)
     return;
   std::vector<TrunkRecord> now;
   for (const MapTrunk *trunk : seen)
-    now.push_back(recordOf(*trunk, 0, kBreastHeight));
+    now.push_back(recordOf(*trunk, 0, 0, kBreastHeight));
   const auto placement = placeOnMap(now, earlier);
   if (!placement || std::abs(placement->yaw) > kMostTurn)
     return;

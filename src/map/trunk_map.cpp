@@ -196,9 +196,12 @@ TrunkStatus TrunkMap::statusOf(const MapTrunk &trunk, bool has_ranges) const
   return is_placed ? TrunkStatus::confirmed : TrunkStatus::candidate;
 }
 
-TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double breast_z, bool has_ranges) const
+TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double ground_z, double breast_height,
+                               bool has_ranges) const
 {
   TrunkRecord record;
+  const double breast_z = ground_z + breast_height;
+  record.ground_z = ground_z;
   record.id = trunk.id;
   record.xy = trunk.trunk.axisAt(breast_z).head<2>();
   record.radius = trunk.trunk.radius();
@@ -215,11 +218,11 @@ TrunkRecord TrunkMap::recordOf(const MapTrunk &trunk, double log_odds, double br
   return record;
 }
 
-std::vector<TrunkRecord> TrunkMap::records(double breast_z, bool has_ranges) const
+std::vector<TrunkRecord> TrunkMap::records(const GroundZ &ground_z, double breast_height, bool has_ranges) const
 {
   std::vector<TrunkRecord> records;
   for (const MapTrunk &trunk : m_trunks)
-    records.push_back(recordOf(trunk, logOdds(trunk), breast_z, has_ranges));
+    records.push_back(recordOf(trunk, logOdds(trunk), ground_z(trunk.trunk.xy), breast_height, has_ranges));
   for (const ArchivedTrunk &gone : m_archive) {
     MapTrunk trunk;
     trunk.id = gone.id;
@@ -236,7 +239,7 @@ std::vector<TrunkRecord> TrunkMap::records(double breast_z, bool has_ranges) con
     trunk.first_seen_s = gone.first_seen_s;
     trunk.last_seen_s = gone.last_seen_s;
     trunk.removed = true;
-    records.push_back(recordOf(trunk, gone.log_odds, breast_z));
+    records.push_back(recordOf(trunk, gone.log_odds, ground_z(trunk.trunk.xy), breast_height));
   }
   std::sort(records.begin(), records.end(), [](const TrunkRecord &a, const TrunkRecord &b) { return a.id < b.id; });
   return records;

@@ -22,6 +22,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -32,6 +33,9 @@ constexpr double kSigmaOfWoods = 0.7;
 
 /// Of the axes of two trunks at breast height [m].
 double distanceBetween(const Trunk &a, const Trunk &b);
+
+/// Height of the ground in the world at a place [m].
+using GroundZ = std::function<double(const Eigen::Vector2d &)>;
 
 /// Which hypotheses the map keeps whole; of the others it keeps a record.
 enum class Memory
@@ -313,14 +317,17 @@ public:
   /// As users get it: one that was confirmed and is out of sight is confirmed, one whose place is known less well than
   /// is asked for a candidate. \p has_ranges: false while the camera has only rotated, so that no place is known.
   TrunkStatus statusOf(const MapTrunk &trunk, bool has_ranges = true) const;
-  /// \p breast_z: breast height in the world, where places are told [m].
-  std::vector<TrunkRecord> records(double breast_z = kBreastHeight, bool has_ranges = true) const;
+  /// \p ground_z of a place [m]; \p breast_height over it, where places are told [m].
+  std::vector<TrunkRecord> records(
+      const GroundZ &ground_z = [](const Eigen::Vector2d &) { return 0.0; }, double breast_height = kBreastHeight,
+      bool has_ranges = true) const;
 
 private:
   std::size_t place(int id) const;
   MapTrunk &at(int id) { return m_trunks[place(id)]; }
   void archive(MapUpdate &update, double now_s);
-  TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double breast_z, bool has_ranges = true) const;
+  TrunkRecord recordOf(const MapTrunk &trunk, double log_odds, double ground_z, double breast_height,
+                       bool has_ranges = true) const;
   bool isRejected(const MapTrunk &trunk, bool has_ranges) const;
   bool mayBeConfirmed(const MapTrunk &trunk, bool has_ranges) const;
   bool areTooNear(const Trunk &a, const Trunk &b) const;

@@ -142,6 +142,17 @@ Motion Engine::estimateMotion(const Frame &frame)
   return motion;
 }
 
+/// By the points of this frame, or level where the motion itself rests on a level ground.
+std::optional<GroundPlane> Engine::groundUnder(const Frame &frame, const Motion &motion)
+{
+  if (m_motion->isTranslationMeasured())
+    return m_ground_filter.add(
+        frame.status == FrameStatus::ok && motion.image_fault.empty() ? points() : std::vector<TriangulatedRay>(),
+        cameraAt(newest()).t);
+  const std::optional<double> level = m_motion->groundZ();
+  return level ? std::optional(GroundPlane{cameraAt(newest()).t.head<2>(), *level, {0, 0}}) : std::nullopt;
+}
+
 /// Adds the pose of this frame to the smoother and updates it once, together with the measurements of trunks in the
 /// frame before: all later stages use the pose that this update estimates.
 Viewpoint Engine::extendTrajectory(const Frame &frame, const Motion &motion)
@@ -162,7 +173,8 @@ Viewpoint Engine::extendTrajectory(const Frame &frame, const Motion &motion)
     m_smoother.addRelativePose(between.a, between.b, between.measurement);
   m_smoother.update();
   refreshMap(secondsOf(frame.stamp_ns) - kLately_s);
-  return {m_camera, cameraAt(newest()), m_motion->hasRanges(), m_motion->groundZ(), secondsOf(frame.stamp_ns)};
+  m_ground.push_back(groundUnder(frame, motion));
+  return viewpointOf(newest(), secondsOf(frame.stamp_ns));
 }
 
 std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motion &motion)

@@ -45,7 +45,8 @@ private:
   std::vector<ScoredHypothesis> scoreAll(const std::vector<ColumnView> &views,
                                          const std::vector<ScoredHypothesis> &before = {}) const;
   template <typename Frames> std::vector<ColumnView> columnViews(const Frames &frames) const;
-  Viewpoint viewpointOf(const Keyframe &frame) const;
+  Viewpoint viewpointOf(std::size_t pose, double time_s) const;
+  std::optional<GroundPlane> groundUnder(const Frame &frame, const Motion &motion);
   static constexpr int kLeastViews = 4;    ///< that a hypothesis needs to be scored
   static constexpr double kSettled = 1e-6; ///< relative fall of the cost at which optimisation ends
 
@@ -81,6 +82,7 @@ private:
   void maskTextureEdges(std::vector<PredictedTrunk> &predicted) const;
   void scoreByConsistency(const Frame &frame, const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   std::vector<TriangulatedRay> points() const;
+  double groundAt(const Eigen::Vector2d &xy) const;
   std::vector<int> reviewMap(const std::vector<TriangulatedRay> &points, const Viewpoint &view);
   void keepConfirmed();
   TrunkEstimate estimateOf(const MapTrunk &trunk, bool with_covariance) const;
@@ -125,6 +127,8 @@ private:
   TextureTracker m_texture;
   ConsistencyWindow m_consistency;
   KeyframeStore m_keyframes; ///< keyframes for the final pass
+  GroundFilter m_ground_filter;
+  std::vector<std::optional<GroundPlane>> m_ground; ///< by pose
   TrunkMap m_map;
   std::vector<ScoredHypothesis> m_scored;
   std::map<std::size_t, std::vector<std::size_t>> m_views; ///< poses that saw each trunk of the smoother, at the end

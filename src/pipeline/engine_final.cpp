@@ -30,9 +30,9 @@ bool isOf(const ScoredHypothesis &one, const Hypothesis &hypothesis)
 }
 } // namespace
 
-Viewpoint Engine::viewpointOf(const Keyframe &frame) const
+Viewpoint Engine::viewpointOf(std::size_t pose, double time_s) const
 {
-  return {m_camera, cameraAt(frame.pose), true, m_motion->groundZ(), frame.time_s};
+  return {m_camera, cameraAt(pose), m_motion->hasRanges(), m_ground[pose], time_s};
 }
 
 /// Scores \p hypothesis against chance, and, where it is worth the work, against a strip of a surface.
@@ -90,7 +90,7 @@ std::vector<CandidateTrack> Engine::trackThroughKeyframes(const std::vector<Hypo
     for (std::size_t f = 0; f < m_keyframes.frames().size(); ++f) {
       const Keyframe &frame = m_keyframes.frames()[f];
       const Pose wMb = m_smoother.pose(frame.pose);
-      const Viewpoint at = viewpointOf(frame);
+      const Viewpoint at = viewpointOf(frame.pose, frame.time_s);
       std::shared_ptr<const Gradient> gradient; // computed when the first hypothesis needs it
       for (std::size_t i = 0; i < trackers.size(); ++i) {
         const Eigen::Vector3d to = found[i].trunk.trunk.axisAt(at.wMc.t.z()) - at.wMc.t;

@@ -56,7 +56,7 @@ void Engine::detectLeaning(const TrunkMap &likely, KeyframeGradients &gradients)
   DetectionWindow windows[2];
   for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i) {
     const Keyframe &frame = m_keyframes.frames()[i];
-    const Viewpoint at = viewpointOf(frame);
+    const Viewpoint at = viewpointOf(frame.pose, frame.time_s);
     for (const int side : {0, 1})
       windows[side].push(gradients[i], frame.pose, at, m_smoother, options[side]);
     if (i % kLeaningEvery != 0)

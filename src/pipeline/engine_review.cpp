@@ -47,7 +47,7 @@ FrameReport Engine::review(std::size_t index) const
   report.wMb = m_smoother.pose(index);
   report.wMc = cameraAt(index);
   report.has_ranges = m_motion->hasRanges();
-  const Viewpoint view{m_camera, report.wMc, report.has_ranges, m_motion->groundZ(), secondsOf(report.stamp_ns)};
+  const Viewpoint view = viewpointOf(index, secondsOf(report.stamp_ns));
   for (const MapTrunk &trunk : m_map.trunks()) {
     if (m_map.statusOf(trunk, report.has_ranges) != TrunkStatus::confirmed)
       continue;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bole
 {
@@ -75,6 +76,18 @@ void Engine::setUnits()
   m_saliency = SaliencyEstimator(m_camera, m_units.saliency);
 }
 
+/// By the plane of the pose that was nearest.
+double Engine::groundAt(const Eigen::Vector2d &xy) const
+{
+  double nearest = std::numeric_limits<double>::infinity(), z = 0;
+  for (std::size_t pose = 0; pose < m_ground.size(); ++pose)
+    if (const auto &plane = m_ground[pose]; plane && (cameraAt(pose).t.head<2>() - xy).norm() < nearest) {
+      nearest = (cameraAt(pose).t.head<2>() - xy).norm();
+      z = plane->heightAt(xy);
+    }
+  return z;
+}
+
 std::vector<TrunkRecord> Engine::map() const
 {
   std::vector<TrunkRecord> records;
@@ -82,10 +95,9 @@ std::vector<TrunkRecord> Engine::map() const
     return records;
   const Eigen::Vector2d origin = m_smoother.pose(0).t.head<2>() * m_metres;
   const double sigma = m_motion->hasRanges() ? estimateScale(true).sigma : 0;
-  const double ground_z = m_motion->groundZ().value_or(0);
-  for (const TrunkRecord &in_units : m_map.records(ground_z + kBreastHeight / m_metres, m_motion->hasRanges())) {
+  const auto ground_z = [this](const Eigen::Vector2d &xy) { return groundAt(xy); };
+  for (const TrunkRecord &in_units : m_map.records(ground_z, kBreastHeight / m_metres, m_motion->hasRanges())) {
     TrunkRecord record = inMetres(in_units, m_metres);
-    record.ground_z = ground_z * m_metres;
     Vector5d by_log_scale;
     by_log_scale << record.xy - origin, record.radius, 0, 0;
     record.covariance += sigma * sigma * by_log_scale * by_log_scale.transpose();

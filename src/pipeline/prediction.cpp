@@ -44,11 +44,11 @@ ElevationRange elevationOf(const RelativeTrunk &relative, const Trunk &trunk, co
 {
   if (!view.has_ranges)
     return kUnrangedPart;
-  if (!view.ground_z)
+  if (!view.ground)
     return options.detection.profile.range;
   const double d = trunk.radius() / relative.ratio();
   const double tangent = std::sqrt(std::max(d * d - trunk.radius() * trunk.radius(), 0.01));
-  const double above = view.wMc.t.z() - *view.ground_z;
+  const double above = view.wMc.t.z() - view.ground->heightAt(trunk.xy);
   return {(options.flow.trunk_low - above) / tangent, (options.flow.trunk_high - above) / tangent};
 }
 

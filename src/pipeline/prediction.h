@@ -5,6 +5,7 @@
 
 #include "detection/detector.h"
 #include "map/trunk_map.h"
+#include "pipeline/ground.h"
 #include "pipeline/stage_options.h"
 #include "tracking/trunk_tracker.h"
 
@@ -21,8 +22,8 @@ struct Viewpoint
 {
   PinholeCamera camera;
   Pose wMc;
-  bool has_ranges = true;         ///< false while the camera has only rotated
-  std::optional<double> ground_z; ///< height of the ground in the world [m]
+  bool has_ranges = true;            ///< false while the camera has only rotated
+  std::optional<GroundPlane> ground; ///< in the world
   double time_s = 0;
 };
 

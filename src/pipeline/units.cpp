@@ -58,6 +58,7 @@ TrunkRecord inMetres(TrunkRecord record, double metres)
 {
   record.xy *= metres;
   record.radius *= metres;
+  record.ground_z *= metres;
   record.covariance.topRows<3>() *= metres;
   record.covariance.leftCols<3>() *= metres;
   return record;

@@ -303,7 +303,8 @@ TEST_F(Life, APlaceThatIsKnownLessWellThanAskedForLeavesATrunkOutOfTheRecordsAlo
     change(trunk, [](MapTrunk &t) { t.place_covariance = 0.5 * Eigen::Matrix2d::Identity(); }); // 1 m
     const bool is_left_out = most == 0.5;
     EXPECT_EQ(m_map.records()[0].status, is_left_out ? TrunkStatus::candidate : TrunkStatus::confirmed) << most;
-    EXPECT_EQ(m_map.records(kBreastHeight, false)[0].status, TrunkStatus::confirmed); // bearings have no place
+    EXPECT_EQ(m_map.records([](const Eigen::Vector2d &) { return 0.0; }, kBreastHeight, false)[0].status,
+              TrunkStatus::confirmed); // bearings have no place
     EXPECT_EQ(m_map.records()[0].reject_reason, is_left_out ? RejectReason::undecided : RejectReason::none) << most;
     EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
   }

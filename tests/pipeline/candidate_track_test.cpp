@@ -31,7 +31,7 @@ protected:
       const std::size_t pose = k == 0 ? m_smoother.addFirstPose(wMb, covariance) : m_smoother.addPose(step, covariance);
       m_smoother.update();
       m_view.wMc = wMb * kMount;
-      m_view.ground_z = 0;
+      m_view.ground = GroundPlane();
       m_view.time_s = 0.1 * k;
       const auto image = test::drawTrunks(kCamera, m_view.wMc.inverse(), test::smallWood(), unsigned(k));
       m_window.push(std::make_shared<const Gradient>(computeGradient(image)), pose, m_view, m_smoother, m_options);

@@ -70,7 +70,8 @@ TEST(Pipeline, AFrameOfBeforeIsReviewedWithTheMapAndThePathThatTheFlightEndedWit
       EXPECT_EQ(seen.status, TrunkStatus::confirmed);
       views[seen.id] += seen.is_tracked;
       const Trunk trunk = knownTrunk(report, seen.id)->trunk;
-      EXPECT_LT((trunk.axisAt(kBreastHeight).head<2>() - map[seen.id].xy).norm(), 1e-9);
+      const double breast_z = map[seen.id].ground_z + kBreastHeight;
+      EXPECT_LT((trunk.axisAt(breast_z).head<2>() - map[seen.id].xy).norm(), 1e-9);
       EXPECT_NEAR(seen.distance, (trunk.axisAt(report.wMc.t.z()) - report.wMc.t).head<2>().norm(), 1e-9);
     }
   }

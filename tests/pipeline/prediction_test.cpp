@@ -24,7 +24,7 @@ Viewpoint eye()
 {
   Viewpoint view;
   view.wMc = Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.2}) * kMount;
-  view.ground_z = 0;
+  view.ground = GroundPlane();
   return view;
 }
 
@@ -120,7 +120,7 @@ TEST(Elevation, IsThatOfTwoHeightsOverTheGround)
   const ElevationRange range = elevationOf(relative, trunk, view, options);
   EXPECT_NEAR(range.low, (options.flow.trunk_low - 1.2) / 4, 1e-3);
   EXPECT_NEAR(range.high, (options.flow.trunk_high - 1.2) / 4, 1e-3);
-  view.ground_z.reset();
+  view.ground.reset();
   EXPECT_EQ(elevationOf(relative, trunk, view, options).high, options.detection.profile.range.high);
 }
 } // namespace
