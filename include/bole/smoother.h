@@ -133,8 +133,6 @@ public:
   std::size_t addTrunk(const Trunk &guess, const TrunkPrior &prior);
   /// Indefinite or non-finite summaries are not added. The energy's constant part is not kept.
   SummaryStatus addObservation(std::size_t pose, std::size_t trunk, const SummaryFactor &summary);
-  /// Takes back what \p pose saw of \p trunk; estimates stay until the next solve.
-  void removeObservation(std::size_t pose, std::size_t trunk);
   /// Not added where one of the poses was forgotten.
   void addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement);
   /// Odometry between any two poses, e.g. a loop closed by other means. Not added where one was forgotten.

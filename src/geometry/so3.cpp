@@ -39,17 +39,6 @@ Vector3d logSo3(const Matrix3d &R)
   return 2.0 * std::atan2(sine, q.w()) / sine * q.vec();
 }
 
-Matrix3d rightJacobianSo3(const Vector3d &phi)
-{
-  const double angle2 = phi.squaredNorm();
-  const Matrix3d S = skew(phi);
-  if (angle2 < 1e-10)
-    return Matrix3d::Identity() - 0.5 * S + S * S / 6.0;
-  const double angle = std::sqrt(angle2);
-  return Matrix3d::Identity() - (1 - std::cos(angle)) / angle2 * S +
-         (angle - std::sin(angle)) / (angle2 * angle) * S * S;
-}
-
 Matrix3d inverseRightJacobianSo3(const Vector3d &phi)
 {
   const double angle2 = phi.squaredNorm();

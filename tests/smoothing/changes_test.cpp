@@ -42,31 +42,6 @@ TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
   EXPECT_THROW(replay.smoother.trunk(1), vpException);
 }
 
-TEST(Changes, AViewThatWasTakenBackIsAsIfItHadNeverBeen)
-{
-  const Flight flight = simulateFlight(shortFlight());
-  Replay with(flight, smootherFor(shortFlight())), without(flight, smootherFor(shortFlight()));
-  with.run();
-  without.run();
-  const auto &[seen, summary] = flight.views.back().front();
-  SummaryFactor wrong = summary;
-  wrong.optimum = wrong.optimum.plus(Vector4d(0.02, 0, 0.05, 0.2));
-  const auto trunk = static_cast<std::size_t>(with.trunk_id[static_cast<std::size_t>(seen)]);
-  const std::size_t pose = with.smoother.poseCount() - 1;
-
-  with.smoother.removeObservation(pose, trunk);
-  with.smoother.addObservation(pose, trunk, wrong);
-  with.smoother.update();
-  with.smoother.removeObservation(pose, trunk);
-  with.smoother.addObservation(pose, trunk, summary);
-  with.smoother.optimize();
-  without.smoother.optimize();
-
-  EXPECT_EQ(with.smoother.observationCount(), without.smoother.observationCount());
-  EXPECT_NEAR(with.smoother.cost(), without.smoother.cost(), 1e-6 * without.smoother.cost());
-  EXPECT_LT(with.smoother.trunk(trunk).minus(without.smoother.trunk(trunk)).norm(), 1e-3);
-}
-
 TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
 {
   const Flight flight = simulateFlight(shortFlight());

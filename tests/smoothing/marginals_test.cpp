@@ -255,7 +255,6 @@ TEST_F(OneTrunk, RefusesWhatTheCallerGotWrong)
   for (const std::size_t none : {trunk + 1, std::size_t(-1)}) {
     EXPECT_THROW(smoother.addObservation(pose, none, view()), vpException);
     EXPECT_THROW(smoother.addObservation(pose + 1, trunk, view()), vpException);
-    EXPECT_THROW(smoother.removeObservation(pose, none), vpException);
     EXPECT_THROW(smoother.mergeTrunks(trunk, none), vpException);
     EXPECT_THROW(smoother.removeTrunk(none), vpException);
     EXPECT_THROW(smoother.keepTrunk(none, true), vpException);
