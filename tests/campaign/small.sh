@@ -29,7 +29,10 @@ kill -KILL $pid 2>/dev/null || true
 wait $pid 2>/dev/null || true
 pkill -KILL -f "$folder" 2>/dev/null || true
 # an orphan would write the flight that the next one writes
-for _ in $(seq 100); do ls -l /proc/[0-9]*/cwd 2>/dev/null | grep -q "$folder" && sleep 0.2 || break; done
+for _ in $(seq 100); do
+  readlink /proc/[0-9]*/cwd 2>/dev/null | grep -q "$folder" || break
+  sleep 0.2
+done
 first=$(stat -c %Y "$folder"/results/default/*.json | sort -n | head -n 1)
 BOLE=$bole snakemake -s "$source/apps/campaign/Snakefile" --configfile "$folder/campaign.yaml" --cores 2 -d "$folder" \
   --unlock >/dev/null 2>&1
