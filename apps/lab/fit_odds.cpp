@@ -44,8 +44,7 @@ Eigen::Matrix3d alignment(const Trajectory &path, const Trajectory &truth)
     to.insert(to.end(), {truth[k].wMb.t.x(), truth[k].wMb.t.y()});
   }
   const auto count = static_cast<Eigen::Index>(from.size() / 2);
-  return Eigen::umeyama(Eigen::Matrix2Xd::Map(from.data(), 2, count), Eigen::Matrix2Xd::Map(to.data(), 2, count),
-                        false);
+  return Eigen::umeyama(Eigen::MatrixXd::Map(from.data(), 2, count), Eigen::MatrixXd::Map(to.data(), 2, count), false);
 }
 
 /// Hypotheses of one flight. One within 0.35 m and two fifths of the radius is a trunk, one beyond 0.5 m of every trunk

@@ -38,15 +38,15 @@ std::size_t Smoother::State::newPose(const Pose &wMb)
   return poses.size() - 1;
 }
 
-std::size_t Smoother::State::newTrunk(const Trunk &guess, const TrunkPrior &prior)
+std::size_t Smoother::State::newTrunk(const Trunk &guess, const TrunkPrior &trunk_prior)
 {
-  require(guess.minus(Trunk()).allFinite() && prior.mean.minus(Trunk()).allFinite() && prior.sigma.allFinite() &&
-              (prior.sigma.array() > 0).all(),
+  require(guess.minus(Trunk()).allFinite() && trunk_prior.mean.minus(Trunk()).allFinite() &&
+              trunk_prior.sigma.allFinite() && (trunk_prior.sigma.array() > 0).all(),
           "trunk, must be finite with sigmas above 0");
   TrunkState trunk;
   trunk.value = guess;
-  trunk.prior = prior;
-  trunk.covariance = prior.sigma.cwiseAbs2().asDiagonal();
+  trunk.prior = trunk_prior;
+  trunk.covariance = trunk_prior.sigma.cwiseAbs2().asDiagonal();
   trunk.place_covariance = trunk.covariance.topLeftCorner<2, 2>();
   std::size_t number = trunks.size();
   if (free_trunks.empty())

@@ -111,7 +111,7 @@ public:
   const FactorsOfPose &factorsOf(std::size_t pose) const { return factors[pose - first_held]; }
   bool isHeld(std::size_t pose) const { return pose >= first_held; }
   std::size_t newPose(const Pose &wMb);
-  std::size_t newTrunk(const Trunk &guess, const TrunkPrior &prior);
+  std::size_t newTrunk(const Trunk &guess, const TrunkPrior &trunk_prior);
   void noteView(std::size_t pose, std::size_t trunk);
   void removeTrunk(std::size_t trunk);
   void mergeTrunks(std::size_t keep, std::size_t gone);
