@@ -130,7 +130,7 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
       {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
        "a candidate not seen for longer is dropped, a trunk looked for only while its bearing is known to its width"},
-      {"map.lag", &o.map.lag, 0, 1e5, "s", "older poses are fixed and forgotten, which bounds the memory; 0: never"},
+      {"map.lag", &o.map.lag, 0, 1e5, "s", "older poses are fixed and forgotten; 0: never"},
 
       {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal walk of the pose filter in 0.1 s"},
       {"odometry.step_vertical", &o.odometry.step_vertical, 1e-4, 1, "m",

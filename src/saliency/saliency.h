@@ -89,7 +89,7 @@ private:
     float prior = 0; ///< log odds before looking
   };
   bool isStale(const vpImage<unsigned char> &image) const;
-  bool asksForRange() const { return m_options.use_translation && m_translation; }
+  bool asksForRange() const { return m_translation.has_value(); }
   void addMotion(const std::optional<RotationPrior> &gyro, const std::optional<TranslationPrior> &translation);
   RotationEm refineRotation(const ImagePyramid &current, Saliency &result) const;
   CoarseLabels labelByRange(const ImagePyramid &current, Saliency &result);

@@ -25,7 +25,6 @@ struct SaliencyOptions
       30; ///< pixels that count as one independent measurement; [1, 1e4]. Neighbours share their errors
 
   // --- labels that ask about inverse depth, where the translation is given
-  bool use_translation = true;  ///< off: labels by EM alone even where odometry gives the translation
   double sigma_residual = 0.05; ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
   double near_range = 6;        ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
   double min_range = 2;         ///< nearest range of the sweep [m]; (0.05, near_range)

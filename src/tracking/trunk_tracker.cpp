@@ -197,26 +197,19 @@ TrackingResult trackTrunk(const Gradient &gradient, const PinholeCamera &camera,
                                                                     : TrackingStatus::not_visible);
 
   // scan for maxima under the prediction, and choose the pair of them that are the borders
-  RelativeTrunk start = prediction.relative;
-  PeakPair pair;
-  if (options.scan) {
-    const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance, options.border_correlation);
-    const auto scan = [&](const SeenBorder &border, double variance) {
-      const double width =
-          std::clamp(options.scan_sigmas * std::sqrt(variance), options.scan_min_px, options.scan_max_px);
-      return border.visible ? scanBorder(gradient.signed_x, border.line, width, options.contrast_min)
-                            : std::vector<BorderPeak>();
-    };
-    const auto left_peaks = scan(left, S(0, 0)), right_peaks = scan(right, S(1, 1));
-    if ((left.visible && left_peaks.empty()) || (right.visible && right_peaks.empty()))
-      return finish(TrackingStatus::no_border);
-    pair = pairPeaks(left_peaks, right_peaks, {S, prediction.left_contrast, prediction.right_contrast}, 1).front();
-    start = startFrom(pair, left, right, prediction.relative);
-  }
-  else {
-    pair.left.contrast = meanAlongOnly(gradient.signed_x, left.line);
-    pair.right.contrast = meanAlongOnly(gradient.signed_x, right.line);
-  }
+  const Eigen::Matrix2d S = offsetCovariance(left, right, prediction.covariance, options.border_correlation);
+  const auto scan = [&](const SeenBorder &border, double variance) {
+    const double width =
+        std::clamp(options.scan_sigmas * std::sqrt(variance), options.scan_min_px, options.scan_max_px);
+    return border.visible ? scanBorder(gradient.signed_x, border.line, width, options.contrast_min)
+                          : std::vector<BorderPeak>();
+  };
+  const auto left_peaks = scan(left, S(0, 0)), right_peaks = scan(right, S(1, 1));
+  if ((left.visible && left_peaks.empty()) || (right.visible && right_peaks.empty()))
+    return finish(TrackingStatus::no_border);
+  const PeakPair pair =
+      pairPeaks(left_peaks, right_peaks, {S, prediction.left_contrast, prediction.right_contrast}, 1).front();
+  const RelativeTrunk start = startFrom(pair, left, right, prediction.relative);
   if (!start.isFinite())
     return finish(TrackingStatus::diverged);
 

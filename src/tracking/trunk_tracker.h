@@ -27,7 +27,6 @@ struct TrackingOptions
   int rows_min = 20;           ///< shortest part of a border worth looking at, [px], 4 to 1000
   double tilt_sigma = 0.03;    ///< of the trunk against the vertical (lean and bow), [rad], 0.001 to 0.5
   double polish_max_px = 3;    ///< a minimum farther from its start is another border, [px], 0.5 to 20
-  bool scan = true;            ///< false: minimise from the prediction, as the paper does
 };
 
 enum class TrackingStatus
