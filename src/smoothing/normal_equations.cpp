@@ -106,7 +106,7 @@ void NormalEquations::eliminationStructure(const std::vector<int> &order, int to
       if (block.row != column)
         m_later[std::min(place[column], place[block.row])].push_back(std::max(place[column], place[block.row]));
   children.assign(order.size(), 0);
-  std::vector<int> seen(order.size(), -1), first_below(order.size(), -1), next_below(order.size(), -1);
+  std::vector<int> seen(order.size(), -1), first_below = seen, next_below = seen;
   for (int p = 0; p < n; ++p) {
     std::vector<int> &later = m_later[p];
     if (p >= n - together) {
