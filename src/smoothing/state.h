@@ -142,6 +142,7 @@ public:
   double addWindow(NormalEquations *system) const;
   double solveWindow(UpdateResult &result);
   std::vector<bool> remembered(std::size_t until) const;
+  Eigen::Vector3d shiftOfPrior() const;
   void recentre();
   void absorb(std::size_t from, std::size_t until);
   void shrink();

@@ -119,15 +119,36 @@ std::vector<bool> Smoother::State::remembered(std::size_t until) const
   return stays;
 }
 
+/// By how much all that the prior touches was shifted since it was linearised: what leaves, by the trunks in sight, the
+/// least error in the bearings from the newest pose at which they are linearised; where none is in sight, by the newest
+/// pose of the prior. That pose alone is no measure: each has moved by an error of its own while it was the newest, and
+/// these add up.
+Eigen::Vector3d Smoother::State::shiftOfPrior() const
+{
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  for (const Name &name : prior.names)
+    if (name.is_pose)
+      shift = poses[name.number].t - pointOf(name.number).t;
+  constexpr double kNearest = 0.5; // m: the camera is beside no axis
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double weights = 0;
+  for (const Name &name : prior.names)
+    if (!name.is_pose && isInWindow(trunks[name.number])) {
+      const TrunkState &trunk = trunks[name.number];
+      const double range = std::max(kNearest, (trunk.value.xy - poses.back().t.head<2>()).norm());
+      sum += (trunk.value.xy - trunk.point->xy) / (range * range);
+      weights += 1 / (range * range);
+    }
+  if (weights > 0)
+    shift.head<2>() = sum / weights;
+  return shift;
+}
+
 /// The points of the prior follow where all of it was shifted to, or new poses would be linearised with trunks that
 /// stand elsewhere. The quadratic stays what it is.
 void Smoother::State::recentre()
 {
-  const auto last =
-      std::find_if(prior.names.rbegin(), prior.names.rend(), [](const Name &name) { return name.is_pose; });
-  if (last == prior.names.rend())
-    return;
-  const Eigen::Vector3d shift = poses[last->number].t - pointOf(last->number).t;
+  const Eigen::Vector3d shift = shiftOfPrior();
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(prior.g.size());
   int row = 0;
   for (const Name &name : prior.names) {

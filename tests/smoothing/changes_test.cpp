@@ -313,6 +313,26 @@ TEST(Changes, RememberedTrunksTieTheRoundsTogetherThatTheWindowHasLeft)
   EXPECT_GT((without.sigma - Vector6d::Ones()).maxCoeff(), 0.2); // what is not tied drifts, and says so
 }
 
+TEST(Changes, ThirtyRoundsStayAsNearToTheTruthAsTheySay)
+{
+  FlightOptions o;
+  o.lap = 120;
+  o.poses = 30 * o.lap;
+  o.sigma_position = 0.04;
+  o.sigma_ratio = 0.2;
+  o.seed = 2;
+  const Flight flight = simulateFlight(o);
+  Replay window(flight, forgetting(o, o.lap / 10));
+  double worst = 0;
+  for (int i = 0; i < o.poses; ++i) {
+    window.step();
+    const Vector6d error = window.smoother.pose(static_cast<std::size_t>(i)).minus(flight.truth[std::size_t(i)]);
+    const Eigen::ArrayXd sigma = window.smoother.currentPoseCovariance().diagonal().array().sqrt();
+    worst = std::max(worst, (error.array() / sigma).abs().maxCoeff());
+  }
+  EXPECT_LT(worst, 6); // of 21,600 errors that are correlated
+}
+
 /// Bytes of the heap a frame that twelve rounds keep after the fourth, with trunks that are given up a frame later.
 double keptAFrame(int remembered)
 {
