@@ -8,6 +8,7 @@
 #include "overlay_window.h"
 #include "track_arguments.h"
 #include "track_output.h"
+#include "worker.h"
 
 #include "input/live_video.h"
 #include "input/secrets.h"
@@ -189,12 +190,13 @@ RunSummary describeRun(const TrackArguments &arguments)
 
 /// The next frame, nothing at the end. One that waits in a file is read while the one before is worked on; a live one
 /// is as new as it can be.
-std::future<std::optional<Frame>> nextOf(FrameSource &source, bool is_live)
+std::future<std::optional<Frame>> nextOf(FrameSource &source, bool is_live, Worker &reader)
 {
-  return std::async(is_live ? std::launch::deferred : std::launch::async, [&source]() -> std::optional<Frame> {
+  const auto read = [&source]() -> std::optional<Frame> {
     Frame frame;
     return source.next(frame) ? std::optional<Frame>(std::move(frame)) : std::nullopt;
-  });
+  };
+  return is_live ? std::async(std::launch::deferred, read) : reader(read);
 }
 
 /// Frames from \p source until it ends, enough were taken, or somebody interrupts. Returns how many.
@@ -204,14 +206,15 @@ std::size_t fly(const TrackArguments &arguments, FrameSource &source, bool is_li
   constexpr std::size_t kKeepEvery = 50; // frames between two times that what is known is written, at least
   Progress progress(arguments.is_quiet ? 0 : source.size(), stderr);
   std::size_t count = 0, keep_at = 1;
-  auto next = nextOf(source, is_live);
+  Worker reader;
+  auto next = nextOf(source, is_live, reader);
   while (!interrupted() && next.valid()) {
     std::optional<Frame> frame = next.get();
     if (!frame)
       break;
     ++count;
     if (arguments.frames_most == 0 || count < arguments.frames_most)
-      next = nextOf(source, is_live);
+      next = nextOf(source, is_live, reader);
     if (arguments.is_without_odometry)
       frame->wMb_odometry.reset();
     if (arguments.is_without_gyro)

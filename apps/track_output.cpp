@@ -216,7 +216,7 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
   vpImage<vpRGBa> picture;
   if (m_has_pictures)
     picture = drawOverlay(frame.image, m_summary.camera, overlay);
-  m_filming = std::async(std::launch::async, [this, image = frame.image, stamp_ns = frame.stamp_ns, picture, overlay] {
+  m_filming = m_film_worker([this, image = frame.image, stamp_ns = frame.stamp_ns, picture, overlay] {
     film([&] {
       if (m_overlay && m_is_overlay_due)
         m_overlay->write(m_has_pictures ? picture : drawOverlay(image, m_summary.camera, overlay), stamp_ns);

@@ -9,6 +9,7 @@
 #include "output/run_folder.h"
 #include "output/verdict.h"
 #include "output/video_writer.h"
+#include "worker.h"
 #include <bole/pipeline.h>
 
 #include <atomic>
@@ -84,5 +85,6 @@ private:
   std::future<std::optional<InputDigest>> m_digest;
   std::future<std::string> m_keeping; ///< what went wrong; it and the film last: they end before the rest goes
   std::future<void> m_filming;        ///< of the frame before
+  Worker m_film_worker;
 };
 } // namespace bole::apps
