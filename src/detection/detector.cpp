@@ -18,7 +18,8 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr int kLeastViews = 5; ///< views within the window that see both borders: fewer let chance pairs agree
+constexpr double kAside_px = 2.5; ///< from a border into what is beside it: half of the window of saliency
+constexpr int kLeastViews = 5;    ///< views within the window that see both borders: fewer let chance pairs agree
 
 /// A view reduced to the ground plane.
 struct PlaneView
@@ -244,8 +245,7 @@ bool overlaps(const Detection &a, const Detection &b) { return a.q_left > b.q_ri
 double quality(const Detection &detection, const LogNormal &radii)
 {
   return detection.agreement * detection.inliers * std::sqrt(detection.trunk.radius()) *
-         std::exp(radii.logOdds(detection.trunk.log_radius)) * (0.5 + std::max(detection.foreground, 0.0)) /
-         (detection.rms_px + 0.2);
+         std::exp(radii.logOdds(detection.trunk.log_radius)) / (detection.rms_px + 0.2);
 }
 
 std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewColumns &columns,
@@ -293,24 +293,23 @@ bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double 
     return overlaps && !holds_it;
   });
 }
-} // namespace
-
-double foregroundBetween(const vpImage<float> &p_background, const PinholeCamera &camera, const RelativeTrunk &relative,
-                         const ElevationRange &range)
+/// The lines of the newest view that have something beside them that is near enough to matter (paper, Section 5):
+/// trunks are sought between these alone.
+std::vector<ProfilePeak> salientPeaks(const DetectorView &view, const PinholeCamera &camera,
+                                      const vpImage<float> &p_background, const DetectorOptions &options)
 {
-  const BorderLine left = borderLine(camera, relative, Border::left, range, 0);
-  const BorderLine right = borderLine(camera, relative, Border::right, range, 0);
-  double background = 0;
-  int n = 0;
-  for (int v = std::max(left.row_begin, right.row_begin); v < std::min(left.row_end, right.row_end); ++v) {
-    const int first = static_cast<int>(std::ceil(left.xAt(v))), last = static_cast<int>(std::floor(right.xAt(v)));
-    if (last < first)
-      continue;
-    background += static_cast<double>(sumOfRow(p_background[v] + first, last - first + 1));
-    n += last - first + 1;
-  }
-  return n >= 30 ? 1 - background / n : -1;
+  const double aside = kAside_px / camera.fx;
+  const auto isSalient = [&](double q) {
+    const std::optional<double> background = meanAlong(p_background, camera, *view.profile, q, options.profile.range);
+    return !background || 1 - *background >= options.foreground_min;
+  };
+  std::vector<ProfilePeak> salient;
+  for (const ProfilePeak &peak : view.profile->peaks)
+    if (isSalient(peak.q - aside) || isSalient(peak.q + aside))
+      salient.push_back(peak);
+  return salient;
 }
+} // namespace
 
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
                                     const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
@@ -327,7 +326,8 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
     plane.push_back({view.profile, view.wMc.t.head<2>(), forward, {-forward.y(), forward.x()}});
   }
 
-  const auto &peaks = views.back().profile->peaks; // by rising q: from right to left
+  const std::vector<ProfilePeak> peaks = // by rising q: from right to left
+      p_background ? salientPeaks(views.back(), camera, *p_background, options) : views.back().profile->peaks;
   const ViewColumns columns = columnsOf(plane);
   const SweptRanges ranges(options);
   std::vector<float> scores;
@@ -356,12 +356,6 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
         const Vector2d w = detection->trunk.xy - plane.back().position;
         detection->trunk.lean = views.back().profile->lean * Vector2d(-w.y(), w.x()).normalized();
         detection->trunk.xy -= views.back().wMc.t.z() * detection->trunk.lean;
-        if (p_background)
-          detection->foreground = foregroundBetween(
-              *p_background, camera, relativeTrunk(views.back().wMc, Pose(), detection->trunk), options.profile.range);
-        if (p_background && detection->range < options.near_range && detection->foreground >= 0 &&
-            detection->foreground < options.foreground_min)
-          continue;
         detection->quality = quality(*detection, options.radii);
         found.push_back(*detection);
       }

@@ -68,6 +68,21 @@ std::vector<float> nearestPeaks(const LevelProfile &profile, double sign)
 }
 } // namespace
 
+std::optional<double> meanAlong(const vpImage<float> &image, const PinholeCamera &camera, const LevelProfile &profile,
+                                double q, const ElevationRange &range)
+{
+  const double horizontal = std::hypot(1, q), by_elevation = profile.lean * (1 + q * q);
+  const auto at = [&](double elevation) -> Vector3d {
+    return profile.cRl * Vector3d(1, q + by_elevation * elevation, elevation * horizontal);
+  };
+  const Vector3d low = at(range.low), high = at(range.high);
+  const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
+  const double rows_full = std::min(camera.fy * (range.high - range.low) * horizontal, double(camera.height));
+  if (line.rows() < kLeastRows * rows_full)
+    return std::nullopt;
+  return meanAlongOnly(image, line);
+}
+
 LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,
                                  const ProfileOptions &options)
 {
@@ -82,18 +97,9 @@ LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &c
   profile.q_first = -half * profile.step;
   profile.mean.assign(static_cast<std::size_t>(2 * half + 1), 0.f);
 
-  for (int i = -half; i <= half; ++i) {
-    const double q = i * profile.step, horizontal = std::hypot(1, q), by_elevation = options.lean * (1 + q * q);
-    const auto at = [&](double elevation) -> Vector3d {
-      return profile.cRl * Vector3d(1, q + by_elevation * elevation, elevation * horizontal);
-    };
-    const Vector3d low = at(options.range.low), high = at(options.range.high);
-    const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
-    const double rows_full =
-        std::min(camera.fy * (options.range.high - options.range.low) * horizontal, double(camera.height));
-    if (line.rows() >= kLeastRows * rows_full)
-      profile.mean[static_cast<std::size_t>(i + half)] = static_cast<float>(meanAlongOnly(g, line));
-  }
+  for (int i = -half; i <= half; ++i)
+    profile.mean[static_cast<std::size_t>(i + half)] =
+        static_cast<float>(meanAlong(g, camera, profile, i * profile.step, options.range).value_or(0));
   findExtremes(profile);
   findPeaks(profile, options.contrast_min);
   profile.rising_peak = nearestPeaks(profile, 1);

@@ -10,6 +10,7 @@
 #include "gradient/border_line.h"
 #include <bole/pose.h>
 
+#include <optional>
 #include <vector>
 
 namespace bole
@@ -44,6 +45,11 @@ struct ProfileOptions
   double lean = 0;             ///< of the lines across the line of sight, positive to the left [tan], -0.5 to 0.5
   double contrast_min = 0.008; ///< weaker maxima are no peaks [full scale/px], 0.001 to 0.5
 };
+
+/// Mean of \p image along the line at \p q of \p profile, over the elevations \p range; nothing where too little of it
+/// is in the image.
+std::optional<double> meanAlong(const vpImage<float> &image, const PinholeCamera &camera, const LevelProfile &profile,
+                                double q, const ElevationRange &range);
 
 /// Profile of the gradient \p g seen by \p camera with the rotation \p wRc. Cost: about 0.5 ms at 320x240.
 LevelProfile computeLevelProfile(const vpImage<float> &g, const PinholeCamera &camera, const Eigen::Matrix3d &wRc,

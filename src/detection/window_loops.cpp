@@ -91,14 +91,4 @@ float scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count,
   }
   return best;
 }
-
-BOLE_VECTOR_CLONES
-float sumOfRow(const float *numbers, int n)
-{
-  float sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < n; ++i)
-    sum += numbers[i];
-  return sum;
-}
 } // namespace bole

@@ -51,7 +51,4 @@ struct BorderCurve
   const float *sum, *seen;
 };
 float scoresOfPair(const BorderCurve &left, const BorderCurve &right, int count, float views_min, float *scores);
-
-/// Sum of \p n numbers.
-float sumOfRow(const float *numbers, int n);
 } // namespace bole

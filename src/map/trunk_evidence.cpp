@@ -18,9 +18,7 @@ constexpr double kBias = 3.35;
 constexpr double kInnovation = -2.29; ///< a pixel of rms between prediction and what was found
 constexpr double kMissed = -3.77;     ///< share of frames in which it should have been seen and was not
 constexpr double kLogRadius = -0.5;   ///< wide ones are more often gaps between trunks
-constexpr double kForegroundKnown = -0.77;
-constexpr double kForeground = 1.91; ///< moved like something near, 0 to 1
-constexpr double kSeeThrough = -0.8; ///< log of 1 + MapTrunk::seeThroughRatio
+constexpr double kSeeThrough = -0.8;  ///< log of 1 + MapTrunk::seeThroughRatio
 constexpr double kLogParallax = 0.69;
 constexpr double kLogContrast = 0.49;
 constexpr double kRedetections = 0.54; ///< log of 1 + times the detector came to the same hypothesis
@@ -44,10 +42,8 @@ void TrunkMap::estimateRadii()
 double TrunkMap::evidence(const MapTrunk &trunk) const
 {
   const double missed = trunk.misses / (trunk.hits + trunk.misses + 2.0);
-  const double foreground_known = std::min(trunk.foreground_count, 5) / 5.0;
   return kBias + kInnovation * std::sqrt(trunk.innovation2) / m_options.innovation_unit_px + kMissed * missed +
          kLogRadius * (trunk.trunk.log_radius - m_radii.log_mean) + m_radii.logOdds(trunk.trunk.log_radius) +
-         foreground_known * (kForegroundKnown + kForeground * trunk.foreground) +
          kSeeThrough * std::log1p(trunk.seeThroughRatio()) + kLogParallax * std::log(trunk.parallax() + 0.01) +
          kLogContrast * std::log(trunk.contrast + 0.005) + kRedetections * std::log1p(trunk.redetections) +
          kLogPlaceSigma * std::log(trunk.placeSigma() + 1e-3);

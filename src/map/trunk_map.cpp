@@ -97,8 +97,6 @@ void TrunkMap::record(const TrunkMeasurement &measurement)
   if (measurement.kind != TrunkMeasurement::Kind::seen)
     return;
   addView(trunk, measurement.view);
-  if (measurement.foreground && measurement.range <= m_options.near_range)
-    trunk.foreground += (*measurement.foreground - trunk.foreground) / ++trunk.foreground_count;
 }
 
 void TrunkMap::record(const PointCount &points)

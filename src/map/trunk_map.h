@@ -64,7 +64,6 @@ struct MapOptions
   double reject_confirmed = -1.5;  ///< log-odds below which a confirmed trunk is rejected, -50 to 0
   double reject_rival = 1.5;       ///< log odds by which another candidate for the same place must be better for one
                                    ///< to be rejected, 0 to 50
-  double near_range = 5.5;         ///< saliency inside a trunk is asked nearer than this [m], 0 to 100
   double through_range = 9;        ///< whether points behind a trunk are seen through it is asked nearer than this
                                    ///< [m], 0 (never) to 100
   double innovation_unit_px = 1;   ///< rms of prediction against what was found that counts as one pixel of a camera
@@ -118,12 +117,10 @@ struct MapTrunk
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   BearingSpread left, right;                           ///< of its borders over its views
   double innovation2 = 0;                              ///< running mean of TrunkView::innovation2
-  double foreground = 0;                               ///< mean of 1 - p(background) inside it
-  int foreground_count = 0;
-  PointCount points;                ///< over all frames
-  double consistency_odds = 0;      ///< log-odds by the columns of the last frames,
-  int consistency_views = 0;        ///< and in how many of them it was compared
-  bool is_silhouette = false;       ///< the background was seen beside both its borders
+  PointCount points;                                   ///< over all frames
+  double consistency_odds = 0;                         ///< log-odds by the columns of the last frames,
+  int consistency_views = 0;                           ///< and in how many of them it was compared
+  bool is_silhouette = false;                          ///< the background was seen beside both its borders
   std::optional<double> final_odds; ///< log-odds by all frames, where they were judged: see TrunkMap::applyDecisions()
   bool removed = false;             ///< out of the smoother
   bool inactive = false;            ///< a candidate that is not looked for any more
@@ -170,10 +167,8 @@ struct TrunkMeasurement
   };
   int id = 0;
   Kind kind = Kind::missed;
-  TrunkView view;                   ///< where it was seen
-  bool is_flipped = false;          ///< borders of the other sign stand where it was expected
-  double range = 0;                 ///< [m]
-  std::optional<double> foreground; ///< mean of 1 - p(background) inside it
+  TrunkView view;          ///< where it was seen
+  bool is_flipped = false; ///< borders of the other sign stand where it was expected
 };
 
 /// Views compared before columns decide.

@@ -87,8 +87,8 @@ void setRange(StageOptions &o, const Options::Range &range)
     o.saliency.near_range = std::max(range.near, kNearest);
     o.saliency.min_range = std::min(o.saliency.min_range, o.saliency.near_range / 2);
   }
-  constexpr double kUndecided = 0.5; // m: at near itself the labels are undecided
-  o.detection.near_range = o.map.near_range = std::max(0.0, range.near - kUndecided);
+  else
+    o.detection.foreground_min = 0;
   o.map.through_range = range.through;
 }
 

@@ -81,8 +81,7 @@ bool isFlippedNear(const PredictedTrunk &predicted, const TrackingResult &result
 } // namespace
 
 std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vector<PredictedTrunk> &predicted,
-                                      const TrunkMap &map, const vpImage<float> *p_background, const Viewpoint &view,
-                                      const StageOptions &options)
+                                      const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
 {
   const FlowOptions &flow = options.flow;
   std::vector<TrackedTrunk> seen;
@@ -97,12 +96,6 @@ std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vecto
     const int flipped_in_a_row = map.trunk(prediction.id).flipped_in_a_row + 1;
     if (tracked.is_flipped && flow.turned_frames > 0 && flipped_in_a_row >= flow.turned_frames)
       result.status = TrackingStatus::tracked;
-    if (p_background && view.has_ranges && result.status == TrackingStatus::tracked) {
-      const double foreground =
-          foregroundBetween(*p_background, view.camera, result.optimum, prediction.tracking.range);
-      if (foreground >= 0)
-        tracked.foreground = foreground;
-    }
     seen.push_back(tracked);
   }
   return seen;
@@ -116,12 +109,10 @@ TrunkMeasurement measurementOf(const TrackedTrunk &tracked, const TrunkMap &map,
   TrunkMeasurement measurement;
   measurement.id = predicted.id;
   measurement.is_flipped = tracked.is_flipped;
-  measurement.range = predicted.range;
   if (status == TrackingStatus::tracked) {
     measurement.kind = TrunkMeasurement::Kind::seen;
     measurement.view =
         viewOf(tracked.result, predicted.tracking.relative, map.trunk(predicted.id).trunk, view, options);
-    measurement.foreground = tracked.foreground;
   }
   else if (status == TrackingStatus::occluded || status == TrackingStatus::not_visible)
     measurement.kind = TrunkMeasurement::Kind::hidden;

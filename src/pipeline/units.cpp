@@ -12,27 +12,12 @@ StageOptions inUnits(StageOptions options, double metres)
   FlowOptions &flow = options.flow;
   DetectorOptions &detection = options.detection;
   MapOptions &map = options.map;
-  for (double *length : {&flow.view_spacing,
-                         &flow.view_correlation,
-                         &flow.trunk_low,
-                         &flow.trunk_high,
-                         &flow.track_range,
-                         &detection.range_min,
-                         &detection.range_max,
-                         &detection.radius_min,
-                         &detection.radius_max,
-                         &detection.near_range,
-                         &map.most_place_sigma,
-                         &map.near_range,
-                         &map.through_range,
-                         &map.usual_radius,
-                         &map.merge_distance,
-                         &map.radius_min,
-                         &map.radius_max,
-                         &options.smoothing.prior_radius,
-                         &options.smoothing.prior_position_sigma,
-                         &options.saliency.near_range,
-                         &options.saliency.min_range})
+  for (double *length :
+       {&flow.view_spacing, &flow.view_correlation, &flow.trunk_low, &flow.trunk_high, &flow.track_range,
+        &detection.range_min, &detection.range_max, &detection.radius_min, &detection.radius_max, &map.most_place_sigma,
+        &map.through_range, &map.usual_radius, &map.merge_distance, &map.radius_min, &map.radius_max,
+        &options.smoothing.prior_radius, &options.smoothing.prior_position_sigma, &options.saliency.near_range,
+        &options.saliency.min_range})
     *length /= metres;
   return options;
 }

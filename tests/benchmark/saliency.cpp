@@ -23,13 +23,14 @@ enum Mode
 };
 
 /// One whole pass over frames 0 to 110 an iteration; figures are of frames 10 to 110.
-void fly(benchmark::State &state, const char *name, Mode mode, const SaliencyOptions &options, const std::string &label)
+void fly(benchmark::State &state, const char *name, Mode mode, SaliencyOptions options, const std::string &label)
 {
   if (!support::hasFlight(name)) {
     state.SkipWithError("the rendered flights are not here");
     return;
   }
   const support::ForestFlight flight = support::readForestFlight(name, 0, 110);
+  options.near_range = 6;
   support::RocCurve roc, known_roc;
   double turn_error = 0, frames = 0;
   for (auto _ : state) {

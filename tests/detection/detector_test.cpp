@@ -135,31 +135,15 @@ TEST(Detector, IgnoresRegionsWithKnownTrunks)
   EXPECT_LT((rest[0].trunk.xy - trunkOf(trunks[1]).xy).norm(), 0.2);
 }
 
-TEST(Detector, RefusesANearTrunkThatMovesLikeTheBackground)
+TEST(Detector, LooksWhereSomethingIsNearAlone)
 {
-  const DrawnFlight flight({{3, 0.7, 0.15, 40}}, sweep());
-  const vpImage<float> background(240, 320, 0.95f), foreground(240, 320, 0.05f);
-  EXPECT_TRUE(detect(flight, {}, &background).empty());
-  const auto found = detect(flight, {}, &foreground);
+  const DrawnFlight flight({{3, 0.7, 0.15, 40}, {3, -0.7, 0.15, 40}}, sweep());
+  vpImage<float> p_background(240, 320, 0.95f);
+  EXPECT_TRUE(detect(flight, {}, &p_background).empty());
+  for (unsigned v = 0; v < 240; ++v)
+    std::fill_n(p_background[v], 160, 0.05f); // on the left
+  const auto found = detect(flight, {}, &p_background);
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_NEAR(found[0].foreground, 0.95, 1e-3);
-}
-
-TEST(Detector, MeansTheForegroundBetweenTheBorders)
-{
-  const PinholeCamera camera;
-  const Pose wMc = lookingAhead(0, 0, 0, 0, 0.2);
-  const DrawnTrunk trunk{3, 0.4, 0.2, 0};
-  const RelativeTrunk relative = relativeTrunk(wMc, Pose(), trunkOf(trunk));
-  // a field that is foreground on the trunk alone
-  const auto drawn = draw({trunk}, wMc, camera, 255);
-  vpImage<float> p_background(240, 320);
-  for (unsigned i = 0; i < drawn.getSize(); ++i)
-    p_background.bitmap[i] = static_cast<float>(drawn.bitmap[i]) / 255;
-  EXPECT_GT(foregroundBetween(p_background, camera, relative, {}), 0.97);
-  RelativeTrunk twice = relative;
-  twice.log_ratio += std::log(2);
-  EXPECT_NEAR(foregroundBetween(p_background, camera, twice, {}), 0.5, 0.03);
-  EXPECT_LT(foregroundBetween(p_background, camera, relativeTrunk(wMc, Pose(), trunkOf({3, 9, 0.2, 0})), {}), 0);
+  EXPECT_GT(found[0].trunk.xy.y(), 0);
 }
 } // namespace

@@ -35,14 +35,12 @@ protected:
   }
   const MapTrunk &at(int id) const { return m_map.trunk(id); }
   double evidence(int id) const { return m_map.evidence(at(id)); }
-  void see(int id, const TrunkView &view, std::optional<double> foreground = {}, double range = 0)
+  void see(int id, const TrunkView &view)
   {
     TrunkMeasurement measurement;
     measurement.id = id;
     measurement.kind = TrunkMeasurement::Kind::seen;
     measurement.view = view;
-    measurement.range = range;
-    measurement.foreground = foreground;
     m_map.record(measurement);
   }
   /// \p views more views, the bearing sweeping \p parallax in all of them.
@@ -327,20 +325,6 @@ TEST_F(Life, TheProbabilityThatIsToldIsTheOneThatDecides)
   m_map.applyDecisions({{judged, m_options.confirm_odds + 0.3, true, std::nullopt}});
   EXPECT_NEAR(m_map.records()[static_cast<std::size_t>(judged)].probability,
               1 / (1 + std::exp(-m_options.confirm_odds - 0.3)), 1e-9);
-}
-
-TEST_F(Life, WhatDidNotMoveLikeSomethingNearLosesOdds)
-{
-  const int still = add(trunkAt(3, 1)), moved = add(trunkAt(3, -4)), far = add(trunkAt(3, -8));
-  const TrunkView view = viewAt(1, 0.6, -0.1, 0.1, 0.9, 0.1);
-  for (int i = 0; i < 20; ++i) {
-    see(still, view, 0.05, m_options.near_range - 0.1);
-    see(moved, view, 0.9, m_options.near_range - 0.1);
-    see(far, view, 0.05, m_options.near_range + 0.1); // says nothing that far away
-  }
-  EXPECT_LT(evidence(still), evidence(far) - 0.5);
-  EXPECT_GT(evidence(moved), evidence(far) + 0.5);
-  EXPECT_EQ(at(far).foreground_count, 0);
 }
 
 TEST_F(Life, RadiiAreExpectedToBeThoseOfTheTrunksThatAreConfirmed)

@@ -248,7 +248,6 @@ private:
     keep(counts);
     m_all.push_back(scoresOfPair({sum.data(), counts.data()}, {sum.data(), counts.data()}, 80, 1, scores.data()));
     keep(scores);
-    m_all.push_back(static_cast<double>(sumOfRow(m_image.data() + 5, 203)));
   }
 
   void columns()
