@@ -51,7 +51,6 @@ struct Options
     double track = 12;        ///< known trunks farther than this are not tracked
     double detect_min = 1.5;  ///< of a new trunk
     double detect_max = 10.5; ///< of a new trunk
-    double near = 8;          ///< trunks are sought where the saliency has something nearer; 0: everywhere
     double through = 9;       ///< whether points are seen through a trunk is asked nearer than this; 0: never
   } range;                    ///< how far is looked
 

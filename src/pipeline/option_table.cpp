@@ -113,8 +113,6 @@ std::vector<OptionEntry> optionTable(Options &o)
        "nearest new trunk"},
       {"range.detect_max", &o.range.detect_max, OptionBound(o.range.detect_min, "range.detect_min"), 50, "m",
        "farthest new trunk; farther costs precision"},
-      {"range.near", &o.range.near, 0, 100, "m",
-       "trunks are sought where the saliency has something nearer; 0: everywhere"},
       {"range.through", &o.range.through, 0, 100, "m", "nearer points seen through a trunk count against it; 0: never"},
 
       {"detection.window", &o.detection.window, 4, 100, "frames", "looked at together for new trunks"},
