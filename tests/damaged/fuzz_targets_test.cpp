@@ -203,8 +203,7 @@ TEST(FuzzTargets, DamagedRecordingsAndCommands)
 
 TEST(FuzzTargets, DamagedGraphs)
 {
-  test::FlightOptions options;
-  options.poses = 8;
+  test::FlightOptions options{8};
   const test::Flight flight = test::simulateFlight(options);
   test::Replay replay(flight, test::smootherFor(options));
   replay.run();
