@@ -5,6 +5,7 @@
 #include "support/files.h"
 #include "support/shell.h"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <fmt/format.h>
@@ -20,11 +21,9 @@ namespace fs = std::filesystem;
 
 std::size_t posesIn(const fs::path &run)
 {
-  std::ifstream file(run / "trajectory.tum");
-  std::size_t count = 0;
-  for (std::string line; std::getline(file, line);)
-    count += line.front() != '#';
-  return count;
+  const std::vector<std::string> lines = test::linesOf(run / "trajectory.tum");
+  return static_cast<std::size_t>(
+      std::count_if(lines.begin(), lines.end(), [](const std::string &line) { return line.front() != '#'; }));
 }
 
 std::size_t hiddenIn(const fs::path &run)
