@@ -155,6 +155,7 @@ TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
   vpSimulatorArDrone robot(clearing(), calm());
   takeOff(robot);
   EXPECT_TRUE(robot.isInAir());
+  EXPECT_NEAR(robot.body().pose().t.z(), calm().body.takeoff_height, 0.06);
   robot.emergency();
   EXPECT_FALSE(robot.isInAir());
   robot.takeOff();
@@ -163,6 +164,7 @@ TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
   robot.land();
   robot.advance(6);
   EXPECT_FALSE(robot.isInAir());
+  EXPECT_NEAR(robot.body().pose().t.z(), 0.05, 0.01);
 }
 
 TEST(SimulatorArDrone, FramesComeAtTheirRateAndLate)
