@@ -3,16 +3,13 @@
 /// \file
 /// Reads the stages of a source tree and who includes whom. The lists of src/CMakeLists.txt are the only ones.
 
+#include "support/files.h"
+
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <regex>
 #include <set>
 #include <sstream>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 namespace bole::test
 {
@@ -26,14 +23,6 @@ struct Stage
   Names depends;
   Names headers; ///< public headers without a source of their own
 };
-
-inline std::string textOf(const fs::path &path)
-{
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// The stages in the order of the file.
 inline std::vector<Stage> readStages(const fs::path &cmake_file)

@@ -4,8 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cstdlib>
-
 namespace
 {
 namespace fs = std::filesystem;
@@ -21,23 +19,17 @@ class SmallTree : public testing::Test
 protected:
   SmallTree()
   {
-    std::string pattern = (fs::temp_directory_path() / "bole-tree-XXXXXX").string();
-    m_root = mkdtemp(pattern.data());
     write("include/bole/pose.h", "");
     write("src/geometry/pose.cpp", "#include <bole/pose.h>\n");
     write("src/map/map.h", "#include <bole/pose.h>\n");
     write("src/CMakeLists.txt", "\nbole_add_stage(geometry)\nbole_add_stage(map DEPENDS geometry)\n");
   }
-  ~SmallTree() override { fs::remove_all(m_root); }
 
-  void write(const std::string &name, const std::string &text) const
-  {
-    fs::create_directories((m_root / name).parent_path());
-    std::ofstream(m_root / name) << text;
-  }
+  void write(const std::string &name, const std::string &text) const { m_folder.write(name, text); }
   std::vector<std::string> faults() const { return IncludeGraph(m_root).faults(); }
 
-  fs::path m_root;
+  bole::test::TemporaryFolder m_folder;
+  const fs::path m_root = m_folder.path();
 };
 } // namespace
 

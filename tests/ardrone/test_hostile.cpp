@@ -6,6 +6,7 @@
 #include "emulator/server_socket.h"
 #include "emulator/uvlc_encoder.h"
 
+#include "files.h"
 #include "flight.h"
 
 #include <gtest/gtest.h>
@@ -109,20 +110,11 @@ void send(const ServerSocket &socket, const Bytes &bytes, const sockaddr_in &to)
   socket.sendTo(bytes.data(), bytes.size(), to);
 }
 
-vpImage<unsigned char> scene(int shift)
-{
-  vpImage<unsigned char> image(120, 160);
-  for (unsigned v = 0; v < 120; ++v)
-    for (unsigned u = 0; u < 160; ++u)
-      image[v][u] = static_cast<unsigned char>((u * 7 + v * 3 + static_cast<unsigned>(shift) * 5) % 251);
-  return image;
-}
-
 /// A key frame with its header, of a stream of its own.
 Bytes paveFrame(std::uint32_t number)
 {
   VideoPacketEncoder encoder({160, 128, 20, 1e6, false, 1, ""});
-  const auto encoded = encoder.encode(scene(static_cast<int>(number)), true);
+  const auto encoded = encoder.encode(test::stripes(160, 120, static_cast<int>(number)), true);
   PaveHeader header;
   header.display_width = 160;
   header.display_height = 120;
@@ -201,7 +193,7 @@ TEST(Hostile, WhatComesFromAnotherPortIsNotHeard)
   const ServerSocket other = ServerSocket::bindUdp("127.0.0.1", 0);
   for (std::uint32_t k = 1; k <= 50; ++k) {
     send(other, encodeNavdata(packet(1000 + k)), of_navdata);
-    send(other, encodeUvlc(scene(static_cast<int>(k)), k), of_video);
+    send(other, encodeUvlc(test::stripes(160, 120, static_cast<int>(k)), k), of_video);
   }
   ASSERT_TRUE(eventually([&] { // the drone's own come later
     static std::uint32_t sequence = 1;
@@ -209,7 +201,7 @@ TEST(Hostile, WhatComesFromAnotherPortIsNotHeard)
     return link.counters().navdata_packets > 0;
   }));
   expectSeesAgain(link, [&](std::uint32_t number) {
-    send(drone.video, encodeUvlc(scene(static_cast<int>(number)), number), of_video);
+    send(drone.video, encodeUvlc(test::stripes(160, 120, static_cast<int>(number)), number), of_video);
   });
   const LinkCounters counters = link.counters();
   EXPECT_EQ(counters.navdata_late + counters.navdata_refused, 0u);
@@ -233,7 +225,7 @@ TEST(Hostile, AFloodOfTinyDatagramsMakesNoFrames)
   EXPECT_FALSE(link.next(frame, 0));
   EXPECT_EQ(link.counters().video.frames, 0u);
   expectSeesAgain(link, [&](std::uint32_t number) {
-    send(drone.video, encodeUvlc(scene(static_cast<int>(number)), number), client);
+    send(drone.video, encodeUvlc(test::stripes(160, 120, static_cast<int>(number)), number), client);
   });
   drone.expectNoFlightCommand();
 }
@@ -287,7 +279,7 @@ TEST(Hostile, NoTrafficMakesTheClientSendAFlightCommand)
     const sockaddr_in of_video = generation == 1 ? FakeDrone::clientOf(drone.video) : sockaddr_in{};
     ServerSocket stream = generation == 2 ? drone.accept() : ServerSocket();
     std::mt19937 random(static_cast<unsigned>(generation));
-    const Bytes picture = generation == 1 ? encodeUvlc(scene(1), 1) : paveFrame(1);
+    const Bytes picture = generation == 1 ? encodeUvlc(test::stripes(160, 120, 1), 1) : paveFrame(1);
     for (int k = 0; k < 600; ++k) {
       Navdata navdata = packet(static_cast<std::uint32_t>(k + 1));
       navdata.state = static_cast<std::uint32_t>(random()); // emergency, watchdog, bootstrap, flying, in all mixtures

@@ -1,38 +1,25 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/recording.h"
-
 #include "ardrone/bytes.h"
+#include "ardrone/recording.h"
+#include "support/files.h"
 
 #include "flight.h"
 
 #include <csignal>
-#include <filesystem>
-#include <fstream>
 #include <gtest/gtest.h>
-#include <random>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <visp3/core/vpException.h>
 
 using namespace bole;
+using test::TemporaryFolder;
 
 namespace
 {
-struct TemporaryFolder
-{
-  std::string path;
-  TemporaryFolder()
-  {
-    std::string name = (std::filesystem::temp_directory_path() / "bole_recording_XXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-};
-
 std::vector<std::uint8_t> bytesOf(const std::string &path)
 {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string text = test::textOf(path);
+  return {text.begin(), text.end()};
 }
 
 std::vector<RecordedPiece> all(RecordingReader &reader)
@@ -61,8 +48,8 @@ std::vector<std::size_t> writeTwenty(const std::string &folder)
 TEST(Recording, CutAtAnyByteItKeepsEveryPieceBeforeTheCut)
 {
   const TemporaryFolder folder;
-  const auto ends = writeTwenty(folder.path);
-  auto bytes = bytesOf(folder.path + "/raw.bin");
+  const auto ends = writeTwenty(folder.path());
+  auto bytes = bytesOf(folder / "raw.bin");
   ASSERT_EQ(bytes.size(), ends.back());
   for (std::size_t cut = bytes.size() + 1; cut-- > 0;) {
     RecordingReader reader(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(cut)));
@@ -75,8 +62,8 @@ TEST(Recording, CutAtAnyByteItKeepsEveryPieceBeforeTheCut)
 TEST(Recording, ADamagedPieceIsSkippedAndTheOthersRead)
 {
   const TemporaryFolder folder;
-  const auto ends = writeTwenty(folder.path);
-  auto bytes = bytesOf(folder.path + "/raw.bin");
+  const auto ends = writeTwenty(folder.path());
+  auto bytes = bytesOf(folder / "raw.bin");
   bytes[ends[9] + 21] ^= 0xff;
   RecordingReader reader(std::move(bytes));
   const auto pieces = all(reader);
@@ -89,8 +76,8 @@ TEST(Recording, ADamagedPieceIsSkippedAndTheOthersRead)
 TEST(Recording, OneOfNothingButBeginningsIsGivenUpAtTheCostOfAFewReadings)
 {
   const TemporaryFolder folder;
-  writeTwenty(folder.path);
-  const auto good = bytesOf(folder.path + "/raw.bin");
+  writeTwenty(folder.path());
+  const auto good = bytesOf(folder / "raw.bin");
   std::vector<std::uint8_t> bytes;
   for (int i = 0; i < 100'000; ++i) {
     appendLittleEndian(bytes, std::uint32_t{0x45434542});
@@ -111,18 +98,17 @@ TEST(Recording, AKilledWriterLeavesAReadableRecording)
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    RecordingWriter writer(folder.path);
+    RecordingWriter writer(folder.path());
     const std::vector<std::uint8_t> bytes(5000, 7);
     for (std::int64_t i = 0;; ++i)
       writer.write(LinkChannel::video, i, bytes.data(), bytes.size());
   }
   test::eventually([&] {
-    return std::filesystem::exists(folder.path + "/raw.bin") &&
-           std::filesystem::file_size(folder.path + "/raw.bin") > 200'000;
+    return std::filesystem::exists(folder / "raw.bin") && std::filesystem::file_size(folder / "raw.bin") > 200'000;
   });
   kill(child, SIGKILL);
   waitpid(child, nullptr, 0);
-  RecordingReader reader(folder.path);
+  RecordingReader reader(folder.path());
   const auto pieces = all(reader);
   EXPECT_GT(pieces.size(), 30u);
   for (std::size_t i = 0; i < pieces.size(); ++i)
@@ -133,11 +119,10 @@ TEST(Recording, AKilledWriterLeavesAReadableRecording)
 TEST(Recording, RefusesToWriteOverARecordingAndToReadAnythingElse)
 {
   const TemporaryFolder folder;
-  writeTwenty(folder.path);
-  EXPECT_THROW(RecordingWriter(folder.path), vpException);
-  EXPECT_THROW(RecordingReader(folder.path + "/nothing"), vpException);
-  std::ofstream(folder.path + "/other.bin") << "something else\n";
-  EXPECT_THROW(RecordingReader(folder.path + "/other.bin"), vpException);
+  writeTwenty(folder.path());
+  EXPECT_THROW(RecordingWriter(folder.path()), vpException);
+  EXPECT_THROW(RecordingReader(folder / "nothing"), vpException);
+  EXPECT_THROW(RecordingReader(folder.write("other.bin", "something else\n")), vpException);
 }
 
 TEST(Recording, ARecordedFlightIsServedAgain)
@@ -145,7 +130,7 @@ TEST(Recording, ARecordedFlightIsServedAgain)
   for (const int generation : {1, 2}) {
     const TemporaryFolder folder;
     {
-      RecordingWriter writer(folder.path);
+      RecordingWriter writer(folder.path());
       const auto emulator = test::emulate(generation, 40);
       DroneLink link(ArDroneAddress::parse(emulator->address()), {},
                      [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
@@ -154,8 +139,8 @@ TEST(Recording, ARecordedFlightIsServedAgain)
       ASSERT_TRUE(emulator->wait(test::kPatience_s));
       ASSERT_TRUE(test::eventually([&] { return link.counters().video.frames + link.counters().video.skipped >= 38; }));
     }
-    EXPECT_EQ(recordedGeneration(folder.path), generation);
-    ArDroneEmulator replay(makeRecordingFeed(folder.path), {});
+    EXPECT_EQ(recordedGeneration(folder.path()), generation);
+    ArDroneEmulator replay(makeRecordingFeed(folder.path()), {});
     replay.start();
     DroneLink link(ArDroneAddress::parse(replay.address()));
     LiveFrame last;

@@ -156,17 +156,6 @@ TEST(Uvlc, DecodesWhatTheSeparateEncoderWrites)
   }
 }
 
-TEST(Uvlc, AnEvenPictureComesBackExactlyAtEveryGrey)
-{
-  for (int grey = 0; grey < 256; grey += 5) {
-    const vpImage<unsigned char> image(120, 160, static_cast<unsigned char>(grey));
-    const auto bytes = encodeUvlc(image, 1);
-    const UvlcResult result = decodeUvlc(bytes.data(), bytes.size());
-    ASSERT_TRUE(result.whole);
-    EXPECT_LE(largestDifference(result.picture, image), 1) << grey;
-  }
-}
-
 TEST(Uvlc, LosesOneGroupToADamagedBlockAndSaysSo)
 {
   const auto image = scene(320, 240);

@@ -106,16 +106,6 @@ TEST(DroneVideoDecoder, IsWholeAgainFromTheNextKeyFrameOnWhateverWasDamagedWhere
   EXPECT_GT(longest, 0u);
 }
 
-TEST(DroneVideoDecoder, DatagramsThatCannotBeAPictureAreNoFrames)
-{
-  DroneVideoDecoder decoder(1);
-  const Bytes tiny(12, 0xA5);
-  for (int k = 0; k < 10'000; ++k)
-    EXPECT_TRUE(decoder.decode(tiny.data(), tiny.size()).empty());
-  EXPECT_EQ(decoder.counters().refused, 10'000u);
-  EXPECT_EQ(decoder.counters().frames, 0u);
-}
-
 TEST(DroneVideoDecoder, ADatagramThatWasOvertakenIsNoFrame)
 {
   test::MadeUpFlight flight(4);

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /// \file
-/// What the point stage measures on the rendered flights, and what it costs in one thread.
-///
-///     benchmark_motion                 the tables of src/doc/points.md
-///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
+/// What the point stage measures on the rendered flights, and what it costs in one thread: the tables of
+/// src/doc/points.md.
 
+#include "geometry/median.h"
 #include "input/asl_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_motion.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"
-#include <bole/open_source.h>
 
 #include <Eigen/Dense>
 #include <fmt/format.h>
@@ -35,12 +33,6 @@ double threadTime()
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
-}
-
-double median(std::vector<double> values)
-{
-  std::sort(values.begin(), values.end());
-  return values.empty() ? NAN : values[values.size() / 2];
 }
 
 double mean(const std::vector<double> &values)
@@ -115,9 +107,9 @@ void compareRelativePoses(const Flight &flight, bool gyro, bool odometry)
     fmt::print("{:13} {:4} {:4} {:2} | {:6.2f} -> {:5.2f} deg | {:.4f} -> {:.4f} deg | {:5.2f} "
                "({:4.2f}) {:6.2f} ({:4.2f}) | "
                "{:3}/{:3} | {:4.2f} ms\n",
-               flight.name, gyro ? "gyro" : "-", odometry ? "odo" : "-", back, median(e.direction_odometry),
-               median(e.direction), median(e.rotation_gyro), median(e.rotation), mean(e.nees_rotation),
-               median(e.nees_rotation), mean(e.nees_direction), median(e.nees_direction), e.direction.size(),
+               flight.name, gyro ? "gyro" : "-", odometry ? "odo" : "-", back, medianOf(e.direction_odometry),
+               medianOf(e.direction), medianOf(e.rotation_gyro), medianOf(e.rotation), mean(e.nees_rotation),
+               medianOf(e.nees_rotation), mean(e.nees_direction), medianOf(e.nees_direction), e.direction.size(),
                flight.frames.size() - static_cast<std::size_t>(back), time / double(flight.frames.size()));
   }
 }
@@ -181,43 +173,11 @@ void comparePaths(const Flight &flight)
              place_ms / double(n), vertical_ms / double(n));
 }
 
-void plainVideo(const std::string &path)
-{
-  const auto source = openSource(path);
-  PointTracker tracker(source->camera());
-  PointOdometry odometry(source->camera(), kGuessedFocalSigma); // openSource() guesses it
-  VerticalFilter vertical;
-  std::map<std::string, int> statuses;
-  for (Frame frame; source->next(frame);) {
-    if (frame.status != FrameStatus::ok) {
-      continue;
-    }
-    tracker.track(frame.image);
-    const auto placed = odometry.process(tracker);
-    vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, source->camera(), placed.wMc.R, std::nullopt));
-    ++statuses[toString(placed.status)];
-    fmt::print("{:6.2f} s {:13} {:3} points, sigma {:.2f} px, at {:7.3f} {:7.3f} {:7.3f}, turned "
-               "{:6.2f} deg\n",
-               1e-9 * double(frame.stamp_ns), toString(placed.status), placed.points, placed.sigma_px, placed.wMc.t.x(),
-               placed.wMc.t.y(), placed.wMc.t.z(), logSo3(placed.wMc.R).norm() * kDegrees);
-  }
-  for (const auto &[status, count] : statuses) {
-    fmt::print("{} {}\n", status, count);
-  }
-  if (vertical.known()) {
-    fmt::print("up in the first camera: {:.3f} {:.3f} {:.3f}\n", vertical.up().x(), vertical.up().y(),
-               vertical.up().z());
-  }
-}
 } // namespace
 
-int main(int argc, char **argv)
+int main()
 {
   cv::setNumThreads(1);
-  if (argc > 1) {
-    plainVideo(argv[1]);
-    return 0;
-  }
   if (!std::filesystem::exists(std::string(BOLE_SHARED_DATA_DIR) + "/rendered")) {
     fmt::print("skipped: {}/rendered is absent\n", BOLE_SHARED_DATA_DIR);
     return 0;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Cost of a frame, and area under the ROC curve of "nearer than 6 m" on the rendered flights (as counters): flySaliency
-// for what may be known of the motion, ablateSaliency for the parts of the default, one taken away at a time.
+// Cost of a frame, and area under the ROC curve of "nearer than 6 m" on the rendered flights (as counters), for what
+// may be known of the motion.
 #include "support/forest_flight.h"
 #include "support/roc.h"
 
 #include "saliency/saliency.h"
 
 #include <benchmark/benchmark.h>
-#include <iterator>
 #include <string>
 
 namespace
@@ -79,37 +78,6 @@ void flySaliency(benchmark::State &state)
 }
 BENCHMARK(flySaliency)
     ->ArgsProduct({{0, 1, 2}, {odometry_and_gyro, gyro_alone, images_alone}})
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
-
-struct Step
-{
-  const char *name;
-  void (*undo)(SaliencyOptions &);
-};
-const Step kSteps[] = {{"default", [](SaliencyOptions &) {}},
-                       {"evidence of one pair of frames alone", [](SaliencyOptions &o) { o.evidence_decay = 0; }},
-                       {"consecutive frames", [](SaliencyOptions &o) { o.max_frames_apart = 1; }},
-                       {"plain likelihood", [](SaliencyOptions &o) { o.relative_evidence = false; }},
-                       {"sweep from 0.5 m", [](SaliencyOptions &o) { o.min_range = 0.5; }},
-                       {"residual noise 2 %", [](SaliencyOptions &o) { o.sigma_residual = 0.02; }},
-                       {"windows of 9x9", [](SaliencyOptions &o) { o.window_width_px = 9; }},
-                       {"the last four at once", [](SaliencyOptions &o) {
-                          o.relative_evidence = false;
-                          o.min_range = 0.5;
-                          o.sigma_residual = 0.02;
-                          o.window_width_px = 9;
-                        }}};
-
-void ablateSaliency(benchmark::State &state)
-{
-  const Step &step = kSteps[state.range(1)];
-  SaliencyOptions options;
-  step.undo(options);
-  fly(state, kFlights[state.range(0)], odometry_and_gyro, options, step.name);
-}
-BENCHMARK(ablateSaliency)
-    ->ArgsProduct({{0, 1, 2}, benchmark::CreateDenseRange(0, std::size(kSteps) - 1, 1)})
     ->Unit(benchmark::kMillisecond)
     ->Iterations(1);
 } // namespace

@@ -347,8 +347,7 @@ int main(int argc, char **argv)
   }
   const int most = argc > 1 ? std::atoi(argv[1]) : 2000;
   for (int poses : {100, 500, most}) {
-    test::FlightOptions o;
-    o.poses = poses;
+    test::FlightOptions o{poses};
     const test::Flight flight = test::simulateFlight(o);
     test::Replay replay(flight, test::smootherFor(o));
     std::vector<double> ms;

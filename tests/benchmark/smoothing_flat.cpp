@@ -69,8 +69,7 @@ double compareWithBatch(const bole::test::Replay &replay, const bole::test::Flig
 
 int main(int argc, char **argv)
 {
-  bole::test::FlightOptions o;
-  o.poses = argc > 1 ? std::atoi(argv[1]) : 20000;
+  bole::test::FlightOptions o{argc > 1 ? std::atoi(argv[1]) : 20000};
   o.lap = argc > 3 ? std::atoi(argv[3]) : 0;
   const bole::test::Flight flight = bole::test::simulateFlight(o);
   bole::SmootherOptions options = bole::test::smootherFor(o);

@@ -21,7 +21,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <sstream>
@@ -116,9 +115,9 @@ void addCaptured(std::vector<Bytes> &good, const std::string &name, std::size_t 
 
 Bytes bytesOf(const std::string &path, std::size_t most = 1 << 20)
 {
-  std::ifstream file(path, std::ios::binary);
-  EXPECT_TRUE(file) << path;
-  Bytes bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string text = test::textOf(path);
+  EXPECT_FALSE(text.empty()) << path;
+  Bytes bytes(text.begin(), text.end());
   bytes.resize(std::min(bytes.size(), most));
   return bytes;
 }
@@ -130,21 +129,12 @@ Bytes withKind(std::uint8_t kind, Bytes bytes)
   return bytes;
 }
 
-vpImage<unsigned char> scene(unsigned width, unsigned height, int shift)
-{
-  vpImage<unsigned char> image(height, width);
-  for (unsigned v = 0; v < height; ++v)
-    for (unsigned u = 0; u < width; ++u)
-      image[v][u] = static_cast<unsigned char>((u * 7 + v * 3 + static_cast<unsigned>(shift) * 5) % 251);
-  return image;
-}
-
 Bytes paveStream()
 {
   VideoPacketEncoder encoder({160, 128, 20, 4e5, false, 4, ""});
   Bytes stream = {12}; // the target cuts the rest into pieces of 97 bytes
   for (int i = 0; i < 6; ++i) {
-    const auto encoded = encoder.encode(scene(160, 128, i), i == 0);
+    const auto encoded = encoder.encode(test::stripes(160, 128, i), i == 0);
     PaveHeader header;
     header.frame_number = static_cast<std::uint32_t>(i + 1);
     header.timestamp_ms = static_cast<std::uint32_t>(50 * i);
@@ -178,23 +168,21 @@ TEST(FuzzTargets, DamagedPaveStreams)
 
 TEST(FuzzTargets, DamagedUvlcPictures)
 {
-  expectSurvives("uvlc", fuzz_uvlc, {encodeUvlc(scene(88, 72, 0), 1), encodeUvlc(scene(160, 120, 3), 2)}, 1500);
+  expectSurvives("uvlc", fuzz_uvlc,
+                 {encodeUvlc(test::stripes(88, 72, 0), 1), encodeUvlc(test::stripes(160, 120, 3), 2)}, 1500);
 }
 
 TEST(FuzzTargets, DamagedRecordingsAndCommands)
 {
-  const std::string folder = testing::TempDir() + "bole_fuzz_recording";
-  std::filesystem::remove_all(folder);
-  std::string path;
+  const test::TemporaryFolder folder;
   {
-    RecordingWriter writer(folder);
+    RecordingWriter writer(folder.path());
     for (int i = 0; i < 20; ++i) {
       const Bytes bytes(static_cast<std::size_t>(10 + 13 * i), static_cast<std::uint8_t>(i));
       writer.write(i % 2 ? LinkChannel::video : LinkChannel::navdata, 1000 * i, bytes.data(), bytes.size());
     }
   }
-  std::ifstream file(folder + "/raw.bin", std::ios::binary);
-  const Bytes recording{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const Bytes recording = bytesOf(folder / "raw.bin");
   ASSERT_GT(recording.size(), 1000u);
   const std::string text =
       "AT*CONFIG=1,\"general:navdata_demo\",\"FALSE\"\rAT*CTRL=2,5,0\rAT*PCMD=3,1,0,-1085485875,0,0\r";
@@ -203,8 +191,7 @@ TEST(FuzzTargets, DamagedRecordingsAndCommands)
 
 TEST(FuzzTargets, DamagedGraphs)
 {
-  test::FlightOptions options;
-  options.poses = 8;
+  test::FlightOptions options{8};
   const test::Flight flight = test::simulateFlight(options);
   test::Replay replay(flight, test::smootherFor(options));
   replay.run();
@@ -256,7 +243,7 @@ TEST(FuzzTargets, DamagedModels)
 TEST(FuzzTargets, DamagedImages)
 {
   std::vector<Bytes> good;
-  const vpImage<unsigned char> I = scene(64, 48, 0);
+  const vpImage<unsigned char> I = test::stripes(64, 48, 0);
   const cv::Mat image(48, 64, CV_8UC1, I.bitmap);
   for (const char *kind : {".png", ".jpg", ".pgm", ".bmp", ".tiff"}) {
     good.emplace_back();
@@ -267,12 +254,13 @@ TEST(FuzzTargets, DamagedImages)
 
 TEST(FuzzTargets, DamagedVideos)
 {
-  const std::string path = testing::TempDir() + "bole_fuzz_video.mp4";
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "video.mp4";
   {
     VideoWriter writer(path);
     vpImage<vpRGBa> colour;
     for (int i = 0; i < 12; ++i) {
-      vpImageConvert::convert(scene(96, 64, i), colour);
+      vpImageConvert::convert(test::stripes(96, 64, i), colour);
       writer.write(colour, 100'000'000LL * i);
     }
     writer.finish();

@@ -21,14 +21,7 @@ struct DrawnTrunk
   double lean = 0; ///< to the left for a camera that looks along x [tan]
 };
 
-inline Trunk trunkOf(const DrawnTrunk &drawn)
-{
-  Trunk trunk;
-  trunk.xy = {drawn.x, drawn.y};
-  trunk.log_radius = std::log(drawn.radius);
-  trunk.lean.y() = drawn.lean;
-  return trunk;
-}
+inline Trunk trunkOf(const DrawnTrunk &drawn) { return {{drawn.x, drawn.y}, std::log(drawn.radius), {0, drawn.lean}}; }
 
 /// A camera 1.2 m above the ground that looks along x, turned by \p yaw, \p pitch (nose down) and \p roll [rad].
 inline Pose lookingAhead(double x, double y, double yaw = 0, double pitch = 0, double roll = 0)

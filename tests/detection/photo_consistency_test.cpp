@@ -22,29 +22,6 @@ int bandsOf(const LevelColumn &column)
   return bands;
 }
 
-/// Where a camera that is turned and rolled sees a trunk, its columns are as bright as it is.
-TEST(ColumnImage, ColumnsOfATrunkAreAsBrightAsItIsWhateverTheAttitude)
-{
-  const DrawnTrunk trunk{4, 0.6, 0.2, 40};
-  for (const Pose &wMc : {lookingAhead(0, 0), lookingAhead(0.3, -0.2, 0.15, 0.1, -0.2)}) {
-    const ColumnImage level = computeColumnImage(draw({trunk}, wMc, kCamera), kCamera, wMc.R, ElevationRange());
-    const auto at = locate(trunkOf(trunk), ColumnView(level, wMc), kFarthest);
-    ASSERT_TRUE(at.has_value());
-    const LevelColumn inside = level.at(std::tan(at->bearing));
-    const LevelColumn outside = level.at(std::tan(at->bearing + 2 * at->half_angle));
-    ASSERT_GT(bandsOf(inside), 0);
-    ASSERT_GT(bandsOf(outside), 0);
-    for (std::size_t b = 0; b < kLevelBands; ++b) {
-      if (!std::isnan(inside.value[b])) {
-        EXPECT_NEAR(inside.value[b], 40 / 255.0, 0.01);
-      }
-      if (!std::isnan(outside.value[b])) {
-        EXPECT_NEAR(outside.value[b], 200 / 255.0, 0.01);
-      }
-    }
-  }
-}
-
 TEST(ColumnImage, ColumnsLeanAsTheTrunkDoes)
 {
   const DrawnTrunk trunk{4, 0.1, 0.08, 40, 0.12};

@@ -8,6 +8,8 @@
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
+#include "support/files.h"
+#include "support/messages.h"
 #include "support/shell.h"
 #include <bole/cylinder.h>
 #include <bole/graph.h>
@@ -17,17 +19,15 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
 #include <sstream>
-#include <visp3/core/vpException.h>
 #include <visp3/mbt/vpMbGenericTracker.h>
 
 namespace
 {
 using namespace bole;
+using test::linesOf;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
@@ -64,8 +64,6 @@ class Exported : public testing::Test
 protected:
   Exported()
   {
-    std::string pattern = (fs::temp_directory_path() / "bole-export-XXXXXX").string();
-    m_run = mkdtemp(pattern.data());
     writeTrunks(m_run + "/trunks.csv", m_map.trunks);
     writeTrajectory(m_run + "/trajectory.tum", m_map.trajectory);
     RunSummary summary;
@@ -83,21 +81,12 @@ protected:
     graph.pose_priors.push_back({0, {graph.poses[0].wMb, 1e-4 * Matrix6d::Identity()}});
     writeG2o(m_run + "/graph.g2o", graph);
   }
-  ~Exported() override { fs::remove_all(m_run); }
 
   std::string path(const std::string &format, const std::optional<GeoOrigin> &origin = {}) const
   {
     const std::string file = m_run + "/out." + format;
     exportRun(m_run, format, file, origin);
     return file;
-  }
-  static std::vector<std::string> linesOf(const std::string &file)
-  {
-    std::vector<std::string> lines;
-    std::ifstream stream(file);
-    for (std::string line; std::getline(stream, line);)
-      lines.push_back(line);
-    return lines;
   }
   static std::vector<double> numbersOf(const std::string &line)
   {
@@ -109,7 +98,8 @@ protected:
   }
 
   const MapOfRun m_map = smallMap();
-  std::string m_run;
+  test::TemporaryFolder m_folder;
+  const std::string m_run = m_folder.path();
 };
 
 /// What \p tool of Debian's says of \p file; skips the test where it is not installed.
@@ -217,10 +207,6 @@ TEST_F(Exported, GeoJsonWithoutAnOriginHasMetresAndSaysSo)
   const auto json = nlohmann::json::parse(std::ifstream(path("geojson")));
   EXPECT_THAT(json.at("units").get<std::string>(), HasSubstr("metres"));
   EXPECT_NEAR(json["features"][1]["geometry"]["coordinates"][0].get<double>(), m_map.trunks[1].xy.x(), 1e-4);
-}
-
-TEST_F(Exported, GeoJsonWithoutAnOriginIsSaidToBeInMetres)
-{
   EXPECT_THAT(exportRun(m_run, "geojson", m_run + "/m.geojson", {}), HasSubstr("coordinates are metres"));
   EXPECT_EQ(exportRun(m_run, "geojson", m_run + "/m.geojson", GeoOrigin{59.34, 18.07, 30}), "");
   EXPECT_EQ(exportRun(m_run, "ply", m_run + "/m.ply", {}), "");
@@ -230,14 +216,9 @@ TEST_F(Exported, ADamagedSummaryIsNamedInPlainWords)
 {
   for (const char *text : {"{\"scale\": 5}", "{\"ranges\": \"no\"}", "{}"}) {
     std::ofstream(m_run + "/summary.json") << text;
-    try {
-      readMapOfRun(m_run);
-      FAIL() << text;
-    }
-    catch (const vpException &error) {
-      EXPECT_THAT(error.what(), HasSubstr("summary.json: is damaged: ")) << text;
-      EXPECT_THAT(error.what(), testing::Not(HasSubstr("json.exception")));
-    }
+    EXPECT_THAT(test::messageOf([&] { readMapOfRun(m_run); }),
+                testing::AllOf(HasSubstr("summary.json: is damaged: "), testing::Not(HasSubstr("json.exception"))))
+        << text;
   }
 }
 
@@ -424,12 +405,6 @@ TEST_F(Exported, ARunThatOnlyRotatedIsRefused)
 TEST_F(Exported, AMapWithoutTrunksIsRefused)
 {
   writeTrunks(m_run + "/trunks.csv", {});
-  try {
-    path("dxf");
-    FAIL() << "no exception";
-  }
-  catch (const vpException &error) {
-    EXPECT_THAT(error.what(), HasSubstr("no trunk"));
-  }
+  EXPECT_THAT(test::messageOf([&] { path("dxf"); }), HasSubstr("no trunk"));
 }
 } // namespace

@@ -2,13 +2,13 @@
 // What happens to a process: signals, a full disk, a small stack, a reader that goes away, two at once.
 #include "fault_list.h"
 
+#include "support/files.h"
 #include "support/shell.h"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
@@ -19,19 +19,11 @@ namespace
 {
 namespace fs = std::filesystem;
 
-std::string bytesOf(const fs::path &path)
-{
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 std::size_t posesIn(const fs::path &run)
 {
-  std::ifstream file(run / "trajectory.tum");
-  std::size_t count = 0;
-  for (std::string line; std::getline(file, line);)
-    count += line.front() != '#';
-  return count;
+  const std::vector<std::string> lines = test::linesOf(run / "trajectory.tum");
+  return static_cast<std::size_t>(
+      std::count_if(lines.begin(), lines.end(), [](const std::string &line) { return line.front() != '#'; }));
 }
 
 std::size_t hiddenIn(const fs::path &run)
@@ -47,7 +39,7 @@ std::string trackOf(const Shop &shop, const std::string &run, const std::string 
   return shop.bole + " track " + shop.flight + " -o " + run + more;
 }
 
-/// A run that gets \p signal when it has first written what it knows. \return its status as waitpid() tells it.
+/// A run that gets \p signal when it has written fifty poses. \return its status as waitpid() tells it.
 int runUntil(const Shop &shop, const std::string &run, int signal)
 {
   const pid_t child = fork();
@@ -59,7 +51,7 @@ int runUntil(const Shop &shop, const std::string &run, int signal)
     _exit(127);
   }
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(300);
-  while (!fs::exists(run + "/summary.json") && std::chrono::steady_clock::now() < give_up)
+  while (posesIn(run) < 50 && std::chrono::steady_clock::now() < give_up)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   kill(child, signal);
   int status = 0;
@@ -79,7 +71,8 @@ Fault interrupted(const std::string &name, int signal)
     const int status = runUntil(shop, run, signal);
     const std::size_t poses = posesIn(run);
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    return Seen{code == 130 && poses >= 50 && fs::exists(run + "/trunks.csv") && hiddenIn(run) == 0,
+    const bool is_told = test::textOf(run + "/summary.json").find("interrupted") != std::string::npos;
+    return Seen{code == 130 && poses >= 50 && is_told && fs::exists(run + "/trunks.csv") && hiddenIn(run) == 0,
                 fmt::format("exit {}, {} poses kept", code, poses)};
   });
 }
@@ -94,7 +87,7 @@ Seen killedAndResumed(const Shop &shop)
   const int unbroken = test::runShell(trackOf(shop, whole, " --no-video -q")).status;
   bool is_same = resumed == 0 && unbroken == 0 && kept >= 50;
   for (const char *file : {"/trajectory.tum", "/trunks.csv", "/graph.g2o"})
-    is_same = is_same && bytesOf(run + file) == bytesOf(whole + file);
+    is_same = is_same && test::textOf(run + file) == test::textOf(whole + file);
   return {is_same && hiddenIn(run) == 0, fmt::format("{} poses kept; --resume: exit {}, {}", kept, resumed,
                                                      is_same ? "the same bytes" : "OTHER BYTES")};
 }
@@ -122,8 +115,8 @@ Seen noReader(const Shop &shop)
   const int status = test::runShell("(" + trackOf(shop, run, " --no-video --frames 30") + "; echo $? > " + shop.folder +
                                     "/status) | true")
                          .status;
-  const std::string code = bytesOf(shop.folder + "/status");
-  const bool is_complete = bytesOf(run + "/summary.json").find("\"complete\": true") != std::string::npos;
+  const std::string code = test::textOf(shop.folder + "/status");
+  const bool is_complete = test::textOf(run + "/summary.json").find("\"complete\": true") != std::string::npos;
   return {status == 0 && is_complete && code == "0\n",
           fmt::format("exit {}, {}", code.substr(0, code.find('\n')), is_complete ? "complete" : "NOT COMPLETE")};
 }

@@ -82,11 +82,4 @@ TEST(CameraModel, LensesOfBothKindsProjectAsThoseOfOpenCvDo)
   EXPECT_LT((model.distort({0.5, -0.2}) - Eigen::Vector2d(258.9424249, 83.8751459)).norm(), 1e-6);
   EXPECT_EQ(model.distort({0, 0}), Eigen::Vector2d(kCamera.cx, kCamera.cy)); // on the axis, where r is 0
 }
-
-TEST(CameraModel, WithoutDistortionShowsThePinhole)
-{
-  CameraModel model;
-  model.pinhole = kCamera;
-  EXPECT_LT((model.distort({0.5, -0.2}) - kCamera.project({0.5, -0.2, 1})).norm(), 1e-12);
-}
 } // namespace

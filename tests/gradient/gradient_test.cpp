@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/so3.h"
+#include "gradient/border_line.h"
 #include "gradient/gradient.h"
 
 #include <gmock/gmock.h>
@@ -56,29 +58,167 @@ TEST(Gradient, IsTheConvolutionByItsDefinitionUpToTheEdges)
   }
 }
 
-TEST(Gradient, OfARampIsItsSlopeInFullScaleAPixel)
+const PinholeCamera kCamera;
+const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0, 0, 1.2});
+
+RelativeTrunk seen(double roll = 0, double x = 4, double y = 0.4)
 {
-  const auto I = painted(40, 80, [](int u, int) { return 20 + 2.0 * u; });
-  const Gradient gradient = computeGradient(I);
-  EXPECT_NEAR(gradient.signed_x[20][40], 2.0 / 255, 1e-6);
+  const Trunk trunk{{x, y}, std::log(0.2)};
+  return relativeTrunk(Pose(kForward.R * expSo3({0, 0, roll}), kForward.t), Pose(), trunk);
 }
 
-TEST(Gradient, KnowsNothingOfWhatChangesDownwardsOnly)
+vpImage<float> field(const std::function<double(double, double)> &value)
 {
-  const auto I = painted(40, 80, [](int, int v) { return 5.0 * v; });
-  const Gradient gradient = computeGradient(I);
-  for (int v = 0; v < 40; ++v)
-    for (int u = 0; u < 80; ++u)
-      EXPECT_NEAR(gradient.signed_x[v][u], 0, 1e-6);
+  vpImage<float> g(240, 320);
+  for (int v = 0; v < 240; ++v)
+    for (int u = 0; u < 320; ++u)
+      g[v][u] = static_cast<float>(value(u, v));
+  return g;
 }
 
-TEST(Gradient, PeaksAtAStepWithTheSignOfItsBrightness)
+/// Curved across and down, so that both derivatives differ from row to row.
+double wave(double u, double v) { return std::sin(0.13 * u + 0.02 * v) + 0.3 * std::cos(0.05 * v); }
+
+TEST(BorderLine, RunsThroughTheProjectedDirectionsOfItsBorder)
 {
-  const auto I = painted(30, 60, [](int u, int) { return u < 30 ? 200 : 40; });
-  const Gradient gradient = computeGradient(I);
-  for (int u = 0; u < 60; ++u)
-    EXPECT_GE(gradient.signed_x[15][u] + 1e-6f, std::min(gradient.signed_x[15][29], gradient.signed_x[15][30]));
-  EXPECT_NEAR(gradient.signed_x[15][29], gradient.signed_x[15][30], 1e-6); // the step is between the two
-  EXPECT_LT(gradient.signed_x[15][29], -0.1);
+  for (const double roll : {-0.4, 0.0, 0.25})
+    for (const Border border : {Border::left, Border::right}) {
+      const ElevationRange range;
+      const RelativeTrunk trunk = seen(roll);
+      const BorderLine line = borderLine(kCamera, trunk, border, range);
+      ASSERT_GT(line.rows(), 80);
+      for (const double tangent : {range.low, 0.1, range.high}) {
+        const Eigen::Vector2d u = kCamera.project(trunk.borderDirection(border, tangent));
+        EXPECT_NEAR(line.xAt(u.y()), u.x(), 1e-9);
+      }
+      const double top = kCamera.project(trunk.borderDirection(border, range.high)).y();
+      const double foot = kCamera.project(trunk.borderDirection(border, range.low)).y();
+      EXPECT_EQ(line.row_begin, std::ceil(std::max(top, 1.0)));
+      EXPECT_EQ(line.row_end, std::floor(std::min(foot, 238.0)) + 1);
+    }
+}
+
+TEST(BorderLine, StaysInsideTheImageLessItsMargin)
+{
+  // rolled so far that the line leaves through the side
+  const BorderLine line = borderLine(kCamera, seen(0.6, 4, 2.4), Border::left, {-2, 2}, 4);
+  ASSERT_GT(line.rows(), 0);
+  for (int v = line.row_begin; v < line.row_end; ++v) {
+    EXPECT_GE(line.xAt(v), 4 - 1e-9);
+    EXPECT_LE(line.xAt(v), 315 + 1e-9);
+  }
+  EXPECT_GE(line.row_begin, 1);
+  EXPECT_LE(line.row_end, 239);
+}
+
+TEST(BorderLine, HasNoRowsWhereThereIsNothingToSee)
+{
+  EXPECT_EQ(borderLine(kCamera, seen(0, -4, 0.4), Border::left, {}).rows(), 0); // behind the camera
+  EXPECT_EQ(borderLine(kCamera, seen(0, 2, 4), Border::left, {}).rows(), 0);    // beside the image
+  EXPECT_EQ(borderLine(kCamera, seen(1.0), Border::left, {}).rows(), 0);        // not steep
+}
+
+TEST(BorderLine, MovesItsEndsByWhatItIsTold)
+{
+  const BorderLine line = borderLine(kCamera, seen(0.2), Border::left, {}), moved = line.moved(1.5, -0.75);
+  EXPECT_NEAR(moved.xAt(line.row_begin), line.xAt(line.row_begin) + 1.5, 1e-9);
+  EXPECT_NEAR(moved.xAt(line.row_end - 1), line.xAt(line.row_end - 1) - 0.75, 1e-9);
+}
+
+Eigen::Matrix<double, 2, 4> differences(const RelativeTrunk &trunk, Border border, const BorderLine &line, double h)
+{
+  Eigen::Matrix<double, 2, 4> J;
+  const int ends[2] = {line.row_begin, line.row_end - 1};
+  for (int i = 0; i < 4; ++i) {
+    const Vector4d step = h * Vector4d::Unit(i);
+    const BorderLine plus = borderLine(kCamera, trunk.plus(step), border, {}),
+                     minus = borderLine(kCamera, trunk.plus(-step), border, {});
+    for (int k = 0; k < 2; ++k)
+      J(k, i) = (plus.xAt(ends[k]) - minus.xAt(ends[k])) / (2 * h);
+  }
+  return J;
+}
+
+TEST(BorderLine, JacobianAgreesWithCentralDifferences)
+{
+  for (const Border border : {Border::left, Border::right}) {
+    const RelativeTrunk trunk = seen(0.2).plus({0, 0.15, 0, 0.3});
+    const BorderLine line = borderLine(kCamera, trunk, border, {});
+    const auto J = borderJacobian(kCamera, trunk, border, line);
+    const double error = (differences(trunk, border, line, 2e-3) - J).norm();
+    EXPECT_LT(error, 1e-4 * J.norm());
+    EXPECT_NEAR(error / (differences(trunk, border, line, 1e-3) - J).norm(), 4, 0.2);
+  }
+}
+
+TEST(MeanGradient, OfASmoothFieldIsTheMeanOfItsValuesOnTheLine)
+{
+  const auto g = field(wave);
+  const BorderLine line = borderLine(kCamera, seen(0.2), Border::right, {});
+  double mean = 0;
+  for (int v = line.row_begin; v < line.row_end; ++v)
+    mean += wave(line.xAt(v), v) / line.rows();
+  EXPECT_NEAR(meanAlong(g, line).mean, mean, 1e-5);
+  EXPECT_NEAR(meanAlongOnly(g, line), mean, 3e-3); // linear between columns
+}
+
+TEST(MeanGradient, DerivativesAgreeWithCentralDifferences)
+{
+  const auto g = field(wave);
+  const BorderLine line = borderLine(kCamera, seen(0.2), Border::right, {});
+  const MeanGradient at = meanAlong(g, line);
+  const double h = 1e-3;
+  EXPECT_NEAR(at.by_top, (meanAlong(g, line.moved(h, 0)).mean - meanAlong(g, line.moved(-h, 0)).mean) / (2 * h), 1e-6);
+  EXPECT_NEAR(at.by_bottom, (meanAlong(g, line.moved(0, h)).mean - meanAlong(g, line.moved(0, -h)).mean) / (2 * h),
+              1e-6);
+  EXPECT_GT(std::abs(at.by_top), 1e-3);
+}
+
+/// Of an upright line the interpolation is the same in every row: nothing averages its faults away.
+TEST(MeanGradient, OfAnUprightLineIsASmoothFunctionOfItsPlace)
+{
+  const auto g = field([](double u, double) { return std::exp(-0.5 * std::pow((u - 150.3) / 1.4, 2)); });
+  BorderLine line{140, 0, 60, 160};
+  double best = 0, best_x = 0;
+  for (double x = 148; x < 153; x += 0.01) {
+    line.x_top = x;
+    const double mean = meanAlong(g, line).mean;
+    if (mean > best) {
+      best = mean;
+      best_x = x;
+    }
+  }
+  EXPECT_NEAR(best_x, 150.3, 0.1); // linear interpolation gives 150
+}
+
+TEST(MeanGradient, SamplesOutsideTheImageCountAsZero)
+{
+  const auto g = field([](double, double) { return 1.0; });
+  const BorderLine line{-20, 40.0 / 99, 10, 110}; // the first half is left of the image
+  EXPECT_NEAR(meanAlong(g, line).mean, 0.48, 0.02);
+  EXPECT_NEAR(meanAlongOnly(g, line), 0.5, 0.02);
+  EXPECT_EQ(meanAlong(g, BorderLine()).mean, 0);
+}
+
+TEST(Evenness, TellsABorderAlongTheWholeLineFromAPieceOfIt)
+{
+  BorderLine line;
+  line.x_top = 20;
+  line.slope = 0.05;
+  line.row_begin = 10;
+  line.row_end = 90;
+  const auto borderOver = [&](int rows, float value) {
+    vpImage<float> g(100, 60, 0.f);
+    for (int v = line.row_begin; v < line.row_begin + rows; ++v)
+      for (int shift = -2; shift <= 2; ++shift)
+        g[v][static_cast<int>(line.xAt(v)) + shift] = value;
+    return g;
+  };
+  EXPECT_NEAR(evennessAlong(borderOver(80, 0.1f), line, 1), 1, 1e-6);
+  EXPECT_NEAR(evennessAlong(borderOver(40, 0.1f), line, 1), 0.5, 1e-6); // half of the line: 4^2 / (8 * 4)
+  EXPECT_NEAR(evennessAlong(borderOver(10, 0.1f), line, 1), 1.0 / 8, 1e-6);
+  EXPECT_EQ(evennessAlong(borderOver(80, -0.1f), line, 1), 0); // the other polarity
+  EXPECT_NEAR(evennessAlong(borderOver(80, -0.1f), line, -1), 1, 1e-6);
+  EXPECT_EQ(evennessAlong(borderOver(0, 0.f), line, 1), 0);
 }
 } // namespace

@@ -3,29 +3,23 @@
 /// \file
 /// A small ASL folder on disk that tests may damage.
 
+#include "support/files.h"
+
+#include <bole/frame.h>
+
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
-#include <string>
 
 namespace bole::test
 {
 /// 64x48 images at 10 Hz, gyro at 100 Hz, odometry that moves 0.1 m a frame along x. Removed at the end.
-class FlightFolder
+class FlightFolder : public TemporaryFolder
 {
 public:
   explicit FlightFolder(std::size_t frames)
   {
-    std::string pattern = (std::filesystem::temp_directory_path() / "bole-flight-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr)
-      throw std::runtime_error("cannot make a temporary folder");
-    m_path = pattern;
-    std::filesystem::create_directories(m_path + "/mav0/cam0/data");
+    std::filesystem::create_directories(path() + "/mav0/cam0/data");
     std::string images = "#timestamp [ns],filename\n", poses = "#timestamp [ns],x,y,z,qw,qx,qy,qz\n",
                 rates = "#timestamp [ns],x,y,z,ax,ay,az\n";
     for (std::size_t i = 0; i < frames; ++i) {
@@ -40,17 +34,8 @@ public:
     write("mav0/odom0/data.csv", poses);
     write("mav0/imu0/data.csv", rates);
   }
-  ~FlightFolder()
-  {
-    std::error_code error;
-    std::filesystem::remove_all(m_path, error);
-  }
-  FlightFolder(const FlightFolder &) = delete;
-  FlightFolder &operator=(const FlightFolder &) = delete;
-
-  const std::string &path() const { return m_path; }
   static std::string imageName(std::size_t i) { return fmt::format("{:04d}.png", i); }
-  std::string imagePath(std::size_t i) const { return m_path + "/mav0/cam0/data/" + imageName(i); }
+  std::string imagePath(std::size_t i) const { return path() + "/mav0/cam0/data/" + imageName(i); }
   static unsigned char pixel(std::size_t frame, int row, int column)
   {
     const double f = static_cast<double>(frame);
@@ -59,11 +44,6 @@ public:
                                       30 * std::sin(0.47 * column - 0.19 * row + 0.25 * f));
   }
 
-  void write(const std::string &file, const std::string &text) const
-  {
-    std::filesystem::create_directories(std::filesystem::path(m_path + "/" + file).parent_path());
-    std::ofstream(m_path + "/" + file, std::ios::binary) << text;
-  }
   void writeImage(std::size_t i, int width, int height) const
   {
     cv::Mat image(height, width, CV_8UC1);
@@ -86,8 +66,13 @@ public:
     file.seekp(static_cast<std::streamoff>(at));
     file.put(static_cast<char>(byte ^ 0x55));
   }
-
-private:
-  std::string m_path;
 };
+
+inline std::vector<Frame> readAll(FrameSource &source)
+{
+  std::vector<Frame> frames;
+  for (Frame frame; source.next(frame);)
+    frames.push_back(frame);
+  return frames;
+}
 } // namespace bole::test

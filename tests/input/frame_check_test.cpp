@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/messages.h"
+
 #include "input/camera_plausibility.h"
 #include "input/frame_check.h"
+#include "input/frame_health.h"
 
-#include <bole/visp.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <visp3/core/vpException.h>
+#include <random>
 
 using namespace bole;
 using testing::HasSubstr;
@@ -33,24 +35,7 @@ std::string refusalOf(const std::function<void(Frame &)> &spoil, std::optional<s
 {
   Frame frame = soundFrame();
   spoil(frame);
-  try {
-    requireSound(frame, 59, last_ns);
-  }
-  catch (const vpException &error) {
-    return error.getStringMessage();
-  }
-  return "";
-}
-
-std::string refusalOf(MountedCamera camera)
-{
-  try {
-    requirePlausible(camera);
-  }
-  catch (const vpException &error) {
-    return error.getStringMessage();
-  }
-  return "";
+  return test::messageOf([&] { requireSound(frame, 59, last_ns); });
 }
 } // namespace
 
@@ -119,12 +104,12 @@ TEST(FrameCheck, ACameraThatAProgramHandsOverIsCheckedAsOneOfAFile)
 {
   MountedCamera good;
   good.bMc = forwardCamera();
-  EXPECT_EQ(refusalOf(good), "");
   const auto with = [&](const std::function<void(MountedCamera &)> &spoil) {
     MountedCamera camera = good;
     spoil(camera);
-    return refusalOf(camera);
+    return test::messageOf([&] { requirePlausible(camera); });
   };
+  EXPECT_EQ(with([](MountedCamera &) {}), "");
   for (const double wrong : {0.0, -200.0, kNaN, kInfinity, 1e9}) {
     EXPECT_THAT(with([&](MountedCamera &c) { c.model.pinhole.fx = wrong; }), HasSubstr("camera: ")) << wrong;
     EXPECT_THAT(with([&](MountedCamera &c) { c.model.pinhole.fy = wrong; }), HasSubstr("camera: ")) << wrong;
@@ -137,4 +122,86 @@ TEST(FrameCheck, ACameraThatAProgramHandsOverIsCheckedAsOneOfAFile)
   EXPECT_THAT(with([](MountedCamera &c) { c.bMc.R(0, 0) = kNaN; }), HasSubstr("rigid motion"));
   EXPECT_THAT(with([](MountedCamera &c) { c.bMc.R *= 2; }), HasSubstr("rigid motion"));
   EXPECT_THAT(with([](MountedCamera &c) { c.bMc.R.setIdentity(); }), HasSubstr("no rotation in the body"));
+}
+
+namespace
+{
+/// The gaps that are told of frames that come after these intervals [s].
+std::vector<double> gapsOf(const std::vector<double> &intervals_s, FrameStatus status = FrameStatus::ok)
+{
+  PinholeCamera camera;
+  camera.fx = camera.fy = 50;
+  FrameHealth health(camera, Pose());
+  std::vector<double> gaps;
+  double time_s = 7;
+  for (std::size_t i = 0; i <= intervals_s.size(); ++i) {
+    Frame frame;
+    time_s += i > 0 ? intervals_s[i - 1] : 0;
+    frame.stamp_ns = std::llround(1e9 * time_s);
+    frame.status = status;
+    frame.image.resize(48, 64);
+    for (int v = 0; v < 48; ++v)
+      for (int u = 0; u < 64; ++u)
+        frame.image[v][u] = static_cast<unsigned char>(128 + 60 * std::sin(0.3 * u + time_s) * std::cos(0.2 * v));
+    health.judge(frame);
+    if (frame.gap_s > 0)
+      gaps.push_back(frame.gap_s);
+    EXPECT_EQ(frame.gap_s > 0, frame.message.rfind("no picture for", 0) == 0) << frame.message;
+  }
+  return gaps;
+}
+
+std::vector<double> steady(std::size_t count, double interval_s) { return std::vector<double>(count, interval_s); }
+} // namespace
+
+TEST(FrameHealth, TellsOfATimeWithoutAPicture)
+{
+  std::vector<double> intervals = steady(40, 0.1);
+  intervals[20] = 2.1;
+  const std::vector<double> gaps = gapsOf(intervals);
+  ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_NEAR(gaps[0], 2.1, 1e-9);
+}
+
+TEST(FrameHealth, APauseAfterEachBurstIsAGap)
+{
+  std::vector<double> intervals = steady(60, 0.1);
+  intervals[20] = intervals[30] = intervals[40] = intervals[50] = 1;
+  EXPECT_EQ(gapsOf(intervals).size(), 4u);
+}
+
+TEST(FrameHealth, AGapThatTheSourceFillsWithMissingFramesIsNoneOnceMore)
+{
+  std::vector<double> intervals = steady(40, 0.1);
+  intervals[20] = 2.1;
+  EXPECT_TRUE(gapsOf(intervals, FrameStatus::missing).empty());
+}
+
+TEST(FrameHealth, ACameraOfAnyRateThatVariesHasNoGap)
+{
+  std::mt19937 random(1);
+  for (const double usual_s : {0.01, 0.033, 0.1, 0.4, 1.0, 5.0}) {
+    std::vector<double> intervals;
+    for (int i = 0; i < 500; ++i) // between the usual rate and a third more than twice as slow
+      intervals.push_back(usual_s * std::uniform_real_distribution<double>(1, 2.3)(random));
+    EXPECT_TRUE(gapsOf(intervals).empty()) << usual_s;
+  }
+}
+
+TEST(FrameHealth, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
+{
+  std::vector<double> intervals = steady(20, 0.1);
+  const std::vector<double> slow = steady(100, 0.4);
+  intervals.insert(intervals.end(), slow.begin(), slow.end());
+  EXPECT_TRUE(gapsOf(intervals).empty());
+}
+
+TEST(FrameHealth, ACameraThatGoesOnVerySlowlyIsToldOnlyUntilThatIsUsual)
+{
+  std::vector<double> intervals = steady(20, 0.1);
+  const std::vector<double> slow = steady(100, 1);
+  intervals.insert(intervals.end(), slow.begin(), slow.end());
+  const std::size_t gaps = gapsOf(intervals).size();
+  EXPECT_GE(gaps, 1u);
+  EXPECT_LE(gaps, 8u);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Streams by their address, from a camera behind HTTP on this machine.
-#include "input/live_video.h"
+#include "support/files.h"
+#include "support/messages.h"
 
+#include "input/live_video.h"
 #include "input/retry_pause.h"
 #include "output/video_writer.h"
 
@@ -166,7 +168,8 @@ TEST(LiveVideo, ConnectsAgainAndEndsWhereNothingComesAnyMore)
 /// The bytes of an MP4 of 25 pictures in a second.
 std::string recording()
 {
-  const std::string path = fmt::format("{}bole_live_recording_{}.mp4", testing::TempDir(), getpid());
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "recording.mp4";
   VideoWriter video(path);
   for (int k = 0; k < 25; ++k) {
     vpImage<vpRGBa> colour(kHeight, kWidth);
@@ -176,16 +179,14 @@ std::string recording()
     video.write(colour, k * 40'000'000LL);
   }
   video.finish();
-  std::ifstream file(path, std::ios::binary);
-  std::remove(path.c_str());
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return test::textOf(path);
 }
 
 /// The same as an MPEG transport stream, which does not tell how long it is.
 std::string transportStream()
 {
-  const std::string path = fmt::format("{}bole_live_stream_{}.mp4", testing::TempDir(), getpid());
-  std::ofstream(path, std::ios::binary) << recording();
+  const test::TemporaryFolder folder;
+  const std::string path = folder.write("recording.mp4", recording());
   AVFormatContext *in = nullptr, *out = nullptr;
   EXPECT_GE(avformat_open_input(&in, path.c_str(), nullptr, nullptr), 0);
   EXPECT_GE(avformat_alloc_output_context2(&out, nullptr, "mpegts", nullptr), 0);
@@ -205,7 +206,6 @@ std::string transportStream()
   av_free(bytes);
   avformat_free_context(out);
   avformat_close_input(&in);
-  std::remove(path.c_str());
   return stream;
 }
 
@@ -256,19 +256,9 @@ TEST(LiveVideo, WaitsLongerFromAttemptToAttempt)
   EXPECT_EQ(pause.next().count(), 0.5);
 }
 
-std::string errorOf(const std::string &address, const SourceOptions &options = {})
-{
-  try {
-    openStream(address, options);
-  }
-  catch (const vpException &error) {
-    return error.getStringMessage();
-  }
-  return "";
-}
-
 TEST(LiveVideo, WhatDoesNotAnswerIsNamed)
 {
+  const auto errorOf = [](const std::string &address) { return test::messageOf([&] { openStream(address, {}); }); };
   EXPECT_THAT(errorOf("http://127.0.0.1:1/none"), HasSubstr("http://127.0.0.1:1/none: no video"));
   EXPECT_THAT(errorOf("/dev/video987"), HasSubstr("/dev/video987: no camera"));
   EXPECT_THAT(errorOf("http://user:secret@127.0.0.1:1/none"), HasSubstr("http://127.0.0.1:1/none: no video"));

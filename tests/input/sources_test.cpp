@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight_folder.h"
-#include "messages.h"
+#include "support/messages.h"
 
 #include "geometry/so3.h"
 #include "input/sequence_source.h"
@@ -11,15 +11,19 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <opencv2/videoio.hpp>
+#include <random>
 
 using namespace bole;
 using bole::test::FlightFolder;
 using bole::test::messageOf;
 using bole::test::readAll;
+using bole::test::textOf;
 using testing::HasSubstr;
 
 namespace
 {
+constexpr std::size_t kTicks = 28; ///< in the header of an AVI's stream: ticks a frame, then ticks a second
+
 cv::Mat picture(std::size_t index, int width = 96, int height = 64)
 {
   cv::Mat image(height, width, CV_8UC3);
@@ -37,7 +41,7 @@ class Sources : public testing::Test
 {
 protected:
   Sources() : m_flight(1) {}
-  std::string path(const std::string &name) const { return m_flight.path() + "/" + name; }
+  std::string path(const std::string &name) const { return m_flight / name; }
 
   void writeImages(const std::string &pattern, const std::vector<int> &numbers) const
   {
@@ -50,6 +54,12 @@ protected:
     ASSERT_TRUE(writer.isOpened());
     for (std::size_t i = 0; i < frames; ++i)
       writer.write(picture(i));
+  }
+  /// Other bytes in the place of those of a file.
+  void overwrite(const std::string &name, std::size_t at, const std::string &bytes) const
+  {
+    std::string all = textOf(path(name));
+    m_flight.write(name, all.replace(at, bytes.size(), bytes));
   }
   FlightFolder m_flight;
 };
@@ -142,18 +152,11 @@ TEST_F(Sources, AVideoGivesEveryFrameWithItsTime)
 TEST_F(Sources, DamagedFramesOfAVideoAreReportedInTheirPlace)
 {
   writeVideo("v.avi", 12, 10);
-  {
-    // Wipe out the compressed picture of one frame in the middle.
-    std::fstream file(path("v.avi"), std::ios::in | std::ios::out | std::ios::binary);
-    std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    std::size_t at = bytes.find("movi");
-    for (int i = 0; i <= 5; ++i)
-      at = bytes.find("00dc", at + 4);
-    file.clear();
-    file.seekp(static_cast<std::streamoff>(at + 8));
-    for (int i = 0; i < 400; ++i)
-      file.put('\0');
-  }
+  const std::string bytes = textOf(path("v.avi"));
+  std::size_t at = bytes.find("movi");
+  for (int i = 0; i <= 5; ++i)
+    at = bytes.find("00dc", at + 4);
+  overwrite("v.avi", at + 8, std::string(400, '\0')); // the compressed picture of one frame in the middle
   VideoSource source(path("v.avi"));
   const auto frames = readAll(source);
   ASSERT_EQ(frames.size(), 12u);
@@ -166,14 +169,10 @@ TEST_F(Sources, DamagedFramesOfAVideoAreReportedInTheirPlace)
 TEST_F(Sources, AVideoThatWasCutOffReportsTheRestAsMissing)
 {
   writeVideo("v.avi", 12, 10);
-  std::size_t cut = 0; // in the middle of the eighth picture
-  {
-    std::ifstream file(path("v.avi"), std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    cut = bytes.find("movi");
-    for (int i = 0; i < 8; ++i)
-      cut = bytes.find("00dc", cut + 4);
-  }
+  const std::string bytes = textOf(path("v.avi"));
+  std::size_t cut = bytes.find("movi"); // in the middle of the eighth picture
+  for (int i = 0; i < 8; ++i)
+    cut = bytes.find("00dc", cut + 4);
   std::filesystem::resize_file(path("v.avi"), cut + 200);
   VideoSource source(path("v.avi"));
   const auto frames = readAll(source);
@@ -206,14 +205,7 @@ TEST_F(Sources, RefusesOdometryThatBeginsAfterTheVideoOrIsOverBeforeIt)
 TEST_F(Sources, ARateThatNoCameraHasIsNotBelieved)
 {
   writeVideo("v.avi", 5, 10);
-  {
-    std::fstream file(path("v.avi"), std::ios::in | std::ios::out | std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    constexpr std::size_t kScale = 28; // of the stream's header: ticks a frame, then ticks a second
-    file.clear();
-    file.seekp(static_cast<std::streamoff>(bytes.find("strh") + kScale));
-    file.write("\xff\xff\xff\x7f\1\0\0\0", 8);
-  }
+  overwrite("v.avi", textOf(path("v.avi")).find("strh") + kTicks, std::string("\xff\xff\xff\x7f\1\0\0\0", 8));
   VideoSource source(path("v.avi"));
   const auto frames = readAll(source);
   ASSERT_EQ(frames.size(), 5u);
@@ -224,17 +216,13 @@ TEST_F(Sources, ARateThatNoCameraHasIsNotBelieved)
 TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
 {
   writeVideo("v.avi", 10, 10);
-  const auto size = std::filesystem::file_size(path("v.avi"));
+  const std::string good = textOf(path("v.avi"));
   for (unsigned seed = 0; seed < 20; ++seed) {
-    std::filesystem::copy_file(path("v.avi"), path("w.avi"), std::filesystem::copy_options::overwrite_existing);
-    {
-      std::fstream file(path("w.avi"), std::ios::in | std::ios::out | std::ios::binary);
-      std::srand(seed);
-      for (int i = 0; i < 30; ++i) {
-        file.seekp(static_cast<std::streamoff>(6000 + static_cast<std::uintmax_t>(std::rand()) % (size - 6000)));
-        file.put(static_cast<char>(std::rand()));
-      }
-    }
+    std::mt19937 random(seed);
+    std::string bytes = good;
+    for (int i = 0; i < 30; ++i)
+      bytes[6000 + random() % (good.size() - 6000)] = static_cast<char>(random());
+    m_flight.write("w.avi", bytes);
     VideoSource source(path("w.avi"));
     std::int64_t last_ns = -1;
     for (const Frame &frame : readAll(source)) {
@@ -253,9 +241,8 @@ TEST_F(Sources, AVideoWhoseTimesGoBackGoesOnAtItsRate)
     for (std::size_t i = 0; i < 20; ++i)
       writer.write(picture(i));
   }
-  std::ifstream once(path("v.ts"), std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(once), std::istreambuf_iterator<char>()};
-  std::ofstream(path("twice.ts"), std::ios::binary) << bytes << bytes; // as a recorder that was started anew
+  const std::string once = textOf(path("v.ts"));
+  m_flight.write("twice.ts", once + once); // as a recorder that was started anew
   VideoSource source(path("twice.ts"));
   const std::vector<Frame> frames = readAll(source);
   ASSERT_GE(frames.size(), 38u);
@@ -391,19 +378,11 @@ TEST_F(Sources, PixelsOfAVideoMayBeWiderThanHigh)
 
 TEST_F(Sources, ARecordingWithoutItsIndexAndARateOfNoCameraAreNamed)
 {
-  std::ofstream(path("cut.mp4"), std::ios::binary) << std::string("\0\0\0\x20"
-                                                                  "ftypisom",
-                                                                  12)
-                                                   << std::string(4000, 'x');
+  m_flight.write("cut.mp4", std::string("\0\0\0 ftypisom", 12) + std::string(4000, 'x'));
   EXPECT_THAT(messageOf([&] { openSource(path("cut.mp4")); }),
               HasSubstr("cut.mp4: no video: its index is missing (moov)"));
   writeVideo("fast.avi", 5, 10);
-  std::fstream file(path("fast.avi"), std::ios::in | std::ios::out | std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  file.clear();
-  file.seekp(static_cast<std::streamoff>(bytes.find("strh") + 28));
-  file.write("\1\0\0\0\xe8\3\0\0", 8);
-  file.close();
+  overwrite("fast.avi", textOf(path("fast.avi")).find("strh") + kTicks, std::string("\1\0\0\0\xe8\3\0\0", 8));
   EXPECT_THAT(messageOf([&] { openSource(path("fast.avi")); }), HasSubstr("1000 pictures a second by its container"));
 }
 
@@ -451,9 +430,9 @@ TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHas)
 /// Differences of stamps are taken everywhere, and have to fit.
 TEST_F(Sources, RefusesStampsThatNoClockHas)
 {
-  std::ofstream(path("poses.csv")) << "-9223372036854775808,0,0,1,1,0,0,0\n350000000,0,0,1,1,0,0,0\n";
-  std::ofstream(path("poses.tum")) << "-9223372036854775808 0 0 1 0 0 0 1\n";
-  std::ofstream(path("powers.tum")) << "1e300 0 0 1 0 0 0 1\n";
+  m_flight.write("poses.csv", "-9223372036854775808,0,0,1,1,0,0,0\n350000000,0,0,1,1,0,0,0\n");
+  m_flight.write("poses.tum", "-9223372036854775808 0 0 1 0 0 0 1\n");
+  m_flight.write("powers.tum", "1e300 0 0 1 0 0 0 1\n");
   for (const char *name : {"poses.csv", "poses.tum", "powers.tum"})
     EXPECT_THAT(messageOf([&] { readTrajectory(path(name)); }),
                 testing::AllOf(HasSubstr(name), HasSubstr("must be at most 4e+09 s from the epoch")));

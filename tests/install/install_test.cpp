@@ -1,30 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What somebody gets who installs bole: the README's program against the installed tree alone.
+#include "support/files.h"
 #include "support/shell.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <string>
-#include <vector>
 
 namespace
 {
 namespace fs = std::filesystem;
 using bole::test::Outcome;
+using bole::test::textOf;
 using testing::HasSubstr;
-
-std::string textOf(const fs::path &path)
-{
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
 
 /// The block in \p language of the README's section on programs.
 std::string readmeBlock(const std::string &language)
@@ -67,13 +55,13 @@ class Install : public testing::Test
 protected:
   static void SetUpTestSuite()
   {
-    std::string pattern = (fs::temp_directory_path() / "bole-install-XXXXXX").string();
-    s_folder = mkdtemp(pattern.data());
+    s_temporary = std::make_unique<bole::test::TemporaryFolder>();
+    s_folder = s_temporary->path();
     s_prefix = s_folder / "prefix";
     s_installed =
         bole::test::runShell("umask 077; " BOLE_CMAKE " --install " BOLE_BINARY_DIR " --prefix " + s_prefix.string());
   }
-  static void TearDownTestSuite() { fs::remove_all(s_folder); }
+  static void TearDownTestSuite() { s_temporary.reset(); }
   void SetUp() override { ASSERT_EQ(s_installed.status, 0) << s_installed.text; }
 
   /// The build folder of a program of somebody else's with \p program as its source, configured with \p arguments.
@@ -96,6 +84,7 @@ protected:
   }
 
   std::string m_configured; ///< what CMake printed
+  inline static std::unique_ptr<bole::test::TemporaryFolder> s_temporary;
   inline static fs::path s_folder, s_prefix;
   inline static Outcome s_installed;
 };

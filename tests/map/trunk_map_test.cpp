@@ -12,13 +12,7 @@ namespace
 {
 using namespace bole;
 
-Trunk trunkAt(double x, double y, double radius = 0.15)
-{
-  Trunk trunk;
-  trunk.xy = {x, y};
-  trunk.log_radius = std::log(radius);
-  return trunk;
-}
+Trunk trunkAt(double x, double y, double radius = 0.15) { return {{x, y}, std::log(radius)}; }
 
 /// A map in which trunks are added and seen as the pipeline would.
 class Life : public testing::Test
@@ -230,27 +224,6 @@ TEST_F(Life, WithoutParallaxATrunkEarnsItsPlaceByEvenBordersAlone)
   EXPECT_TRUE(m_map.active().empty());
 }
 
-TEST_F(Life, StartsAsACandidate)
-{
-  const int trunk = add(trunkAt(3, 1));
-  see(trunk, m_options.confirm_observations - 1);
-  EXPECT_TRUE(review().changes.empty());
-  EXPECT_EQ(at(trunk).status, TrunkStatus::candidate);
-}
-
-TEST_F(Life, IsConfirmedByEnoughViewsThatFit)
-{
-  const int trunk = add(trunkAt(3, 1));
-  see(trunk, m_options.confirm_observations);
-  const auto changes = review().changes;
-  ASSERT_EQ(changes.size(), 1u);
-  EXPECT_EQ(changes[0].id, at(trunk).id);
-  EXPECT_EQ(changes[0].from, TrunkStatus::candidate);
-  EXPECT_EQ(changes[0].to, TrunkStatus::confirmed);
-  EXPECT_TRUE(review().changes.empty()); // and stays so
-  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 1);
-}
-
 TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
 {
   struct Case
@@ -259,6 +232,7 @@ TEST_F(Life, NothingIsConfirmedThatFailsOneCondition)
     std::function<void(MapTrunk &)> spoil;
   };
   const std::vector<Case> cases = {
+      {"views", [&](MapTrunk &t) { t.observations = m_options.confirm_observations - 1; }},
       {"parallax", [](MapTrunk &t) { t.left = t.right = {}; }},
       {"thin", [&](MapTrunk &t) { t.trunk.log_radius = std::log(0.9 * m_options.radius_min); }},
       {"thick", [&](MapTrunk &t) { t.trunk.log_radius = std::log(1.1 * m_options.radius_max); }},
@@ -371,7 +345,7 @@ TEST_F(Life, TheOddsRiseWithWhatSpeaksForATrunkAndFallWithWhatSpeaksAgainst)
   EXPECT_LT(after([](MapTrunk &t) { t.place_covariance *= 9; }), odds);
 }
 
-TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)
+TEST_F(Life, ATrunkWhoseOddsAreBadIsGivenUp)
 {
   const int trunk = add(trunkAt(3, 1));
   see(trunk, m_options.reject_observations - 1, 0.2, 9);
@@ -380,19 +354,14 @@ TEST_F(Life, ACandidateWhoseOddsAreBadIsGivenUp)
   see(trunk, 1, 0, 9);
   miss(trunk, m_options.lost_misses - 1);
   ASSERT_LT(evidence(trunk), m_options.reject_candidate);
+  const int known = confirmed(trunkAt(9, 1));
+  change(known, [](MapTrunk &t) { t.innovation2 = 9; });
+  ASSERT_LT(evidence(known), m_options.reject_confirmed);
   review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_TRUE(at(trunk).removed);
-}
-
-TEST_F(Life, AConfirmedTrunkWhoseOddsTurnBadIsGivenUp)
-{
-  const int trunk = confirmed(trunkAt(3, 1));
-  change(trunk, [](MapTrunk &t) { t.innovation2 = 9; });
-  ASSERT_LT(evidence(trunk), m_options.reject_confirmed);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_TRUE(at(trunk).removed);
+  for (const int gone : {trunk, known}) {
+    EXPECT_EQ(at(gone).status, TrunkStatus::lost);
+    EXPECT_TRUE(at(gone).removed);
+  }
 }
 
 /// What the columns of many frames speak against goes, also when its borders are tracked well.
@@ -407,18 +376,6 @@ TEST_F(Life, ATrunkWhoseColumnsSpeakAgainstItIsGivenUpOnceEnoughWereSeen)
   review();
   EXPECT_TRUE(at(trunk).removed);
   EXPECT_FALSE(at(other).removed);
-}
-
-TEST_F(Life, WhatTheColumnsSpeakAgainstIsNotConfirmed)
-{
-  const int trunk = add(trunkAt(3, 1));
-  m_map.record(ConsistencyScore{trunk, -0.7, 4});
-  see(trunk, 20);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::candidate);
-  m_map.record(ConsistencyScore{trunk, 0.5, 5});
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
 }
 
 /// Between other borders it is the same trunk of the map, and nothing that was seen between the former ones is left.
@@ -446,42 +403,33 @@ TEST_F(Life, AnotherReadingKeepsTheTrunkAndForgetsItsViews)
   EXPECT_EQ(at(trunk).last_seen_s, m_time_s + 0.1);
 }
 
-TEST_F(Life, WhatHidesALostTrunkSaysNothingMoreAgainstIt)
-{
-  const int trunk = confirmed(trunkAt(3, 1), 200);
-  miss(trunk, m_options.lost_misses);
-  review();
-  ASSERT_EQ(at(trunk).status, TrunkStatus::lost);
-  const double odds = evidence(trunk);
-  miss(trunk, 500);
-  EXPECT_EQ(evidence(trunk), odds);
-}
-
-TEST_F(Life, ACandidateThatIsMissedForLongLeavesTheMap)
-{
-  const int trunk = add(trunkAt(3, 1));
-  see(trunk, 3);
-  miss(trunk, m_options.lost_misses - 1);
-  EXPECT_TRUE(review().changes.empty());
-  miss(trunk, 1);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_TRUE(at(trunk).removed);
-}
-
 TEST_F(Life, AConfirmedTrunkThatIsLostKeepsItsPlaceAndComesBackUnderItsId)
 {
-  const int trunk = confirmed(trunkAt(3, 1), 200);
-  const int id = trunk;
-  miss(trunk, m_options.lost_misses);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_FALSE(at(trunk).removed); // still predicted, so it can be found again
-  EXPECT_TRUE(review().changes.empty());
-  see(trunk, 1);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
-  EXPECT_EQ(at(trunk).id, id);
+  for (const bool is_hidden : {false, true}) { // missed, or where its place is not known any more
+    m_map = TrunkMap(m_options);
+    const int trunk = confirmed(trunkAt(3, 1), 200);
+    miss(trunk, m_options.lost_misses - 1);
+    see(trunk, 1);
+    miss(trunk, m_options.lost_misses - 1);
+    EXPECT_TRUE(review().changes.empty()) << "a view ends a row of misses";
+    const int candidate = add(trunkAt(6, -2));
+    see(candidate, 3);
+    m_map.markOutOfSight(candidate);
+    is_hidden ? m_map.markOutOfSight(trunk) : miss(trunk, 1);
+    review();
+    EXPECT_EQ(at(candidate).status, TrunkStatus::candidate);
+    EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
+    EXPECT_TRUE(m_map.isActive(trunk)); // still predicted, so it can be found again
+    EXPECT_EQ(m_map.records()[0].status, TrunkStatus::confirmed);
+    EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::none);
+    const double odds = evidence(trunk);
+    miss(trunk, 500);
+    EXPECT_EQ(evidence(trunk), odds) << "what hides it says nothing more against it";
+    EXPECT_TRUE(m_map.review(1e6).changes.empty()) << "it is never left behind";
+    see(trunk, 1);
+    review();
+    EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
+  }
 }
 
 TEST_F(Life, ABorderWhoseSignTurnsOverBeginsAnew)
@@ -497,27 +445,13 @@ TEST_F(Life, ABorderWhoseSignTurnsOverBeginsAnew)
   EXPECT_GT(*at(trunk).right_contrast, 0.1);
 }
 
-TEST_F(Life, ACandidateThatWasLeftBehindIsNotLookedForAnyMoreButKeepsWhatWasSeenOfIt)
-{
-  const int candidate = add(trunkAt(3, 1));
-  see(candidate, viewAt(10.0, 0.3, 0.2, 0.2, 1, 0));
-  m_map.review(10.0 + 0.99 * m_options.candidate_memory_s);
-  EXPECT_EQ(m_map.active().size(), 1u);
-
-  m_map.review(10.0 + 1.01 * m_options.candidate_memory_s);
-
-  EXPECT_TRUE(m_map.active().empty());
-  EXPECT_FALSE(at(candidate).removed);
-  ASSERT_EQ(m_map.records().size(), 1u);
-  EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::undecided);
-}
-
-TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
+TEST_F(Life, ACandidateThatIsLeftBehindKeepsWhatWasSeenOfItAndIsRemovedWhereThatIsNothing)
 {
   m_time_s = 10;
   const int never_seen = add(trunkAt(3, 1)), seen = add(trunkAt(5, 1));
   see(seen, viewAt(10.0, 0.3, 0.2, 0.2, 1, 0));
   EXPECT_TRUE(m_map.review(10.0 + 0.99 * m_options.candidate_memory_s).removed.empty());
+  EXPECT_EQ(m_map.active().size(), 2u);
 
   const MapUpdate update = m_map.review(10.0 + 1.01 * m_options.candidate_memory_s);
 
@@ -525,6 +459,8 @@ TEST_F(Life, ACandidateOfWhichNothingWasEverSeenIsRemovedWhenItIsLeftBehind)
   EXPECT_EQ(at(never_seen).reject_reason, RejectReason::unseen);
   EXPECT_TRUE(at(never_seen).removed);
   EXPECT_FALSE(at(seen).removed);
+  EXPECT_TRUE(m_map.active().empty());
+  EXPECT_EQ(m_map.records()[1].reject_reason, RejectReason::undecided);
 }
 
 TEST_F(Life, ACandidateThatWasLeftBehindIsConfirmedInTheEndWhereItsEstimatesNowAllowIt)
@@ -544,27 +480,12 @@ TEST_F(Life, ACandidateThatWasLeftBehindIsConfirmedInTheEndWhereItsEstimatesNowA
   EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::none);
 }
 
-TEST_F(Life, AConfirmedTrunkIsNeverLeftBehind)
+TEST_F(Life, TwoTrunksInOnePlaceBecomeOneAndNeighboursWithEnoughBetweenThemStayTwo)
 {
-  confirmed(trunkAt(3, 1), 200);
-  m_map.review(1e6);
-  EXPECT_EQ(m_map.active().size(), 1u);
-}
-
-TEST_F(Life, AViewEndsARowOfMisses)
-{
-  const int trunk = confirmed(trunkAt(3, 1), 200);
-  for (int i = 0; i < 5; ++i) {
-    miss(trunk, m_options.lost_misses - 1);
-    see(trunk, 1);
-    EXPECT_TRUE(review().changes.empty());
-  }
-}
-
-TEST_F(Life, TwoTrunksInOnePlaceBecomeOne)
-{
+  confirmed(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance + 0.01, 1), 60);
   const int old = confirmed(trunkAt(3, 1), 60);
-  const int duplicate = add(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance - 0.01, 1));
+  ASSERT_EQ(m_map.count(TrunkStatus::confirmed), 2);
+  const int duplicate = add(trunkAt(3 - 0.15 - 0.15 - m_options.merge_distance + 0.01, 1));
   see(duplicate, 3);
   const auto changes = review().changes;
   ASSERT_EQ(changes.size(), 1u);
@@ -627,21 +548,6 @@ TEST_F(Life, ATrunkSeenLongIsNoGapForATrackThatSlipped)
   EXPECT_TRUE(at(gap).isGap());
 }
 
-TEST_F(Life, ATrunkWhosePlaceIsNotKnownAnyMoreIsLostFromSight)
-{
-  const int trunk = confirmed(trunkAt(3, 1), 60), candidate = add(trunkAt(6, -2));
-  see(candidate, 3);
-  m_map.markOutOfSight(trunk);
-  m_map.markOutOfSight(candidate);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_FALSE(at(trunk).removed);
-  EXPECT_EQ(at(candidate).status, TrunkStatus::candidate);
-  see(trunk, 1);
-  review();
-  EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
-}
-
 TEST_F(Life, WhatLeansFartherThanTrunksDoIsNone)
 {
   const int trunk = confirmed(trunkAt(3, 1), 60);
@@ -662,23 +568,6 @@ TEST_F(Life, ARivalSeenAtTheSameTimeTakesItsViewsWithIt)
   EXPECT_TRUE(update.merged.empty());
   EXPECT_EQ(update.removed, std::vector<std::size_t>{at(rival).smoother_id});
   EXPECT_EQ(at(rival).reject_reason, RejectReason::outdone);
-}
-
-TEST_F(Life, AConfirmedTrunkOutOfSightStaysInTheRecords)
-{
-  const int trunk = confirmed(trunkAt(3, 1), 200);
-  miss(trunk, m_options.lost_misses);
-  review();
-  ASSERT_EQ(at(trunk).status, TrunkStatus::lost);
-  EXPECT_EQ(m_map.records()[0].status, TrunkStatus::confirmed);
-  EXPECT_EQ(m_map.records()[0].reject_reason, RejectReason::none);
-}
-
-TEST_F(Life, NeighboursWithEnoughBetweenThemStayTwo)
-{
-  confirmed(trunkAt(3, 1));
-  confirmed(trunkAt(3 + 0.15 + 0.15 + m_options.merge_distance + 0.01, 1));
-  EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 2);
 }
 
 TEST_F(Life, HypothesesForOnePlaceCompeteUntilOneIsConfirmed)
@@ -786,8 +675,7 @@ TEST_F(Life, AnyHistoryKeepsItsLaws)
 
 TEST_F(Life, RecordsTellThePlaceAtBreastHeight)
 {
-  Trunk leaning = trunkAt(3, 1);
-  leaning.lean = {0.1, -0.05};
+  const Trunk leaning{{3, 1}, std::log(0.15), {0.1, -0.05}};
   const int trunk = add(leaning);
   Matrix5d covariance = Matrix5d::Zero();
   covariance.diagonal() << 0.01, 0.02, 0.04, 1e-3, 2e-3;

@@ -9,15 +9,13 @@
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
+#include "support/files.h"
 #include "support/german_locale.h"
 #include <bole/config.h>
+#include <bole/graph.h>
 #include <bole/pipeline.h>
 
 #include <gmock/gmock.h>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 
 namespace
 {
@@ -27,28 +25,12 @@ namespace fs = std::filesystem;
 class Locales : public testing::Test
 {
 protected:
-  Locales()
-  {
-    std::string pattern = (fs::temp_directory_path() / "bole-locales-XXXXXX").string();
-    m_folder = mkdtemp(pattern.data());
-  }
-  ~Locales() override { fs::remove_all(m_folder); }
-
-  std::string write(const std::string &name, const std::string &text) const
-  {
-    std::ofstream(m_folder + "/" + name) << text;
-    return m_folder + "/" + name;
-  }
-  static std::string contentOf(const fs::path &path)
-  {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
+  std::string write(const std::string &name, const std::string &text) const { return m_folder.write(name, text); }
 
   /// Files of a short flight, mapped here and now.
   std::map<std::string, std::string> filesOfAFlight(const std::string &name) const
   {
-    const std::string run = m_folder + "/" + name;
+    const std::string run = m_folder / name;
     fs::create_directories(run);
     Options options;
     readConfig(write("options.yaml", "odometry:\n  height: 0.125\n"), options);
@@ -68,15 +50,16 @@ protected:
       trunk.status = TrunkStatus::confirmed;
     writeTrunks(run + "/trunks.csv", trunks);
     writeTrajectory(run + "/trajectory.tum", pipeline.smoothedTrajectory());
+    writeG2o(run + "/graph.g2o", pipeline.graph());
     std::map<std::string, std::string> files;
     const std::vector<Cylinder> many(600);
     writeCao(run + "/many.cao", many);
     for (const auto &entry : fs::directory_iterator(run))
-      files[entry.path().filename().string()] = contentOf(entry.path());
+      files[entry.path().filename().string()] = test::textOf(entry.path());
     return files;
   }
 
-  std::string m_folder;
+  test::TemporaryFolder m_folder;
 };
 
 TEST_F(Locales, AFlightIsMappedToTheSameBytes)
@@ -110,5 +93,6 @@ TEST_F(Locales, FilesOfOthersAreReadAlike)
   EXPECT_EQ(readCao(write("m.cao", "V1\n2\n0.5 0 0\n0.5 0 3\n0\n0\n0\n1\n0 1 0.125\n0\n"))[0].radius, 0.125);
   EXPECT_EQ(readTrajectory(write("o.tum", "1.5 0.25 0 1 0 0 0 1\n"))[0].wMb.t.x(), 0.25);
   EXPECT_EQ(parseOrigin("59.25,18.5,0.5").longitude, 18.5);
+  EXPECT_EQ(readG2o(write("g.g2o", "VERTEX_SE3:QUAT 0 0.5 0 0 0 0 0 1\n")).poses[0].wMb.t.x(), 0.5);
 }
 } // namespace

@@ -18,14 +18,7 @@ using test::cameraAt;
 const PinholeCamera kCamera;
 const vpMbTrunkTracker::Options kOptions;
 
-Cylinder leaning()
-{
-  Cylinder trunk;
-  trunk.foot = {4, 0.8, 0};
-  trunk.top = {4.2, 0.6, 3};
-  trunk.radius = 0.2;
-  return trunk;
-}
+Cylinder leaning() { return {{4, 0.8, 0}, {4.2, 0.6, 3}, 0.2, ""}; }
 
 BorderPlane planeAt(const Pose &cMo, const Cylinder &trunk, Border side)
 {
@@ -81,53 +74,6 @@ TEST(BorderPlane, DerivativeByTheRadiusAgreesWithCentralDifferencesAtTwoStepSize
   };
   EXPECT_LT(std::abs(errorAt(0.1)), 0.01 * std::abs(by_log_radius));
   EXPECT_NEAR(errorAt(0.2) / errorAt(0.1), 4, 0.3);
-}
-
-TEST(BorderPlane, ResidualOfAPointOfTheBorderIsZero)
-{
-  const Cylinder c = cameraAt({0, 0, 1.2}, 0.1) * leaning();
-  const RelativeTrunk relative = relativeTrunk(c);
-  for (const Border side : kBorders) {
-    const ContactLine line = contactLine(c, relative, side);
-    for (const double t : {0.1, 0.5, 0.9}) {
-      const Eigen::Vector3d p = line.foot + t * (line.top - line.foot);
-      EXPECT_NEAR(BorderPlane(c, relative, side).residual(p / p.z()), 0, 1e-12);
-    }
-  }
-}
-
-TEST(BorderPlane, BordersAreThoseOfVpCylinder)
-{
-  const Cylinder trunk = leaning();
-  const Pose cMo = cameraAt({0, 0, 1.2}, 0.1);
-  const Eigen::Vector3d a = trunk.axis();
-  vpCylinder cylinder(a.x(), a.y(), a.z(), trunk.foot.x(), trunk.foot.y(), trunk.foot.z(), trunk.radius);
-  cylinder.track(cMo.toVisp());
-  // a point of each limb of ViSP (rho = x cos theta + y sin theta) lies on one of our borders
-  for (const auto &[rho, theta] :
-       {std::pair(cylinder.getRho1(), cylinder.getTheta1()), std::pair(cylinder.getRho2(), cylinder.getTheta2())}) {
-    const Eigen::Vector3d m(rho * std::cos(theta) - 0.3 * std::sin(theta),
-                            rho * std::sin(theta) + 0.3 * std::cos(theta), 1);
-    const double left = planeAt(cMo, trunk, Border::left).residual(m),
-                 right = planeAt(cMo, trunk, Border::right).residual(m);
-    EXPECT_LT(std::min(std::abs(left), std::abs(right)), 1e-9);
-    EXPECT_GT(std::max(std::abs(left), std::abs(right)), 1e-2);
-  }
-}
-
-TEST(BorderPlane, AnUprightTrunkSaysNothingAlongItsAxisNorAboutIt)
-{
-  const Pose cMo = cameraAt({0, 0, 1.2}, 0.3, 0.2);
-  const Cylinder c = cMo * test::uprightTrunk(4, 0.8, 0.2);
-  Row6d L;
-  double by_log_radius = 0;
-  BorderPlane(c, relativeTrunk(c), Border::left).derive({0.1, 0.2, 1}, L, by_log_radius);
-  const Eigen::Vector3d axis = c.axis();
-  Vector6d along, about; // the camera moves along the axis; it rotates about it, axis through the foot of the trunk
-  along << axis, Eigen::Vector3d::Zero();
-  about << -axis.cross(c.foot), axis;
-  EXPECT_NEAR(L * along, 0, 1e-12);
-  EXPECT_NEAR(L * about, 0, 1e-12);
 }
 
 TEST(BorderPlane, SidewaysIsHowFarTheBorderMovesInARowOfTheImage)

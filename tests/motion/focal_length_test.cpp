@@ -2,8 +2,10 @@
 #include "rendered_walls.h"
 
 #include "geometry/so3.h"
+#include "motion/bundle.h"
 #include "motion/focal_length.h"
 #include <bole/open_source.h>
+#include <bole/trunk.h>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +13,7 @@ namespace
 {
 using namespace bole;
 using namespace bole::test;
+using motion::reprojection;
 
 PinholeCamera guessOf(const PinholeCamera &camera, double factor)
 {
@@ -69,5 +72,77 @@ TEST(FocalLength, AStraightFlightDoesNotTellIt)
     return Pose{Eigen::Matrix3d::Identity(), {0.12 * k, 0, 0.1 * k}};
   });
   EXPECT_FALSE(estimate.known);
+}
+
+const Pose kA(expSo3({0.1, -0.2, 0.05}), {0.3, -0.1, 0.2});
+const Pose kB(expSo3({0.12, -0.1, 0.02}), {0.6, -0.15, 0.5});
+const Eigen::Vector2d kXy(0.2, -0.1), kSeen(0.15, -0.12);
+constexpr double kInverseDepth = 0.2, kFocal = 1.2;
+
+double jacobianError(double step)
+{
+  Eigen::Matrix<double, 2, 6> J_a, J_b;
+  Eigen::Vector2d J_q, J_f;
+  const auto at = [](const Pose &a, const Pose &b, double inverse_depth, double focal) {
+    return reprojection(a, b, kXy, inverse_depth, kSeen, nullptr, nullptr, nullptr, focal);
+  };
+  reprojection(kA, kB, kXy, kInverseDepth, kSeen, &J_a, &J_b, &J_q, kFocal, &J_f);
+  double worst = 0;
+  for (int i = 0; i < 6; ++i) {
+    Vector6d xi = Vector6d::Zero();
+    xi[i] = step;
+    const Eigen::Vector2d by_a =
+        (at(kA.plus(xi), kB, kInverseDepth, kFocal) - at(kA.plus(-xi), kB, kInverseDepth, kFocal)) / (2 * step);
+    const Eigen::Vector2d by_b =
+        (at(kA, kB.plus(xi), kInverseDepth, kFocal) - at(kA, kB.plus(-xi), kInverseDepth, kFocal)) / (2 * step);
+    worst = std::max({worst, (by_a - J_a.col(i)).norm(), (by_b - J_b.col(i)).norm()});
+  }
+  const Eigen::Vector2d by_q =
+      (at(kA, kB, kInverseDepth + step, kFocal) - at(kA, kB, kInverseDepth - step, kFocal)) / (2 * step);
+  const Eigen::Vector2d by_f =
+      (at(kA, kB, kInverseDepth, kFocal * std::exp(step)) - at(kA, kB, kInverseDepth, kFocal * std::exp(-step))) /
+      (2 * step);
+  return std::max({worst, (by_q - J_q).norm(), (by_f - J_f).norm()});
+}
+
+TEST(Reprojection, JacobiansAgreeWithCentralDifferencesAtTwoSteps)
+{
+  const double coarse = jacobianError(2e-3), fine = jacobianError(1e-3);
+  EXPECT_LT(fine, 1e-5);
+  EXPECT_NEAR(coarse / fine, 4, 0.4);
+}
+
+/// A camera that flies a curve among points, seen with a focal length that is off.
+TEST(SolveBundle, FindsTheFocalLengthByWhichAllWasNormalised)
+{
+  constexpr double kOff = 1.1; // of the true one: what is seen looks smaller
+  constexpr int kFrames = 10, kPoints = 60;
+  std::vector<motion::BundleFrame> frames(kFrames);
+  std::vector<motion::BundlePoint> points;
+  for (int k = 0; k < kFrames; ++k)
+    frames[k].wMc = Pose(expSo3({0.005 * k, 0.04 * k, 0}), {0.3 * k, 0.02 * k * k, 0.15 * k});
+  for (int i = 0; i < kPoints; ++i) {
+    const Eigen::Vector3d p(4 * std::sin(1.7 * i), 2 * std::cos(2.3 * i), 7 + 3 * std::sin(0.9 * i));
+    motion::BundlePoint point;
+    for (int k = 0; k < kFrames; ++k) {
+      const Eigen::Vector3d c = frames[k].wMc.inverse() * p;
+      if (k == 0) {
+        point.xy = c.head<2>() / c.z() / kOff;
+        point.inverse_depth = 1 / c.z();
+      }
+      else
+        point.seen.push_back({k, c.head<2>() / c.z() / kOff, 1});
+    }
+    points.push_back(point);
+  }
+  frames[0].fixed = true;
+  motion::BundleOptions options;
+  options.iterations = 60;
+  options.settled = 1e-9;
+  options.first_baseline = (frames[1].wMc.t - frames[0].wMc.t).norm();
+  options.with_focal = true;
+  const motion::BundleResult result = motion::solveBundle(frames, points, options);
+  ASSERT_TRUE(result.solved);
+  EXPECT_NEAR(result.log_focal, -std::log(kOff), 1e-3);
 }
 } // namespace

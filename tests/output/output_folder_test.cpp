@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/files.h"
+#include "support/messages.h"
+
 #include "input/atomic_file.h"
 #include <bole/output_folder.h>
 
 #include <gmock/gmock.h>
 
-#include <filesystem>
-#include <fstream>
 #include <sys/stat.h>
-#include <visp3/core/vpException.h>
 
 namespace
 {
 using namespace bole;
+using test::textOf;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
@@ -20,36 +21,17 @@ const FileNames kNames = {"record.json", "table.csv", "views/*.jpg"};
 class OutputFolders : public testing::Test
 {
 protected:
-  void SetUp() override
+  void write(const std::string &name, const std::string &text = "somebody's") const
   {
-    std::string pattern = (fs::temp_directory_path() / "bole-folder-XXXXXX").string();
-    m_root = mkdtemp(pattern.data());
-    m_folder = m_root / "out";
-  }
-  void TearDown() override { fs::remove_all(m_root); }
-
-  void write(const fs::path &name, const std::string &text = "somebody's") const
-  {
-    fs::create_directories((m_folder / name).parent_path());
-    std::ofstream(m_folder / name) << text;
-  }
-  std::string textOf(const fs::path &path) const
-  {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
+    m_temporary.write("out/" + name, text);
   }
   std::string refusal() const
   {
-    try {
-      OutputFolder(m_folder.string(), kNames);
-      return "";
-    }
-    catch (const vpException &error) {
-      return error.getStringMessage();
-    }
+    return test::messageOf([&] { OutputFolder(m_folder.string(), kNames); });
   }
 
-  fs::path m_root, m_folder;
+  test::TemporaryFolder m_temporary;
+  const fs::path m_root = m_temporary.path(), m_folder = m_root / "out";
 };
 
 TEST_F(OutputFolders, WhatSomebodyElseCalledAlikeIsNotTaken)

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What people look at: the overlay, the videos, the map.
+#include "support/files.h"
+
 #include "input/video_source.h"
 #include "output/map_svg.h"
 #include "output/video_writer.h"
+#include <bole/open_source.h>
 #include <bole/overlay.h>
 
 #include <gmock/gmock.h>
@@ -21,14 +24,11 @@ const PinholeCamera kCamera;
 
 OverlayTrunk trunkAhead(TrunkStatus status = TrunkStatus::confirmed)
 {
-  Trunk trunk;
-  trunk.xy = {3, 0};
-  trunk.log_radius = std::log(0.3);
+  const Trunk trunk{{3, 0}, std::log(0.3)};
   OverlayTrunk ahead;
   ahead.id = 4;
   ahead.status = status;
-  ahead.relative =
-      relativeTrunk(Pose((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0, 0, 1.2}), Pose(), trunk);
+  ahead.relative = relativeTrunk(Pose(forwardCamera().R, {0, 0, 1.2}), Pose(), trunk);
   return ahead;
 }
 
@@ -143,16 +143,10 @@ vpImage<vpRGBa> card(int i)
   return picture;
 }
 
-std::string freshVideo(const std::string &name)
-{
-  const std::string path = testing::TempDir() + "bole_" + name + ".mp4";
-  fs::remove(path);
-  return path;
-}
-
 TEST(VideoWriter, GivesBackEveryPictureWithItsTime)
 {
-  const std::string path = freshVideo("round_trip");
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "round_trip.mp4";
   const std::vector<std::int64_t> stamps_ms = {5000, 5100, 5200, 5350, 5400, 6400, 6500, 6533};
   {
     VideoWriter video(path);
@@ -180,24 +174,19 @@ TEST(VideoWriter, GivesBackEveryPictureWithItsTime)
 
 TEST(VideoWriter, LeavesNothingWithoutFinish)
 {
-  const std::string path = freshVideo("unfinished");
-  const auto files = [&] {
-    int count = 0;
-    for (const auto &entry : fs::directory_iterator(fs::path(path).parent_path()))
-      count += entry.path().filename().string().find("bole_unfinished") != std::string::npos;
-    return count;
-  };
+  const test::TemporaryFolder folder;
   {
-    VideoWriter video(path);
+    VideoWriter video(folder / "unfinished.mp4");
     video.write(card(0), 0);
     video.write(card(1), 40000000);
   }
-  EXPECT_EQ(files(), 0);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
 TEST(VideoWriter, DropsAPictureWhoseTimeDoesNotRiseAndRefusesAnotherSize)
 {
-  VideoWriter video(freshVideo("rules"));
+  const test::TemporaryFolder folder;
+  VideoWriter video(folder / "rules.mp4");
   video.write(card(0), 1000000000);
   video.write(card(1), 1000000000);
   EXPECT_EQ(video.pictures(), 1u);

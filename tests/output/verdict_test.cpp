@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a run says of itself.
+#include "support/files.h"
+
 #include "output/verdict.h"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include <atomic>
-#include <filesystem>
-#include <fstream>
 
 using namespace bole;
 using testing::HasSubstr;
@@ -169,9 +169,8 @@ TEST(Summary, HoldsWhatTheRunCanBeRedoneWith)
 
 TEST(InputDigest, IsTheSha256OfAFile)
 {
-  const std::string path = testing::TempDir() + "bole_digest.txt";
-  std::ofstream(path) << "abc";
-  const auto digest = digestOf(path, std::atomic<bool>(false));
+  const test::TemporaryFolder folder;
+  const auto digest = digestOf(folder.write("digest.txt", "abc"), std::atomic<bool>(false));
   ASSERT_TRUE(digest);
   EXPECT_EQ(digest->bytes, 3u);
   EXPECT_EQ(digest->sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"); // FIPS 180-2, B.1
@@ -179,20 +178,17 @@ TEST(InputDigest, IsTheSha256OfAFile)
 
 TEST(InputDigest, OfAFolderFollowsNamesAndContentAndThatOfNothingIsNone)
 {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::path(testing::TempDir()) / "bole_digest";
-  fs::remove_all(folder);
-  fs::create_directories(folder / "sub");
-  std::ofstream(folder / "a") << "1";
-  std::ofstream(folder / "sub/b") << "23";
+  const test::TemporaryFolder folder;
+  folder.write("a", "1");
+  folder.write("sub/b", "23");
   const std::atomic<bool> go(false), stop(true);
-  const auto first = digestOf(folder.string(), go);
+  const auto first = digestOf(folder.path(), go);
   ASSERT_TRUE(first);
   EXPECT_EQ(first->bytes, 3u);
-  EXPECT_EQ(digestOf(folder.string(), go)->sha256, first->sha256);
-  fs::rename(folder / "a", folder / "c");
-  EXPECT_NE(digestOf(folder.string(), go)->sha256, first->sha256);
-  EXPECT_EQ(digestOf((folder / "%05d.png").string(), go)->bytes, 1u + 2u);
-  EXPECT_FALSE(digestOf(folder.string(), stop));
+  EXPECT_EQ(digestOf(folder.path(), go)->sha256, first->sha256);
+  std::filesystem::rename(folder / "a", folder / "c");
+  EXPECT_NE(digestOf(folder.path(), go)->sha256, first->sha256);
+  EXPECT_EQ(digestOf(folder / "%05d.png", go)->bytes, 1u + 2u);
+  EXPECT_FALSE(digestOf(folder.path(), stop));
   EXPECT_FALSE(digestOf("ardrone://192.168.1.1", go));
 }

@@ -41,8 +41,7 @@ protected:
   static Detection detected(double x_error, double radius)
   {
     Detection detection;
-    detection.trunk.xy = {4 + x_error, 1.6 * (4 + x_error) / 4};
-    detection.trunk.log_radius = std::log(radius);
+    detection.trunk = {{4 + x_error, 1.6 * (4 + x_error) / 4}, std::log(radius)};
     return detection;
   }
   CandidateTrack follow(const Detection &detection) const
@@ -85,8 +84,7 @@ TEST_F(Adopting, WhereNothingStandsNothingIsSeen)
 TEST_F(Adopting, ViewsBehindANearerTrunkOfTheMapAreLeftOut)
 {
   MapTrunk curtain;
-  curtain.trunk.xy = {2, 0.8};
-  curtain.trunk.log_radius = std::log(0.3);
+  curtain.trunk = {{2, 0.8}, std::log(0.3)};
   curtain.status = TrunkStatus::confirmed;
   m_map = TrunkMap(MapOptions(), {curtain});
   EXPECT_LT(follow(detected(0.02, 0.15)).views.size(), static_cast<std::size_t>(kFrames));

@@ -2,6 +2,7 @@
 // The pipeline as a user calls it.
 #include "support/drawn_trunks.h"
 
+#include "pipeline/engine.h"
 #include "pipeline/stage_options.h"
 #include "pipeline/units.h"
 #include <bole/pipeline.h>
@@ -19,6 +20,7 @@ namespace
 const PinholeCamera kCamera;
 const Pose kMount = SmootherOptions::forwardCamera();
 
+/// Sideways to and fro before trunks, with a pose filter that makes no errors.
 Frame byHand(int k, const std::vector<Cylinder> &wood = test::smallWood())
 {
   Frame frame; // its index is left alone
@@ -177,28 +179,90 @@ TEST(Pipeline, BeforeAnyFrameThereIsNothing)
   EXPECT_TRUE(pipeline.smoothedTrajectory().empty());
 }
 
-TEST(Units, OptionsAndReadingsAreInversesOfEachOther)
-{
-  const StageOptions metres;
-  const StageOptions units = inUnits(metres, 2.5);
-  EXPECT_NEAR(units.detection.range_max * 2.5, metres.detection.range_max, 1e-12);
-  EXPECT_NEAR(units.map.usual_radius * 2.5, metres.map.usual_radius, 1e-12);
-  Trunk trunk;
-  trunk.xy = {2, -1};
-  EXPECT_NEAR(inMetres(trunk, 2.5).radius(), 2.5 * trunk.radius(), 1e-12);
-  EXPECT_NEAR(inMetres(trunk, 2.5).xy.x(), 5, 1e-12);
-  const Pose wMb(Eigen::Matrix3d::Identity(), {1, 2, 3}), bMc(kMount.R, {0.1, 0, 0.05});
-  EXPECT_LT(((inMetres(wMb, bMc, 2.5) * bMc).t - 2.5 * (wMb * bMc).t).norm(), 1e-12);
-}
-
 TEST(Units, WhatACameraSeesOfATrunkDoesNotDependOnTheUnit)
 {
   const Pose wMb(Eigen::Matrix3d::Identity(), {1, 0.2, 1.3});
-  Trunk trunk;
-  trunk.xy = {5, 1};
+  const Trunk trunk{{5, 1}};
   const RelativeTrunk before = relativeTrunk(wMb, kMount, trunk);
   const RelativeTrunk after = relativeTrunk(inMetres(wMb, kMount, 0.7), kMount, inMetres(trunk, 0.7));
   EXPECT_LT(before.minus(after).norm(), 1e-12);
+}
+
+// What views of a trunk count for. One that is darker than what is behind it, and then brighter: what a drone sees that
+// flies round it.
+
+constexpr int kTurned = 40; ///< frame in which light and dark change places
+
+Frame turnedFrame(int k)
+{
+  Frame frame = byHand(k);
+  if (k >= kTurned)
+    for (unsigned i = 0; i < frame.image.getSize(); ++i)
+      frame.image.bitmap[i] = static_cast<unsigned char>(255 - frame.image.bitmap[i]);
+  return frame;
+}
+
+/// Confirmed trunks tracked in each of 60 frames.
+std::vector<int> trackedWith(int turned_frames)
+{
+  StageOptions options;
+  options.flow.turned_frames = turned_frames;
+  Pipeline pipeline(kCamera, kMount, options);
+  std::vector<int> tracked;
+  for (int k = 0; k < 60; ++k) {
+    int count = 0;
+    for (const TrunkInView &trunk : pipeline.process(turnedFrame(k)).trunks)
+      count += trunk.id < 5 && trunk.status == TrunkStatus::confirmed && trunk.is_tracked;
+    tracked.push_back(count);
+  }
+  return tracked;
+}
+
+TEST(TurnedTrunk, IsTrackedOnAfterAsManyFramesAsAskedForAndNotBefore)
+{
+  const std::vector<int> tracked = trackedWith(3);
+  ASSERT_GE(tracked[kTurned - 1], 2);
+  EXPECT_EQ(tracked[kTurned], 0);
+  EXPECT_EQ(tracked[kTurned + 1], 0);
+  for (int k = kTurned + 2; k < 60; ++k)
+    EXPECT_GE(tracked[static_cast<std::size_t>(k)], tracked[kTurned - 1] - 1) << k;
+}
+
+TEST(TurnedTrunk, IsAnotherEdgeWhereNobodyAsksForIt)
+{
+  const std::vector<int> tracked = trackedWith(0);
+  ASSERT_GE(tracked[kTurned - 1], 2);
+  for (int k = kTurned; k < kTurned + 8; ++k)
+    EXPECT_EQ(tracked[static_cast<std::size_t>(k)], 0) << k;
+}
+
+/// Standard deviation of log r of the nearest trunk after 30 frames to and fro and \p rest frames at rest.
+double radiusSigmaAfter(int rest, double view_correlation)
+{
+  StageOptions options;
+  options.flow.view_correlation = view_correlation;
+  Engine pipeline(kCamera, kMount, options);
+  for (int k = 0; k < 30 + rest; ++k) {
+    Frame frame = byHand(std::min(k, 30));
+    frame.stamp_ns = k * 100000000LL;
+    pipeline.process(frame);
+  }
+  double sigma = -1, nearest = 1e9;
+  for (const MapTrunk &trunk : pipeline.trunks().trunks())
+    if (trunk.status == TrunkStatus::confirmed && !trunk.removed && trunk.trunk.xy.norm() < nearest) {
+      nearest = trunk.trunk.xy.norm();
+      sigma = std::sqrt(trunk.covariance(2, 2));
+    }
+  return sigma;
+}
+
+TEST(ViewCorrelation, OneViewSeenAgainAndAgainTeachesLittle)
+{
+  const double moved = radiusSigmaAfter(1, 0.05), each_counts = radiusSigmaAfter(40, 0),
+               shared = radiusSigmaAfter(40, 0.05);
+  ASSERT_GT(moved, 0);
+  EXPECT_LT(each_counts, 0.85 * moved);
+  EXPECT_GT(shared, 0.95 * moved);
 }
 } // namespace
 } // namespace bole

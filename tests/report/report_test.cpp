@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/files.h"
+#include "support/shell.h"
+
+#include "output/base64.h"
 #include "output/best_view.h"
 #include "report/report_page.h"
 
 #include <gmock/gmock.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -69,6 +69,7 @@ TEST(Report, TellsOfEachConfirmedTrunkWhatWasKnownAndOfOthersWhereTheyStand)
   const nlohmann::json trunks = jsonOf(smallRun())["trunks"];
   ASSERT_EQ(trunks.size(), 4u);
   EXPECT_EQ(trunks[0]["picture"], "data:image/jpeg;base64,cGljdHVyZQ==");
+  EXPECT_EQ(base64("fooba") + base64("foobar") + base64(std::string("\xff\xfe\x00", 3)), "Zm9vYmE=Zm9vYmFy//4A");
   EXPECT_EQ(trunks[0]["curve"].size(), 30u);
   EXPECT_NEAR(trunks[0]["curve"][3][1], 3.7, 1e-9);
   EXPECT_FALSE(trunks[1].contains("picture"));
@@ -136,25 +137,18 @@ TEST(Report, OfLongFlightsDrawsWhatIsSeen)
 /// The page as a browser has it once its script has run.
 std::string rendered(const RunRecord &run)
 {
-  std::string folder = (std::filesystem::temp_directory_path() / "bole-report-XXXXXX").string();
-  folder = mkdtemp(folder.data());
-  std::ofstream(folder + "/report.html") << reportHtml(run);
-  const std::string command = "chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + folder +
-                              "/profile --virtual-time-budget=3000 --dump-dom file://" + folder +
-                              "/report.html 2>/dev/null";
-  std::string dom;
-  if (FILE *pipe = popen(command.c_str(), "r")) {
-    for (int c; (c = std::fgetc(pipe)) != EOF;)
-      dom += static_cast<char>(c);
-    pclose(pipe);
-  }
-  std::filesystem::remove_all(folder);
+  const test::TemporaryFolder folder;
+  const std::string page = folder.write("report.html", reportHtml(run));
+  const std::string dom =
+      test::runShell("chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + folder / "profile" +
+                     " --virtual-time-budget=3000 --dump-dom file://" + page + " 2>/dev/null")
+          .text;
   return dom.substr(0, dom.find("<script type"));
 }
 
 TEST(ReportInABrowser, ShowsTrunksTimeLineAndDoubts)
 {
-  if (std::system("command -v chromium >/dev/null") != 0)
+  if (test::runShell("command -v chromium").status != 0)
     GTEST_SKIP() << "needs chromium";
   RunRecord run = smallRun();
   std::string dom = rendered(run);
@@ -174,11 +168,9 @@ TEST(ReportInABrowser, ShowsTrunksTimeLineAndDoubts)
 TEST(Trace, ReadsBackWhatItWrote)
 {
   const RunRecord run = smallRun();
-  std::string folder = (std::filesystem::temp_directory_path() / "bole-trace-XXXXXX").string();
-  folder = mkdtemp(folder.data());
-  writeTrace(folder, run.trace);
-  const FlightTrace back = readTrace(folder);
-  std::filesystem::remove_all(folder);
+  const test::TemporaryFolder folder;
+  writeTrace(folder.path(), run.trace);
+  const FlightTrace back = readTrace(folder.path());
   ASSERT_EQ(back.frames.size(), run.trace.frames.size());
   EXPECT_EQ(back.frames[7].status, FrameStatus::corrupt);
   EXPECT_EQ(back.frames[29].stamp_ns, run.trace.frames[29].stamp_ns);

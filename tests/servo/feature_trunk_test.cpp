@@ -27,14 +27,7 @@ Pose cameraPose(const Eigen::Vector3d &turn = {0.05, -0.2, 0.1})
   return Pose(wRc * bole::expSo3(turn), Eigen::Vector3d(0.3, -0.2, 1.2));
 }
 
-Trunk leaningTrunk()
-{
-  Trunk trunk;
-  trunk.xy = {4, 0.7};
-  trunk.log_radius = std::log(0.2);
-  trunk.lean = {0.05, -0.08};
-  return trunk;
-}
+Trunk leaningTrunk() { return {{4, 0.7}, std::log(0.2), {0.05, -0.08}}; }
 
 vpFeatureTrunk featureAt(const Pose &wMc)
 {

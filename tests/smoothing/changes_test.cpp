@@ -11,24 +11,14 @@ namespace bole
 {
 namespace
 {
-using test::DenseReference;
-using test::Flight;
-using test::FlightOptions;
-using test::Replay;
-using test::simulateFlight;
-using test::smootherFor;
+using namespace test;
 
-FlightOptions shortFlight()
-{
-  FlightOptions o;
-  o.poses = 60;
-  return o;
-}
+const FlightOptions kShort{60};
 
 TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
 {
-  const Flight flight = simulateFlight(shortFlight());
-  Replay replay(flight, smootherFor(shortFlight()));
+  const Flight flight = simulateFlight(kShort);
+  Replay replay(flight, smootherFor(kShort));
   replay.run();
   const std::size_t trunks = replay.smoother.graph().trunks.size();
 
@@ -44,8 +34,8 @@ TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
 
 TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
 {
-  const Flight flight = simulateFlight(shortFlight());
-  Replay whole(flight, smootherFor(shortFlight())), halves(flight, smootherFor(shortFlight()));
+  const Flight flight = simulateFlight(kShort);
+  Replay whole(flight, smootherFor(kShort)), halves(flight, smootherFor(kShort));
   whole.run();
   std::vector<int> first;
   for (int i = 0; i < 60; ++i) {
@@ -72,11 +62,11 @@ TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
 
 TEST(Changes, WronglyAssociatedViewsDoNotBendTheMap)
 {
-  FlightOptions clean = shortFlight(), dirty = shortFlight();
+  FlightOptions dirty = kShort;
   dirty.outliers = 0.03;
   const Flight flight = simulateFlight(dirty);
-  Replay robust(flight, smootherFor(clean));
-  SmootherOptions quadratic = smootherFor(clean);
+  Replay robust(flight, smootherFor(kShort));
+  SmootherOptions quadratic = smootherFor(kShort);
   quadratic.summary_loss.kind = LossKind::quadratic;
   Replay plain(flight, quadratic);
   robust.run();
@@ -102,8 +92,7 @@ SmootherOptions forgetting(const FlightOptions &o, int window)
 
 TEST(Changes, AWindowThatForgetsStaysNearTheWhole)
 {
-  FlightOptions o;
-  o.poses = 200;
+  FlightOptions o{200};
   const Flight flight = simulateFlight(o);
   Replay full(flight, smootherFor(o)), window(flight, forgetting(o, 40));
   full.run();
@@ -124,8 +113,7 @@ TEST(Changes, AWindowThatForgetsStaysNearTheWhole)
 TEST(Changes, WhatLeftTheWindowResistsAsItDidBefore)
 {
   constexpr double kPull = 0.05, kSure = 0.02; // [m]
-  FlightOptions o;
-  o.poses = 90;
+  FlightOptions o{90};
   const Flight flight = simulateFlight(o);
   std::vector<double> cost, moved;
   for (const bool forgets : {false, true}) {
@@ -153,8 +141,7 @@ TEST(Changes, WhatLeftTheWindowResistsAsItDidBefore)
 
 TEST(Changes, AFactorWithAForgottenEndIsNotAdded)
 {
-  FlightOptions o;
-  o.poses = 100;
+  FlightOptions o{100};
   const Flight flight = simulateFlight(o);
   Replay window(flight, forgetting(o, 20));
   window.run();
@@ -169,8 +156,7 @@ TEST(Changes, AFactorWithAForgottenEndIsNotAdded)
 
 TEST(Changes, ATrunkThatWasForgottenStandsWhereItWasWhenItIsSeenAgain)
 {
-  FlightOptions o;
-  o.poses = 260;
+  FlightOptions o{260};
   const Flight flight = simulateFlight(o);
   SmootherOptions options = forgetting(o, 20);
   options.remembered = 0;
@@ -225,8 +211,7 @@ TEST(Changes, TrunksThatLeftTheWindowAreMergedInItsPrior)
 
 TEST(Changes, AHypothesisThatIsGivenUpAfterItsViewsLeftTheWindowIsAsIfItHadNeverBeen)
 {
-  FlightOptions o;
-  o.poses = 120;
+  FlightOptions o{120};
   const Flight flight = simulateFlight(o);
   Replay with(flight, forgetting(o, 30)), without(flight, forgetting(o, 30));
   std::size_t wrong = 0;
@@ -253,8 +238,7 @@ TEST(Changes, AHypothesisThatIsGivenUpAfterItsViewsLeftTheWindowIsAsIfItHadNever
 
 TEST(Changes, NewTrunksStandWhereTheyAreAlsoWhenAllOfTheFlightWasShifted)
 {
-  FlightOptions o;
-  o.poses = 140;
+  FlightOptions o{140};
   Flight flight = simulateFlight(o);
   flight.first_covariance.diagonal().head<2>().setConstant(1e2);
   Replay replay(flight, smootherFor(o));

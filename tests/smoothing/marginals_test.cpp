@@ -13,17 +13,18 @@ namespace bole
 {
 namespace
 {
-using test::DenseReference;
-using test::Flight;
-using test::FlightOptions;
-using test::Replay;
-using test::simulateFlight;
-using test::smootherFor;
+using namespace test;
+
+/// Of x and y of a trunk as a pose has them, along the axes of the world there.
+Eigen::Vector2d placeSeenFrom(const Pose &wMb, const Trunk &trunk, double heading)
+{
+  const double turned = std::atan2(wMb.R(1, 0), wMb.R(0, 0)) - heading;
+  return Eigen::Rotation2Dd(-turned) * (trunk.xy - wMb.t.head<2>());
+}
 
 TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
 {
-  FlightOptions o;
-  o.poses = 50;
+  FlightOptions o{50};
   const Flight flight = simulateFlight(o);
   Replay replay(flight, smootherFor(o));
   replay.run();
@@ -45,31 +46,8 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
                               J_trunk * C.block(t, t, 5, 5) * J_trunk.transpose() + cross + cross.transpose();
     EXPECT_TRUE(smoother.relativeCovariance(j).isApprox(expected, 1e-4)) << j;
     EXPECT_NEAR(smoother.bearingVariance(j), expected(2, 2), 1e-4 * expected(2, 2)) << j;
-  }
-}
 
-namespace
-{
-/// Of x and y of a trunk as a pose has them, along the axes of the world there.
-Eigen::Vector2d placeSeenFrom(const Pose &wMb, const Trunk &trunk, double heading)
-{
-  const double turned = std::atan2(wMb.R(1, 0), wMb.R(0, 0)) - heading;
-  return Eigen::Rotation2Dd(-turned) * (trunk.xy - wMb.t.head<2>());
-}
-} // namespace
-
-TEST(Marginals, OfAPlaceAsTheLastPoseHasItThatSawItAgreeWithTheWholeSystem)
-{
-  FlightOptions o;
-  o.poses = 50;
-  const Flight flight = simulateFlight(o);
-  Replay replay(flight, smootherFor(o));
-  replay.run();
-  Smoother &smoother = replay.smoother;
-  smoother.optimize(1e-12);
-  DenseReference dense(smoother.graph());
-  const Eigen::MatrixXd C = dense.covariance();
-  for (std::size_t j = 0; j < dense.graph().trunks.size(); ++j) {
+    // its place as the last pose has it that saw it
     std::size_t last = 0;
     for (const Graph::ObservationEdge &view : dense.graph().observations)
       if (view.trunk == j)
@@ -87,17 +65,16 @@ TEST(Marginals, OfAPlaceAsTheLastPoseHasItThatSawItAgreeWithTheWholeSystem)
       };
       J.col(k) = (at(kStep) - at(-kStep)) / (2 * kStep);
     }
-    const int p = dense.poseRow(last), t = dense.trunkRow(j);
+    const int l = dense.poseRow(last);
     Eigen::Matrix<double, 11, 11> joint;
-    joint << C.block(p, p, 6, 6), C.block(p, t, 6, 5), C.block(t, p, 5, 6), C.block(t, t, 5, 5);
+    joint << C.block(l, l, 6, 6), C.block(l, t, 6, 5), C.block(t, l, 5, 6), C.block(t, t, 5, 5);
     EXPECT_TRUE(smoother.placeCovariance(j).isApprox(J * joint * J.transpose(), 1e-3)) << j;
   }
 }
 
 TEST(Marginals, APlaceAsSeenIsAsWellKnownHoweverFarThePathHasDrifted)
 {
-  FlightOptions o;
-  o.poses = 800;
+  FlightOptions o{800};
   const Flight flight = simulateFlight(o);
   SmootherOptions options = smootherFor(o);
   Replay whole(flight, options);
@@ -134,8 +111,7 @@ TEST(Marginals, ErrorsOfManyFlightsAreWhatTheCovariancesSay)
   double trunk_mean = 0, pose_mean = 0; // NEES over degrees of freedom
   const int runs = 60;
   for (int run = 0; run < runs; ++run) {
-    FlightOptions o;
-    o.poses = 60;
+    FlightOptions o{60};
     o.seed = 100 + run;
     const Flight flight = simulateFlight(o);
     SmootherOptions options = smootherFor(o);
@@ -143,8 +119,7 @@ TEST(Marginals, ErrorsOfManyFlightsAreWhatTheCovariancesSay)
     Replay replay(flight, options);
     replay.run();
     replay.smoother.optimize();
-    const DenseReference dense_graph(replay.smoother.graph());
-    DenseReference dense = dense_graph;
+    DenseReference dense(replay.smoother.graph());
     const Eigen::MatrixXd C = dense.covariance();
     const int from = dense.trunkRow(0), count = static_cast<int>(C.rows()) - from;
     Eigen::VectorXd error(count);
@@ -163,9 +138,6 @@ TEST(Marginals, ErrorsOfManyFlightsAreWhatTheCovariancesSay)
     trunks_in += trunk_nees > quantile(count, -1.96) && trunk_nees < quantile(count, 1.96);
     poses_in += pose_nees > quantile(6, -1.96) && pose_nees < quantile(6, 1.96);
   }
-  std::printf("NEES in the 95 %% band: trunks %d, poses %d of %d runs; mean over degrees of "
-              "freedom %.3f, %.3f\n",
-              trunks_in, poses_in, runs, trunk_mean, pose_mean);
   EXPECT_NEAR(trunk_mean, 1, 0.1);
   EXPECT_NEAR(pose_mean, 1, 0.25);
   EXPECT_GE(trunks_in, 0.9 * runs);

@@ -82,27 +82,6 @@ TEST(SquareRootSummary, IsTheSameEnergyAsASumOfSquares)
     }
 }
 
-TEST(SquareRootSummary, JacobianAgreesWithCentralDifferences)
-{
-  Random random;
-  const SummaryFactor factor = factorOfRank(random, 4);
-  SquareRootSummary root;
-  ASSERT_EQ(squareRoot(factor, root), SummaryStatus::ok);
-  const RelativeTrunk at = factor.optimum.plus(Vector4d(0.3, -0.2, 0.4, 0.2));
-  Matrix4d J;
-  root.residual(at, &J);
-  const auto differences = [&](double h) {
-    Matrix4d D;
-    for (int i = 0; i < 4; ++i)
-      D.col(i) =
-          (root.residual(at.plus(h * Vector4d::Unit(i))) - root.residual(at.plus(-h * Vector4d::Unit(i)))) / (2 * h);
-    return D;
-  };
-  const double error = (differences(2e-2) - J).norm();
-  EXPECT_LT(error, 1e-2 * J.norm());
-  EXPECT_NEAR(error / (differences(1e-2) - J).norm(), 4, 0.2);
-}
-
 TEST(SquareRootSummary, SetsAnEigenvalueJustBelowZeroToZero)
 {
   Random random;

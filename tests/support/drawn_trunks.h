@@ -28,11 +28,7 @@ inline Pose cameraAt(const Eigen::Vector3d &w_position, double yaw = 0, double p
 
 inline Cylinder uprightTrunk(double x, double y, double radius, double height = 4)
 {
-  Cylinder trunk;
-  trunk.foot = {x, y, 0};
-  trunk.top = {x, y, height};
-  trunk.radius = radius;
-  return trunk;
+  return {{x, y, 0}, {x, y, height}, radius, ""};
 }
 
 /// Five trunks ahead of a camera near the origin, none hides another.

@@ -21,26 +21,15 @@ const std::string kFirstPose = " --init 0,1.19,1.12,-6.4"; ///< of the demonstra
 std::string modelOfTheWood(const std::string &folder, double side = 1)
 {
   std::vector<Cylinder> trunks;
-  for (const TruthTrunk &tree : readTruthTrunks(kFlight)) {
-    if (tree.radius <= 0)
-      continue;
-    Cylinder trunk;
-    trunk.foot = {tree.xy.x(), side * tree.xy.y(), 0.1};
-    trunk.top = {tree.xy.x(), side * tree.xy.y(), 4};
-    trunk.radius = tree.radius;
-    trunks.push_back(trunk);
-  }
+  for (const TruthTrunk &tree : readTruthTrunks(kFlight))
+    if (const double x = tree.xy.x(), y = side * tree.xy.y(); tree.radius > 0)
+      trunks.push_back({{x, y, 0.1}, {x, y, 4}, tree.radius, ""});
   fs::create_directories(folder);
   writeCao(folder + "/wood.cao", trunks);
   return folder + "/wood.cao";
 }
 
-/// Lines of a table without its header and its units.
-std::size_t rowsOf(const std::string &path)
-{
-  const std::string text = textOf(path);
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 2;
-}
+constexpr std::size_t kHead = 2; ///< lines of a table: names and units
 
 /// Farthest that the trajectory in \p folder is from the truth [m].
 double worstError(const std::string &folder)
@@ -63,7 +52,7 @@ TEST(Follow, KeepsTheDemonstrationFlightInItsWood)
   const auto summary = jsonOf(folder + "/follow.json");
   EXPECT_EQ(summary.at("frames"), 120);
   EXPECT_GT(summary.at("followed"), 100);
-  EXPECT_EQ(rowsOf(folder + "/status.csv"), 120u);
+  EXPECT_EQ(linesIn(folder + "/status.csv"), kHead + 120);
   EXPECT_LT(worstError(folder), 0.3);
   EXPECT_GT(fs::file_size(folder + "/overlay.mp4"), 50'000u);
 }
@@ -90,7 +79,7 @@ TEST(Follow, IsNotPlacedInAnotherWoodByItself)
   EXPECT_THAT(outcome.text, HasSubstr("not placed on the map"));
   EXPECT_EQ(jsonOf(folder + "/follow.json").at("trusted"), false);
   EXPECT_EQ(jsonOf(folder + "/follow.json").at("followed"), 0);
-  EXPECT_EQ(rowsOf(folder + "/status.csv"), 60u);
+  EXPECT_EQ(linesIn(folder + "/status.csv"), kHead + 60);
 }
 
 TEST(Follow, SaysWhatIsWrongWithAFirstPose)

@@ -3,15 +3,13 @@
 /// \file
 /// The command as a test runs it, and what it leaves.
 
+#include "support/files.h"
 #include "support/shell.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
+#include <algorithm>
 
 namespace bole::test
 {
@@ -31,10 +29,10 @@ inline std::string freshFolder(const std::string &name)
   return folder;
 }
 
-inline std::string textOf(const std::string &path)
+inline std::size_t linesIn(const std::string &path)
 {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string text = textOf(path);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
 inline nlohmann::json jsonOf(const std::string &path) { return nlohmann::json::parse(textOf(path)); }

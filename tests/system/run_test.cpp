@@ -9,14 +9,9 @@
 #include <gmock/gmock.h>
 
 #include <bole/visp.h>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <random>
-#include <sys/wait.h>
-#include <thread>
-#include <unistd.h>
 #include <visp3/io/vpImageIo.h>
 
 namespace
@@ -24,58 +19,6 @@ namespace
 namespace fs = std::filesystem;
 using namespace bole::test;
 using testing::HasSubstr;
-
-std::size_t linesIn(const std::string &path)
-{
-  const std::string text = textOf(path);
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
-std::size_t hiddenFiles(const std::string &folder)
-{
-  std::size_t count = 0;
-  for (const auto &entry : fs::directory_iterator(folder))
-    count += entry.path().filename().string().front() == '.';
-  return count;
-}
-
-pid_t start(const std::string &folder)
-{
-  const pid_t child = fork();
-  if (child == 0) {
-    for (const int each : {SIGHUP, SIGINT, SIGPIPE, SIGTERM})
-      std::signal(each, SIG_DFL); // whoever runs the tests may ignore them
-    if (freopen("/dev/null", "w", stderr) && freopen("/dev/null", "w", stdout))
-      execl(BOLE_EXECUTABLE, "bole", "track", kFlight.c_str(), "-o", folder.c_str(), "--no-video", nullptr);
-    _exit(127);
-  }
-  return child;
-}
-
-class Interrupted : public testing::TestWithParam<int>
-{
-};
-
-TEST_P(Interrupted, KeepsWhatIsKnownAndReturns130)
-{
-  const std::string folder = freshFolder("signal" + std::to_string(GetParam()));
-  const pid_t child = start(folder);
-  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(300);
-  while (linesIn(folder + "/trajectory.tum") < 50 && std::chrono::steady_clock::now() < give_up)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  kill(child, GetParam());
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  ASSERT_EQ(WEXITSTATUS(status), 130);
-  const auto summary = jsonOf(folder + "/summary.json");
-  EXPECT_EQ(summary.at("complete"), false);
-  EXPECT_THAT(summary.at("doubts").dump(), HasSubstr("interrupted"));
-  EXPECT_GE(linesIn(folder + "/trajectory.tum"), 50u);
-  EXPECT_TRUE(fs::exists(folder + "/trunks.csv"));
-  EXPECT_EQ(hiddenFiles(folder), 0u);
-}
-INSTANTIATE_TEST_SUITE_P(Signals, Interrupted, testing::Values(SIGINT, SIGTERM, SIGHUP, SIGPIPE));
 
 /// Pixels of the first picture of a video that are far from those of the flight's, without the bar of text.
 std::size_t drawnOnTheFirstPicture(const std::string &video)
@@ -118,30 +61,6 @@ TEST(Run, HasAPictureAndViewsOfEachTrunk)
   }
 }
 
-TEST(Run, AVideoThatCannotBeWrittenCostsNothingElse)
-{
-  const std::string folder = freshFolder("full");
-  // no file may grow beyond 256 kB (512 bytes a block): the video would, the rest does not
-  const Outcome outcome = run("track " + kFlight + " -o " + folder + " --frames 25", "ulimit -f 500; ");
-  EXPECT_EQ(outcome.status, 0) << outcome.text;
-  EXPECT_THAT(outcome.text, HasSubstr("goes on without videos"));
-  EXPECT_FALSE(fs::exists(folder + "/overlay.mp4"));
-  EXPECT_EQ(linesIn(folder + "/trajectory.tum"), 26u);
-  EXPECT_EQ(jsonOf(folder + "/summary.json").at("complete"), true);
-  EXPECT_EQ(hiddenFiles(folder), 0u);
-}
-
-TEST(Run, ClearsWhatAKilledRunLeftHalfWritten)
-{
-  const std::string folder = freshFolder("partial");
-  fs::create_directories(folder);
-  std::ofstream(folder + "/.overlay.partial.mp4") << "half";
-  std::ofstream(folder + "/.hidden") << "somebody's";
-  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --frames 15 --no-video").status, 0);
-  EXPECT_FALSE(fs::exists(folder + "/.overlay.partial.mp4"));
-  EXPECT_TRUE(fs::exists(folder + "/.hidden"));
-}
-
 TEST(Run, HoldsItsCommandItsOptionsAndItsInput)
 {
   const std::string folder = freshFolder("redo");
@@ -182,17 +101,6 @@ TEST(Run, TellsOnAPageWhatItIsWorth)
   EXPECT_THAT(page, testing::Not(testing::ContainsRegex("src=\"[^d]"))); // nothing but data
   EXPECT_EQ(run("report " + folder).status, 0);
   EXPECT_THAT(textOf(folder + "/report.html"), HasSubstr("\"evaluation\":null"));
-
-  if (bole::test::runShell("command -v chromium").status != 0)
-    GTEST_SKIP() << "chromium is not installed: the page was not opened";
-  for (const char *width : {"400", "1600"}) {
-    const Outcome browser = bole::test::runShell(
-        std::string("chromium --headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=2000 "
-                    "--window-size=") +
-        width + ",2000 --dump-dom file://" + folder + "/report.html");
-    EXPECT_THAT(browser.text, HasSubstr("class=\"trunk chosen\"")); // the script ran
-    EXPECT_THAT(browser.text, testing::Not(HasSubstr("CONSOLE")));
-  }
 }
 
 TEST(Run, PutsNoProgressIntoALog)
@@ -223,19 +131,6 @@ TEST(Run, OfACameraThatNeverMovedSaysSoAndHasNoLengths)
   EXPECT_EQ(jsonOf(folder + "/summary.json").at("trusted"), false);
   EXPECT_EQ(linesIn(folder + "/trunks.csv"), 2u); // names and units
   EXPECT_TRUE(fs::exists(folder + "/bearings.csv"));
-}
-
-TEST(Run, IntoAFolderThatAnotherRunWritesToIsRefused)
-{
-  const std::string folder = freshFolder("twice");
-  const pid_t child = start(folder);
-  while (!fs::exists(folder + "/summary.json") && waitpid(child, nullptr, WNOHANG) == 0)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  const Outcome second = run("track " + kFlight + " -o " + folder + " --frames 15 --no-video");
-  EXPECT_EQ(second.status, 1);
-  EXPECT_THAT(second.text, HasSubstr("another run writes into this folder"));
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
 }
 
 TEST(Command, AloneListsTheCommands)

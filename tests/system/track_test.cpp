@@ -6,18 +6,13 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <regex>
 
 namespace
 {
 namespace fs = std::filesystem;
 using namespace bole::test;
 using testing::HasSubstr;
-
-void copyFlight(const std::string &to)
-{
-  fs::remove_all(to);
-  fs::copy(kFlight, to, fs::copy_options::recursive);
-}
 
 TEST(Track, MapsAPlainVideoAndSaysWhereItsMetreComesFrom)
 {
@@ -52,57 +47,6 @@ TEST(Track, AKnownHeightOfTheCameraIsTheMetreOfAPlainVideo)
   EXPECT_NEAR(evaluation.at("trajectory").at("smoothed").at("scale").get<double>(), 1, 0.25);
 }
 
-void expectRefused(const std::string &arguments, const std::string &folder, const std::string &names)
-{
-  const Outcome outcome = run("track " + arguments + " -o " + folder + " --no-video");
-  EXPECT_NE(outcome.status, 0) << arguments;
-  EXPECT_THAT(outcome.text, HasSubstr(names));
-  EXPECT_FALSE(fs::exists(folder + "/trunks.csv"));
-}
-
-TEST(Track, RefusesAMissingInput) { expectRefused("/nowhere/flight", freshFolder("missing"), "/nowhere/flight"); }
-
-TEST(Track, RefusesAnEmptyFolder)
-{
-  const std::string empty = freshFolder("empty_input");
-  fs::create_directories(empty);
-  expectRefused(empty, freshFolder("empty"), empty);
-}
-
-TEST(Track, RefusesAnUnknownKey)
-{
-  const std::string config = testing::TempDir() + "bole_bad.yaml";
-  std::ofstream(config) << "detection:\n  windwo: 3\n";
-  expectRefused(kFlight + " --config " + config, freshFolder("key"), config + ":2");
-}
-
-TEST(Track, RefusesOdometryThatIsNoNumber)
-{
-  const std::string flight = freshFolder("nan_flight");
-  copyFlight(flight);
-  std::ofstream(flight + "/mav0/odom0/data.csv") << "#t,x,y,z,w,x,y,z\n0,nan,0,1,1,0,0,0\n";
-  expectRefused(flight, freshFolder("nan"), "odom0/data.csv:2");
-}
-
-TEST(Track, RefusesStampsThatGoBack)
-{
-  const std::string flight = freshFolder("back_flight");
-  copyFlight(flight);
-  std::ofstream(flight + "/mav0/cam0/data.csv")
-      << "#timestamp [ns],filename\n100000000,0000100000000.png\n0,0000000000000.png\n";
-  expectRefused(flight, freshFolder("back"), "cam0/data.csv:3");
-}
-
-TEST(Track, PassesOverATruncatedImage)
-{
-  const std::string flight = freshFolder("cut_flight"), folder = freshFolder("cut");
-  copyFlight(flight);
-  fs::resize_file(flight + "/mav0/cam0/data/0000500000000.png", 900);
-  ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video --frames 12").status, 0);
-  const auto summary = jsonOf(folder + "/summary.json");
-  EXPECT_THAT(summary.at("frames").dump(), HasSubstr("corrupt"));
-}
-
 TEST(Track, ShowsItsOverlayInAWindow)
 {
   if (std::system("command -v xvfb-run >/dev/null") != 0)
@@ -119,5 +63,39 @@ TEST(Track, SaysThatThereIsNoDisplayToShowItOn)
       "track " + kFlight + " -o " + freshFolder("no_display") + " --frames 15 --no-video --show", "env -u DISPLAY ");
   EXPECT_NE(outcome.status, 0);
   EXPECT_THAT(outcome.text, HasSubstr("--show: DISPLAY is not set"));
+}
+
+/// The number after the last "cost".
+double lastCost(const std::string &text)
+{
+  const std::regex number("cost +([-0-9.e+]+)");
+  double value = -1;
+  for (std::sregex_iterator at(text.begin(), text.end(), number), end; at != end; ++at)
+    value = std::stod((*at)[1]);
+  return value;
+}
+
+TEST(Graph, OfARunIsExportedAndSolvesToTheCostOfTheRun)
+{
+  const std::string folder = freshFolder("graph"), exported = folder + "/exported.g2o", solved = folder + "/solved.g2o";
+  ASSERT_EQ(run("track " + kFlight + " -o " + folder + " --no-video --frames 40").status, 0);
+  EXPECT_EQ(run("export " + folder + " g2o -o " + exported).status, 0);
+  const std::string told = run("graph " + folder).text;
+  EXPECT_THAT(told, HasSubstr("poses      40"));
+  const Outcome outcome = run("solve " + exported + " -o " + solved);
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_GT(lastCost(told), 0);
+  EXPECT_NEAR(lastCost(outcome.text), lastCost(told), 1e-4 * lastCost(told)); // the run ends at its optimum
+  EXPECT_EQ(linesIn(solved), linesIn(exported));
+}
+
+TEST(Graph, OfAFileThatIsNoneTheLineIsNamedAndNothingIsWritten)
+{
+  const std::string broken = freshFolder("broken.g2o"), none = freshFolder("none.g2o");
+  std::ofstream(broken) << "VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\n";
+  const Outcome outcome = run("solve " + broken + " -o " + none);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.text, HasSubstr(broken + ":1: VERTEX_SE3:QUAT: 2 = nan, must be a finite number"));
+  EXPECT_FALSE(std::filesystem::exists(none));
 }
 } // namespace

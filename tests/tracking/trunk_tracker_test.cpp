@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
+#include "summary/square_root.h"
 #include "tracking/trunk_tracker.h"
+#include <bole/open_source.h>
 
 #include <gtest/gtest.h>
 
@@ -11,31 +13,30 @@ namespace
 {
 using namespace bole;
 
-const Pose kForward((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {0, 0, 1.2});
-
 RelativeTrunk seen(double roll = 0)
 {
-  Trunk trunk;
-  trunk.xy = {4, 0.4};
-  trunk.log_radius = std::log(0.2);
-  Pose wMc = kForward;
-  wMc.R = wMc.R * expSo3({0, 0, roll});
-  return relativeTrunk(wMc, Pose(), trunk);
+  const Trunk trunk{{4, 0.4}, std::log(0.2)};
+  return relativeTrunk(Pose(forwardCamera().R * expSo3({0, 0, roll}), {0, 0, 1.2}), Pose(), trunk);
 }
 
-/// The trunk as a flat area of grey \p inside on \p outside, its borders smooth over a pixel.
-vpImage<unsigned char> drawn(const PinholeCamera &camera, const RelativeTrunk &trunk, int inside, int outside)
+/// The trunk as a flat area of grey \p inside between \p left and \p right ones, its borders smooth over a pixel.
+vpImage<unsigned char> drawn(const PinholeCamera &camera, const RelativeTrunk &trunk, int inside, int left, int right)
 {
   vpImage<unsigned char> image(240, 320);
-  const Eigen::Vector3d left = trunk.borderNormal(Border::left), right = trunk.borderNormal(Border::right);
   for (int v = 0; v < 240; ++v)
     for (int u = 0; u < 320; ++u) {
-      const Eigen::Vector3d ray = camera.ray(Eigen::Vector2d(u, v));
-      const double d_left = -left.dot(ray) * camera.fx, d_right = -right.dot(ray) * camera.fx;
-      const double cover = std::clamp(std::min(d_left, d_right) + 0.5, 0.0, 1.0);
-      image[v][u] = static_cast<unsigned char>(std::lround(outside + cover * (inside - outside)));
+      const auto within = [&](Border border) { // from 0 to 1
+        return std::clamp(0.5 - camera.fx * trunk.borderNormal(border).dot(camera.ray(Eigen::Vector2d(u, v))), 0., 1.);
+      };
+      image[v][u] = static_cast<unsigned char>(
+          std::lround(left + (inside - left) * within(Border::left) + (right - inside) * (1 - within(Border::right))));
     }
   return image;
+}
+
+vpImage<unsigned char> drawn(const PinholeCamera &camera, const RelativeTrunk &trunk, int inside, int outside)
+{
+  return drawn(camera, trunk, inside, outside, outside);
 }
 
 TrackingPrediction predictionNear(const RelativeTrunk &truth, const Vector4d &error)
@@ -234,5 +235,59 @@ TEST(TrunkEnergy, BrightnessScalesNothing)
   const auto weak = curvatureOf(100, 150), strong = curvatureOf(50, 250);
   EXPECT_FALSE(weak.negative);
   EXPECT_LT((weak.F - strong.F).norm(), 0.03 * strong.F.norm());
+}
+
+/// What the summary factor stands for: the image energy round its optimum.
+TEST(SummaryOfAnImage, FollowsTheImageEnergyOnAGridRoundItsOptimum)
+{
+  const PinholeCamera camera;
+  const RelativeTrunk truth = seen();
+  const Gradient gradient = computeGradient(drawn(camera, truth, 100, 210, 40));
+  TrackingPrediction prediction;
+  prediction.relative = truth.plus({0.004, 0, 0.008, 0.03});
+  const TrackingOptions options;
+  const TrackingResult tracked = trackTrunk(gradient, camera, prediction, options);
+  ASSERT_EQ(tracked.status, TrackingStatus::tracked) << toString(tracked.status);
+  const SummaryFactor summary{tracked.optimum, tracked.energy, tracked.f, tracked.F};
+  SquareRootSummary root;
+  ASSERT_EQ(squareRoot(summary, root), SummaryStatus::ok);
+  const TrunkEnergy image(gradient, camera, prediction.range, {true, std::abs(tracked.left_contrast)},
+                          {true, std::abs(tracked.right_contrast)}, options.energy);
+  const double here = image.evaluate(tracked.optimum);
+
+  // steps that move a border, or one of its ends, by about 0.4 px
+  const double turn = 0.4 / 50, bearing = 0.4 / camera.fx, widen = 0.4 / (camera.fx * truth.ratio());
+  int looked = 0;
+  for (int i = -2; i <= 2; ++i)
+    for (int j = -2; j <= 2; ++j)
+      for (int k = -2; k <= 2; ++k) {
+        if (std::abs(i) + std::abs(j) + std::abs(k) == 0 || std::abs(i) + std::abs(j) + std::abs(k) > 3)
+          continue;
+        const RelativeTrunk at = tracked.optimum.plus({i * turn, 0, j * bearing, k * widen});
+        const double rise = image.evaluate(at) - here;
+        EXPECT_GT(rise, 0) << i << j << k; // the optimum is one
+        EXPECT_NEAR((summary.energyAt(at) - summary.energy) / rise, 1, 0.35) << i << " " << j << " " << k;
+        EXPECT_NEAR(0.5 * root.residual(at).squaredNorm() + root.constant, summary.energyAt(at), 1e-9);
+        ++looked;
+      }
+  EXPECT_GT(looked, 50);
+}
+
+TEST(SummaryOfAnImage, KnowsThePlaceOfABorderToWhatAlphaSays)
+{
+  const PinholeCamera camera;
+  const RelativeTrunk truth = seen();
+  const Gradient gradient = computeGradient(drawn(camera, truth, 100, 210, 40));
+  TrackingPrediction prediction;
+  prediction.relative = truth;
+  TrackingOptions options;
+  const auto sigmaOfBearing = [&](double alpha) {
+    options.energy.alpha = alpha;
+    const TrackingResult tracked = trackTrunk(gradient, camera, prediction, options);
+    return camera.fx / std::sqrt(tracked.F(2, 2)); // with r/d known [px]
+  };
+  // two borders of 1/alpha px^2 each
+  EXPECT_NEAR(sigmaOfBearing(0.5), 1, 0.35);
+  EXPECT_NEAR(sigmaOfBearing(0.5) / sigmaOfBearing(2), 2, 0.01);
 }
 } // namespace

@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
-
-#include "baseline/comparison_report.h"
+#include "support/files.h"
 #include "support/units.h"
+
+#include "baseline/comparison.h"
+#include "baseline/comparison_report.h"
 #include <bole/cylinder.h>
 #include <bole/vpMbTrunkTracker.h>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/videoio.hpp>
 
-#include <filesystem>
-#include <unistd.h>
+#include <opencv2/videoio.hpp>
 
 namespace
 {
 using namespace bole;
 using test::cameraAt;
 using testing::HasSubstr;
+namespace fs = std::filesystem;
 
 /// A short flight through drawn trunks; the odometry is the truth, or drifts by \p drift [m] a frame to the left.
 TestFlight drawnFlight(int frames, double drift = 0)
@@ -42,7 +43,6 @@ TestFlight drawnFlight(int frames, double drift = 0)
 class Comparison : public testing::Test
 {
 protected:
-  ~Comparison() override { std::filesystem::remove(m_cao); }
   std::vector<Score> run(const TestFlight &flight, std::vector<Contender> contenders)
   {
     writeCao(m_cao, flight.trunks);
@@ -54,7 +54,8 @@ protected:
     contenders.emplace_back(kind, help, EdgeSettings());
     return contenders;
   }
-  const std::string m_cao = testing::TempDir() + "comparison_" + std::to_string(::getpid()) + ".cao";
+  const test::TemporaryFolder m_folder;
+  const std::string m_cao = m_folder / "wood.cao";
 };
 
 TEST(PoseError, IsTheDistanceOfTheCentresAndTheAngleBetweenTheAttitudes)
@@ -225,7 +226,7 @@ TEST_F(Comparison, TheVideoShowsEveryTrackerWithAPriorInTheColourOfItsAnswer)
   std::vector<Score> scores = run(flight, std::move(contenders));
   for (FrameError &error : scores[1].errors)
     error.wrong = true, error.complained = false;
-  const std::string path = testing::TempDir() + "comparison_" + std::to_string(::getpid()) + ".mp4";
+  const std::string path = m_folder / "comparison.mp4";
   writeComparisonVideo(path, flight, m_cao, scores);
   cv::VideoCapture video(path);
   cv::Mat picture;
@@ -237,7 +238,6 @@ TEST_F(Comparison, TheVideoShowsEveryTrackerWithAPriorInTheColourOfItsAnswer)
         green[column * 2 / picture.cols] += bgr[1] > bgr[2] + 80;
         red[column * 2 / picture.cols] += bgr[2] > bgr[1] + 80;
       }
-  std::filesystem::remove(path);
   EXPECT_EQ(pictures, 4);
   EXPECT_GT(red[0], 500);
   EXPECT_EQ(green[0], 0);
@@ -265,5 +265,56 @@ TEST_F(Comparison, TheReportTellsTheSameInBothForms)
   EXPECT_EQ(json["basin"][0]["success"][1], 0.5);
   EXPECT_EQ(json["faults"][0]["recovered"], 1);
   EXPECT_THAT(toTable(report), HasSubstr("vpMbTrunkTracker, prior"));
+}
+
+class Flights : public testing::Test
+{
+protected:
+  const test::TemporaryFolder m_folder;
+  const std::string m_cao = m_folder / "flight.cao";
+};
+
+TEST_F(Flights, WithThePriorOursIsNeverLostInTheRenderedForests)
+{
+  const fs::path rendered = fs::path(BOLE_SHARED_DATA_DIR) / "rendered";
+  if (!fs::exists(rendered))
+    GTEST_SKIP() << rendered << " is absent";
+  for (const char *name : {"park-forward", "winter-weave", "pine-arc"}) {
+    const TestFlight flight = readAslFlight((rendered / name).string());
+    ASSERT_EQ(flight.frames.size(), 120u);
+    writeCao(m_cao, flight.trunksWithin(25));
+    EdgeSettings settings;
+    settings.far_m = 25;
+    std::vector<Contender> ours;
+    ours.emplace_back(TrackerKind::trunk, Help::prior, settings);
+    ours.emplace_back(TrackerKind::trunk, Help::alone, settings);
+    const std::vector<Score> scores = compare(flight, m_cao, ours, flight.limits);
+    EXPECT_EQ(scores[0].until_loss, 119) << name;
+    EXPECT_EQ(scores[0].silent_failures, 0) << name;
+    EXPECT_LT(scores[0].position_rmse_m, 0.1) << name;
+    EXPECT_LE(scores[1].silent_failures, 6) << name; // alone it may lose the flight, but says so
+  }
+}
+
+TEST_F(Flights, TheCubeIsAReferenceForTheCylinderBesideIt)
+{
+  const fs::path mbt = fs::path(BOLE_VISP_IMAGES_DIR) / "mbt";
+  if (!fs::exists(mbt / "cube"))
+    GTEST_SKIP() << mbt << " is absent: package visp-images-data";
+  const TestFlight flight = readCubeFlight(mbt.string(), 25);
+  ASSERT_EQ(flight.frames.size(), 25u);
+  EXPECT_FALSE(flight.upright);
+  writeCao(m_cao, flight.trunks);
+  std::vector<Contender> ours;
+  ours.emplace_back(TrackerKind::trunk, Help::prior, EdgeSettings(), BOLE_SOURCE_DIR "/models/cylinder.xml");
+  const Score score = compare(flight, m_cao, ours, flight.limits)[0];
+  EXPECT_EQ(score.until_loss, 24);
+  EXPECT_LT(score.position_rmse_m, 0.03);
+}
+
+TEST_F(Flights, AFolderWithoutAFlightIsRefused)
+{
+  EXPECT_THROW(readAslFlight("/nowhere"), vpException);
+  EXPECT_THROW(readCubeFlight("/nowhere"), vpException);
 }
 } // namespace

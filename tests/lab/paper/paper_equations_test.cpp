@@ -31,13 +31,7 @@ SplitGradient gradientAt(const Pose &wMc)
   return splitGradient(test::drawTrunks(kCamera, wMc.inverse(), test::smallWood()));
 }
 
-Trunk trunkOf(const Cylinder &cylinder)
-{
-  Trunk trunk;
-  trunk.xy = cylinder.foot.head<2>();
-  trunk.log_radius = std::log(cylinder.radius);
-  return trunk;
-}
+Trunk trunkOf(const Cylinder &cylinder) { return {cylinder.foot.head<2>(), std::log(cylinder.radius)}; }
 
 /// min(0, dI/dx) and max(0, dI/dx) by Sobel, in full scale a pixel, each convolved with a Gaussian of 3 px.
 struct BlurredParts

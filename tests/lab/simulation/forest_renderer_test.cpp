@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "simulation/forest_renderer.h"
-#include "simulation/h264_link.h"
-#include "simulation/simulated_flight.h"
-
 #include "support/units.h"
 
-#include <Eigen/Geometry>
+#include "simulation/forest.h"
+#include "simulation/forest_renderer.h"
+#include "simulation/h264_link.h"
+#include "simulation/random.h"
+#include "simulation/simulated_flight.h"
 
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <gtest/gtest.h>
 #include <visp3/core/vpException.h>
 
 namespace bole
@@ -92,18 +94,6 @@ TEST(ForestRenderer, DepthIsAlongTheOpticalAxis)
   EXPECT_NEAR(frame.depth[219][20], 1200 * 200 / 99.5, 10);
   EXPECT_EQ(frame.trunk_id[219][20], 65535);
   EXPECT_EQ(frame.depth[5][20], 65535);
-}
-
-TEST(ForestRenderer, SameInputSameBytes)
-{
-  ForestOptions options;
-  options.density = 0.05;
-  const Forest forest = Forest::plant(options, {{0, 0, 1.2}});
-  RenderedFrame a, b;
-  ForestRenderer first(forest, {}), second(forest, {});
-  first.render(cameraAt({0, 0, 1.2}), a);
-  second.render(cameraAt({0, 0, 1.2}), b);
-  EXPECT_TRUE(a.image == b.image);
 }
 
 TEST(ForestRenderer, MotionBlursWhatAStillCameraSeesSharp)
@@ -221,5 +211,77 @@ TEST(H264Link, LowerBitRateLosesMore)
 }
 
 TEST(H264Link, RefusesOddSizes) { EXPECT_THROW(H264Link(321, 240, 15, 1000), vpException); }
+
+std::vector<Eigen::Vector3d> straightPath(double length)
+{
+  std::vector<Eigen::Vector3d> path;
+  for (double x = 0; x <= length; x += 0.1) {
+    path.push_back({x, 0, 1.2});
+  }
+  return path;
+}
+
+TEST(Forest, HasTheDensityThatWasAskedFor)
+{
+  ForestOptions options;
+  options.density = 0.05;
+  const Forest forest = Forest::plant(options, straightPath(40));
+  const double area = (forest.near_max - forest.near_min).prod();
+  EXPECT_NEAR(forest.trunks.size() / area, 0.05, 0.002);
+}
+
+TEST(Forest, LeavesThePathFree)
+{
+  ForestOptions options;
+  options.density = 0.2;
+  options.clearance = 0.9;
+  const std::vector<Eigen::Vector3d> path = straightPath(20);
+  const Forest forest = Forest::plant(options, path);
+  for (const Eigen::Vector3d &point : path) {
+    EXPECT_GT(forest.distanceToBark(point),
+              0.7); // lean and bow may take something of the clearance
+  }
+}
+
+TEST(Forest, WantedTrunksComeFirstWithTheirFootOnTheGround)
+{
+  SimulatedTrunk wanted;
+  wanted.foot = {3, 1, 99};
+  wanted.radius = 0.33;
+  const Forest forest = Forest::plant({}, straightPath(5), {wanted});
+  EXPECT_EQ(forest.trunks.front().id, 0);
+  EXPECT_DOUBLE_EQ(forest.trunks.front().radius, 0.33);
+  EXPECT_DOUBLE_EQ(forest.trunks.front().foot.z(), forest.terrain.height(3, 1));
+}
+
+TEST(SimulatedTrunk, HasItsRadiusAtBreastHeight)
+{
+  SimulatedTrunk trunk;
+  trunk.radius = 0.2;
+  EXPECT_NEAR(trunk.radiusAt(1.3), 0.2, 1e-4);
+  EXPECT_GT(trunk.radiusAt(0), 0.25);
+  EXPECT_LT(trunk.radiusAt(6), 0.19);
+}
+
+TEST(SimulatedTrunk, CylinderPassesThroughTheAxisWhereADroneLooks)
+{
+  SimulatedTrunk trunk;
+  trunk.foot = {4, -2, 0.3};
+  trunk.lean = {0.03, -0.02};
+  trunk.bow = {0.05, 0.02};
+  const Trunk cylinder = trunk.cylinder();
+  EXPECT_NEAR((cylinder.axisAt(0.3 + 0.6) - trunk.axisAt(0.6)).norm(), 0, 1e-12);
+  EXPECT_NEAR((cylinder.axisAt(0.3 + 2.0) - trunk.axisAt(2.0)).norm(), 0, 1e-12);
+  EXPECT_LT((cylinder.axisAt(0.3 + 1.3) - trunk.axisAt(1.3)).norm(), 0.005);
+}
+
+TEST(Terrain, IsFlatAtTheOriginAndSmooth)
+{
+  const Terrain terrain(5, 0.1);
+  EXPECT_NEAR(terrain.height(0, 0), 0, 1e-12);
+  for (double x = -20; x < 20; x += 0.37) {
+    EXPECT_LT(std::abs(terrain.height(x + 0.01, 2) - terrain.height(x, 2)), 0.01);
+  }
+}
 } // namespace
 } // namespace bole

@@ -38,16 +38,6 @@ QuadrotorCommand tilted(double forward, double left)
   return command;
 }
 
-TEST(Quadrotor, RisesToTheTakeOffHeightAndHoldsIt)
-{
-  Quadrotor body(calm(), {2, 3}, 0.5, 0.7);
-  body.command(hovering());
-  fly(body, 8);
-  EXPECT_NEAR(body.pose().t.z(), 0.7 + calm().takeoff_height, 0.06);
-  EXPECT_LT(body.velocity().norm(), 0.01);
-  EXPECT_NEAR((body.pose().t.head<2>() - Eigen::Vector2d(2, 3)).norm(), 0, 1e-9);
-}
-
 TEST(Quadrotor, TiltedForLongTheSpeedIsWhereDragBalancesThrust)
 {
   const QuadrotorOptions options = calm();
@@ -59,18 +49,6 @@ TEST(Quadrotor, TiltedForLongTheSpeedIsWhereDragBalancesThrust)
   const double speed = 9.81 * std::tan(0.3 * options.largest_tilt) / options.drag;
   EXPECT_NEAR(body.measuredVelocity().x(), speed, 0.01 * speed);
   EXPECT_NEAR(std::atan2(body.velocity().y(), body.velocity().x()), 0.5, 1e-6); // along the heading
-}
-
-TEST(Quadrotor, PushesToTheLeftWhereItIsToldTo)
-{
-  Quadrotor body(calm(), {0, 0}, 0, 0);
-  body.command(hovering());
-  fly(body, 5);
-  body.command(tilted(0, 0.5));
-  fly(body, 1);
-  EXPECT_GT(body.velocity().y(), 0.3);
-  EXPECT_NEAR(body.velocity().x(), 0, 1e-9);
-  EXPECT_GT(body.pose().R(1, 2), 0.05); // the thrust leans left
 }
 
 TEST(Quadrotor, HalfTheTiltGivesTheAccelerationMeasuredOnARealDrone)
@@ -120,30 +98,6 @@ TEST(Quadrotor, CommandsComeLate)
   EXPECT_EQ(body.pose().R(1, 0), before);
   fly(body, 1);
   EXPECT_NEAR(std::asin(body.pose().R(1, 0)), 1 - options.turn_lag, 0.05); // a lag costs its time constant
-}
-
-TEST(Quadrotor, HoveringBrakes)
-{
-  Quadrotor body(calm(), {0, 0}, 0, 0);
-  body.command(hovering());
-  fly(body, 5);
-  body.command(tilted(0.5, 0.2));
-  fly(body, 2);
-  ASSERT_GT(body.velocity().norm(), 1);
-  body.command(hovering());
-  fly(body, 5);
-  EXPECT_LT(body.velocity().norm(), 0.02);
-}
-
-TEST(Quadrotor, LandsOnTheGround)
-{
-  Quadrotor body(calm(), {0, 0}, 0, 0.3);
-  body.command(hovering());
-  fly(body, 5);
-  body.command(QuadrotorCommand());
-  fly(body, 6);
-  EXPECT_FALSE(body.isInAir());
-  EXPECT_NEAR(body.pose().t.z(), 0.35, 1e-9);
 }
 
 TEST(Quadrotor, GustsHaveTheirStandardDeviationAndTheSameSeedTheSameFlight)

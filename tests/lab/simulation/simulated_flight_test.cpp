@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/files.h"
+#include "support/messages.h"
+
 #include "simulation/simulated_flight.h"
 #include "simulation/words.h"
 #include "support/units.h"
 #include <bole/open_source.h>
 
-#include <filesystem>
-#include <fstream>
-#include <gtest/gtest.h>
-#include <iterator>
+#include <gmock/gmock.h>
 #include <map>
-#include <visp3/core/vpException.h>
 
 namespace fs = std::filesystem;
 
@@ -17,36 +16,22 @@ namespace bole
 {
 namespace
 {
-std::string contents(const fs::path &path)
-{
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::map<std::string, std::string> tree(const fs::path &folder)
 {
   std::map<std::string, std::string> files;
   for (const auto &entry : fs::recursive_directory_iterator(folder)) {
     if (entry.is_regular_file()) {
-      files[fs::relative(entry.path(), folder).string()] = contents(entry.path());
+      files[fs::relative(entry.path(), folder).string()] = test::textOf(entry.path());
     }
   }
   return files;
 }
 
-/// A folder of its own for each test, removed at the end.
 class SimulatedFlight : public testing::Test
 {
 protected:
-  void SetUp() override
-  {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    m_folder = fs::temp_directory_path() / ("bole_" + name);
-    fs::remove_all(m_folder);
-    fs::create_directories(m_folder);
-  }
-  void TearDown() override { fs::remove_all(m_folder); }
-  fs::path m_folder;
+  const test::TemporaryFolder m_temporary;
+  const fs::path m_folder = m_temporary.path();
 };
 
 TEST_F(SimulatedFlight, SameSceneSameBytes)
@@ -62,8 +47,8 @@ TEST_F(SimulatedFlight, SameSceneSameBytes)
   EXPECT_EQ(tree(m_folder / "a").count("depth/0000200000000.png"), 1u);
   scene.setSeed(12);
   recordFlight(scene, {(m_folder / "c").string(), 3, false, false});
-  EXPECT_NE(contents(m_folder / "a/mav0/cam0/data/0000000000000.png"),
-            contents(m_folder / "c/mav0/cam0/data/0000000000000.png"));
+  EXPECT_NE(test::textOf(m_folder / "a/mav0/cam0/data/0000000000000.png"),
+            test::textOf(m_folder / "c/mav0/cam0/data/0000000000000.png"));
 }
 
 TEST_F(SimulatedFlight, ItsCameraFileIsReadForEveryLens)
@@ -132,14 +117,8 @@ TEST_F(SimulatedFlight, FaultsOfASceneFileNameTheLine)
       {"- 1\n", "scene.yaml:1: a scene must be a mapping"},
   };
   for (const auto &[text, message] : faults) {
-    std::ofstream(m_folder / "scene.yaml") << text;
-    try {
-      readScene((m_folder / "scene.yaml").string());
-      ADD_FAILURE() << "accepted: " << text;
-    }
-    catch (const vpException &error) {
-      EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
-    }
+    const std::string path = m_temporary.write("scene.yaml", text);
+    EXPECT_THAT(test::messageOf([&] { readScene(path); }), testing::HasSubstr(message)) << text;
   }
 }
 

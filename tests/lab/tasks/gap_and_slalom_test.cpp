@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "obstacles.h"
+
 #include "tasks/gap_task.h"
 #include "tasks/slalom_task.h"
 
@@ -10,19 +12,11 @@ namespace bole
 {
 namespace
 {
-Obstacle trunkAt(int id, double x, double y, double radius = 0.15)
-{
-  Obstacle trunk;
-  trunk.id = id;
-  trunk.is_confirmed = true;
-  trunk.xy = {x, y};
-  trunk.radius = radius;
-  return trunk;
-}
+using test::obstacleAt;
 
 TEST(Obstacle, CountsItsCovarianceInTheDirectionAsked)
 {
-  Obstacle trunk = trunkAt(0, 0, 0, 0.2);
+  Obstacle trunk = obstacleAt(0, 0, 0.2, 0);
   trunk.covariance << 0.09, 0, 0, 0.01;
   EXPECT_NEAR(trunk.clearance({2, 0}, 0), 1.8, 1e-12);
   EXPECT_NEAR(trunk.clearance({2, 0}, 2), 1.8 - 0.6, 1e-12);
@@ -130,20 +124,20 @@ TEST(SeenSpace, RaysThatPassATrunkOnBothSidesDoNotPassThroughIt)
 
 TEST(Gap, MiddleIsThatOfTheFreeWidth)
 {
-  const Gap gap = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {0, 0});
+  const Gap gap = gapBetween(obstacleAt(5, -1, 0.3, 4), obstacleAt(5, 1, 0.1, 7), {0, 0});
   EXPECT_NEAR(gap.width, 1.6, 1e-12);
   EXPECT_NEAR(gap.middle.y(), 0.1, 1e-12);
   EXPECT_NEAR(gap.along.x(), 1, 1e-12);
   EXPECT_EQ(gap.left, 7);
   EXPECT_EQ(gap.right, 4);
-  const Gap from_behind = gapBetween(trunkAt(4, 5, -1, 0.3), trunkAt(7, 5, 1, 0.1), {10, 0});
+  const Gap from_behind = gapBetween(obstacleAt(5, -1, 0.3, 4), obstacleAt(5, 1, 0.1, 7), {10, 0});
   EXPECT_NEAR(from_behind.along.x(), -1, 1e-12);
   EXPECT_EQ(from_behind.left, 4);
 }
 
 TEST(Gap, IsOfNoUseWhereATrunkOfItIsDoubtful)
 {
-  std::vector<Obstacle> trunks = {trunkAt(0, 5, 1), trunkAt(1, 5, -1)};
+  std::vector<Obstacle> trunks = {obstacleAt(5, 1, 0.15, 0), obstacleAt(5, -1, 0.15, 1)};
   trunks[0].evidence = 3;
   trunks[1].evidence = 1;
   EXPECT_FALSE(chooseGap(trunks, {0, 0}, 0, 1.5, {}));
@@ -152,7 +146,8 @@ TEST(Gap, IsOfNoUseWhereATrunkOfItIsDoubtful)
 
 TEST(Gap, ChoosesTheOneNearestToStraightAhead)
 {
-  const std::vector<Obstacle> trunks{trunkAt(0, 5, 1), trunkAt(1, 5, -0.8), trunkAt(2, 5, -2.8)};
+  const std::vector<Obstacle> trunks{obstacleAt(5, 1, 0.15, 0), obstacleAt(5, -0.8, 0.15, 1),
+                                     obstacleAt(5, -2.8, 0.15, 2)};
   const auto gap = chooseGap(trunks, {0, 0}, 0, 0, {});
   ASSERT_TRUE(gap);
   EXPECT_EQ(gap->left, 0);
@@ -164,14 +159,14 @@ TEST(Gap, ChoosesTheOneNearestToStraightAhead)
 
 TEST(Gap, IsNotChosenWhereItIsNarrowUnconfirmedOrBlocked)
 {
-  const std::vector<Obstacle> open{trunkAt(0, 5, 0.8), trunkAt(1, 5, -0.8)};
+  const std::vector<Obstacle> open{obstacleAt(5, 0.8, 0.15, 0), obstacleAt(5, -0.8, 0.15, 1)};
   ASSERT_TRUE(chooseGap(open, {0, 0}, 0, 0, {}));
-  EXPECT_FALSE(chooseGap({trunkAt(0, 5, 0.6), trunkAt(1, 5, -0.6)}, {0, 0}, 0, 0, {})); // 0.9 m
+  EXPECT_FALSE(chooseGap({obstacleAt(5, 0.6, 0.15, 0), obstacleAt(5, -0.6, 0.15, 1)}, {0, 0}, 0, 0, {})); // 0.9 m
   auto doubtful = open;
   doubtful[0].is_confirmed = false;
   EXPECT_FALSE(chooseGap(doubtful, {0, 0}, 0, 0, {}));
   auto blocked = open;
-  blocked.push_back(trunkAt(2, 6.2, 0.1));
+  blocked.push_back(obstacleAt(6.2, 0.1, 0.15, 2));
   EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));
   blocked.back().is_confirmed = false; // a candidate is in the way as well
   EXPECT_FALSE(chooseGap(blocked, {0, 0}, 0, 0, {}));

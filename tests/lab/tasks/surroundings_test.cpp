@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tasks/surroundings.h"
+#include "obstacles.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
@@ -9,14 +9,7 @@ namespace bole
 {
 namespace
 {
-Obstacle bark(double x, double y, double radius = 0.2)
-{
-  Obstacle trunk;
-  trunk.is_confirmed = true;
-  trunk.xy = {x, y};
-  trunk.radius = radius;
-  return trunk;
-}
+using test::obstacleAt;
 
 /// All within 6 m was seen to be free, all round.
 Surroundings clearing()
@@ -38,7 +31,7 @@ Eigen::Vector2d safe(const Eigen::Vector2d &velocity, const Eigen::Vector2d &p, 
 TEST(SafeVelocity, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 {
   const SafetyOptions options;
-  const std::vector<Obstacle> trunks{bark(3, 0)};
+  const std::vector<Obstacle> trunks{obstacleAt(3, 0, 0.2)};
   const Surroundings around = clearing();
   Eigen::Vector2d p(0, 0), v(0, 0);
   for (int k = 0; k < 1000; ++k) { // obeys with a lag of 0.5 s
@@ -51,7 +44,7 @@ TEST(SafeVelocity, ADroneThatFliesStraightAtATrunkStopsBeforeIt)
 
 TEST(SafeVelocity, AWayThatLeadsPastOrAwayOrToWhatIsNoTrunkYetStaysAsItIs)
 {
-  std::vector<Obstacle> trunks{bark(2, 1.5)};
+  std::vector<Obstacle> trunks{obstacleAt(2, 1.5, 0.2)};
   EXPECT_NEAR((safe({0.6, 0}, {2, 0}, trunks) - Eigen::Vector2d(0.6, 0)).norm(), 0, 1e-12);
   EXPECT_NEAR((safe({0, -0.6}, {2, 1.0}, trunks) - Eigen::Vector2d(0, -0.6)).norm(), 0, 1e-12);
   trunks[0].is_confirmed = false;
@@ -60,7 +53,7 @@ TEST(SafeVelocity, AWayThatLeadsPastOrAwayOrToWhatIsNoTrunkYetStaysAsItIs)
 
 TEST(SafeVelocity, NeitherADoubtfulNorANearTrunkPushesTheDroneAway)
 {
-  std::vector<Obstacle> trunks{bark(2, 0.4)}; // nearer than the hull allows
+  std::vector<Obstacle> trunks{obstacleAt(2, 0.4, 0.2)}; // nearer than the hull allows
   EXPECT_NEAR(safe({0.6, 0}, {2, 0}, trunks).y(), 0, 1e-12);
   EXPECT_NEAR(safe({0, 0.3}, {2, 0}, trunks).norm(), 0, 1e-12);
   trunks[0].evidence = -0.5;
@@ -69,7 +62,7 @@ TEST(SafeVelocity, NeitherADoubtfulNorANearTrunkPushesTheDroneAway)
 
 TEST(SafeVelocity, TheMiddleOfANarrowGapIsPassedAtFullSpeed)
 {
-  const std::vector<Obstacle> trunks{bark(3, 0.75, 0.15), bark(3, -0.75, 0.15)}; // 1.2 m free
+  const std::vector<Obstacle> trunks{obstacleAt(3, 0.75, 0.15), obstacleAt(3, -0.75, 0.15)}; // 1.2 m free
   for (double x = 0; x < 5; x += 0.05) {
     const Eigen::Vector2d v = safe({0.6, 0}, {x, 0}, trunks);
     EXPECT_GT(v.x(), 0.4) << x;

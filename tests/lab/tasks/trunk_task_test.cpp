@@ -48,8 +48,7 @@ TrunkTaskOptions atOnce()
 Flight before(double x, double y, double radius)
 {
   Flight flight;
-  flight.trunk.xy = {x, y};
-  flight.trunk.log_radius = std::log(radius);
+  flight.trunk = {{x, y}, std::log(radius)};
   return flight;
 }
 
@@ -233,21 +232,6 @@ TEST(DroneResponse, LagsBehindASteadyVelocityByDelayAndLag)
   EXPECT_NEAR(drone.velocity()(0), 0.4, 1e-6);
 }
 
-TEST(FeatureFilter, FindsAValueThatMovesAsOrderedAndDriftsBesides)
-{
-  FeatureFilter filter;
-  filter.start(0.3, 0.002, 0.1);
-  double value = 0.3;
-  for (int k = 0; k < 200; ++k) {
-    const double ordered = 0.02 * std::sin(0.3 * k);
-    value += ordered + 0.1 * 0.04;
-    filter.predict(ordered, 0.1, 0.01);
-    filter.correct(value, 0.002);
-  }
-  EXPECT_NEAR(filter.value(), value, 1e-6);
-  EXPECT_NEAR(filter.drift(), 0.04, 1e-5);
-}
-
 TEST(FeatureFilter, AValueFarOffMovesItByNoMoreThanThreeSigma)
 {
   FeatureFilter calm, jumped;
@@ -320,8 +304,7 @@ protected:
     known.status = TrunkStatus::confirmed;
     known.observations = 100;
     known.log_odds = 5;
-    known.trunk.xy = {4, 0};
-    known.trunk.log_radius = std::log(radius);
+    known.trunk = {{4, 0}, std::log(radius)};
     report.map = {known};
     TrunkInView in_view;
     in_view.id = 7;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "obstacles.h"
+
 #include "tasks/plane_response.h"
 #include "tasks/way_planner.h"
 
@@ -11,14 +13,7 @@ namespace bole
 {
 namespace
 {
-Obstacle trunkAt(double x, double y, double radius = 0.15)
-{
-  Obstacle trunk;
-  trunk.is_confirmed = true;
-  trunk.xy = {x, y};
-  trunk.radius = radius;
-  return trunk;
-}
+using test::obstacleAt;
 
 struct Flown
 {
@@ -75,7 +70,7 @@ TEST(WayPlanner, PassesTrunksThatStandOnTheLine)
 {
   std::vector<Obstacle> trunks;
   for (int k = 0; k < 8; ++k)
-    trunks.push_back(trunkAt(5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
+    trunks.push_back(obstacleAt(5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
   const Flown flown = fly(trunks, 38);
   EXPECT_GT(flown.least, 0.08);
   EXPECT_LT(flown.seconds, 50); // at 1 m/s, not by creeping
@@ -83,7 +78,7 @@ TEST(WayPlanner, PassesTrunksThatStandOnTheLine)
 
 TEST(WayPlanner, ATrunkStraightAheadIsPassedOnOneSideAndNotPonderedOn)
 {
-  const Flown flown = fly({trunkAt(4, 0, 0.2)}, 8);
+  const Flown flown = fly({obstacleAt(4, 0, 0.2)}, 8);
   EXPECT_GT(flown.least, 0.08);
   EXPECT_LT(flown.seconds, 11);
 }
@@ -93,7 +88,7 @@ TEST(WayPlanner, FindsTheOpeningInAWall)
   std::vector<Obstacle> trunks;
   for (int k = -12; k <= 12; ++k)
     if (k != 5 && k != 6 && k != 7)
-      trunks.push_back(trunkAt(6, 0.5 * k, 0.15));
+      trunks.push_back(obstacleAt(6, 0.5 * k, 0.15));
   const Flown flown = fly(trunks, 9);
   EXPECT_GT(flown.least, 0.05);
   EXPECT_GE(flown.x, 9);
@@ -103,7 +98,7 @@ TEST(WayPlanner, StopsBeforeAWallWithoutOpening)
 {
   std::vector<Obstacle> trunks;
   for (int k = -30; k <= 30; ++k)
-    trunks.push_back(trunkAt(4, 0.4 * k, 0.2));
+    trunks.push_back(obstacleAt(4, 0.4 * k, 0.2));
   const Flown flown = fly(trunks, 9);
   EXPECT_GT(flown.least, 0);
   EXPECT_LT(flown.x, 4);
@@ -129,7 +124,7 @@ double widest(const Way &way)
 
 TEST(WayPlanner, KeepsFartherFromWhatIsLessWellKnown)
 {
-  Obstacle sure = trunkAt(4, 0.1), vague = sure;
+  Obstacle sure = obstacleAt(4, 0.1), vague = sure;
   vague.covariance = 0.16 * Eigen::Matrix2d::Identity();
   EXPECT_GT(widest(planned({vague})), widest(planned({sure})) + 0.3);
 }
@@ -159,15 +154,15 @@ TEST(WayPlanner, DoesNotFlyFastWhereNothingIsKnown)
 
 TEST(WayPlanner, KeepsItsSideWhereTheOtherIsHardlyQuicker)
 {
-  const Way left = planned({trunkAt(4, -0.05, 0.3)});
+  const Way left = planned({obstacleAt(4, -0.05, 0.3)});
   EXPECT_GT(left.lookedAt({0, 0}, 3.5).y(), 0);
-  EXPECT_GT(planned({trunkAt(4, 0.05, 0.3)}, {}, left).lookedAt({0, 0}, 3.5).y(), 0); // it moved in the map
-  EXPECT_LT(planned({trunkAt(4, 0.05, 0.3)}).lookedAt({0, 0}, 3.5).y(), 0);
+  EXPECT_GT(planned({obstacleAt(4, 0.05, 0.3)}, {}, left).lookedAt({0, 0}, 3.5).y(), 0); // it moved in the map
+  EXPECT_LT(planned({obstacleAt(4, 0.05, 0.3)}).lookedAt({0, 0}, 3.5).y(), 0);
 }
 
 TEST(WayPlanner, KeepsItsSideWhileItMayBeFlownAtMoreThanHalfItsSpeed)
 {
-  const std::vector<Obstacle> trunk = {trunkAt(2, -0.05, 0.3)};
+  const std::vector<Obstacle> trunk = {obstacleAt(2, -0.05, 0.3)};
   const Way left = planned(trunk);
   const auto side = [&](double room) { // was seen to be free on the left
     return planned(
@@ -183,7 +178,7 @@ TEST(WayPlanner, KeepsItsSideWhileItMayBeFlownAtMoreThanHalfItsSpeed)
 
 TEST(WayPlanner, LeavesWhatItStandsInByTheMap)
 {
-  const Way way = planned({trunkAt(0.3, -0.2, 0.1)});
+  const Way way = planned({obstacleAt(0.3, -0.2, 0.1)});
   EXPECT_LT(way.clearance, 0);
   EXPECT_GT(way.ahead.y(), 0.3);
   EXPECT_GT(way.speed, 0.1);

@@ -17,11 +17,6 @@ namespace bole
 {
 namespace
 {
-TEST(ServoTrialResult, WhatWasNeverFoundWasFoundAtNoTime)
-{
-  EXPECT_TRUE(std::isnan(ServoTrialResult().servoing_from_s));
-}
-
 TEST(Fault, SpoilsFramesInItsTimeAndNoOthers)
 {
   for (const FaultKind kind : {FaultKind::black, FaultKind::freeze, FaultKind::noise}) {
@@ -64,6 +59,7 @@ TEST(Fault, SpoilsASensorInItsTimeAndLeavesTheImage)
       EXPECT_EQ(has_odometry && has_gyro, k < 10) << word << k;
     }
   }
+  EXPECT_THROW(faultFromString("blue"), vpException);
 }
 
 /// Sidesteps to map what is there, then flies straight ahead, whatever stands there.

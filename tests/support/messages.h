@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What tests of frame sources share.
+/// What is said of a mistake.
 
-#include <bole/frame.h>
+#include <bole/visp.h>
 
 #include <functional>
 #include <string>
-#include <vector>
 #include <visp3/core/vpException.h>
 
 namespace bole::test
@@ -19,16 +18,8 @@ inline std::string messageOf(const std::function<void()> &action)
     action();
   }
   catch (const vpException &error) {
-    return error.what();
+    return error.getStringMessage();
   }
   return "";
-}
-
-inline std::vector<Frame> readAll(FrameSource &source)
-{
-  std::vector<Frame> frames;
-  for (Frame frame; source.next(frame);)
-    frames.push_back(frame);
-  return frames;
 }
 } // namespace bole::test
