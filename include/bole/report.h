@@ -8,7 +8,6 @@
 #include <bole/frame.h>
 #include <bole/trunk.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
 #include <string>
 #include <utility>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_link.h"
-#include "geometry/require_range.h"
+#include "geometry/failure.h"
 
 #include "ardrone/receivers.h"
 #include "ardrone/video_stamps.h"

@@ -2,7 +2,6 @@
 #include "ardrone/navdata_odometry.h"
 #include "geometry/constants.h"
 #include "geometry/so3.h"
-#include "geometry/yaw.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -4,7 +4,6 @@
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
 #include "geometry/failure.h"
-#include "geometry/require_range.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -5,8 +5,8 @@
 
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
-#include "geometry/require_range.h"
-#include "geometry/yaw.h"
+#include "geometry/failure.h"
+#include "geometry/so3.h"
 
 #include <algorithm>
 #include <atomic>

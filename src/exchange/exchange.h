@@ -6,7 +6,6 @@
 #include "input/trajectory.h"
 #include <bole/camera.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
 #include <map>
 #include <optional>

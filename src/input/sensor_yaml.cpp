@@ -3,7 +3,7 @@
 
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
-#include "geometry/rotation.h"
+#include "geometry/so3.h"
 #include "input/yaml_file.h"
 
 #include <algorithm>

@@ -3,7 +3,6 @@
 
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
-#include "geometry/require_range.h"
 #include "input/xml_file.h"
 
 #include <algorithm>

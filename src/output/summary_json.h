@@ -8,7 +8,6 @@
 #include <bole/frame.h>
 #include <bole/open_source.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
 #include <exception>
 #include <map>
