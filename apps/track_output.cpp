@@ -3,8 +3,8 @@
 #include "interrupt.h"
 
 #include "geometry/so3.h"
-#include "input/asl_source.h"
 #include "input/atomic_file.h"
+#include "input/recorded_source.h"
 #include <bole/graph.h>
 #include <bole/open_source.h>
 #include <bole/overlay.h>

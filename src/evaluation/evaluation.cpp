@@ -3,7 +3,7 @@
 #include "evaluation/trunk_metrics.h"
 #include "evaluation/visibility.h"
 #include "geometry/failure.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trajectory_writer.h"

@@ -3,8 +3,7 @@
 #include "exchange/exchange.h"
 
 #include "geometry/constants.h"
-#include "input/asl_source.h"
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include <bole/cylinder.h>

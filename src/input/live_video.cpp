@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/live_video.h"
 #include "geometry/failure.h"
+#include "input/recorded_source.h"
 #include "input/retry_pause.h"
 #include "input/secrets.h"
-#include "input/video_source.h"
 
 #include <bole/visp.h>
 #include <chrono>

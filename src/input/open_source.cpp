@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/failure.h"
-#include "geometry/require_range.h"
-#include "input/asl_source.h"
 #include "input/live_video.h"
-#include "input/sequence_source.h"
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include <bole/open_source.h>
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/sequence_source.h"
+#include "input/recorded_source.h"
 
 #include "geometry/failure.h"
 #include "input/sensor_yaml.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/video_source.h"
 #include "geometry/failure.h"
+#include "input/recorded_source.h"
 #include "input/secrets.h"
 #include "input/video_file.h"
 

@@ -3,8 +3,8 @@
 
 #include "evaluation/trajectory_metrics.h"
 #include "geometry/failure.h"
-#include "input/asl_source.h"
 #include "input/csv_reader.h"
+#include "input/recorded_source.h"
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/flight_folder.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 
 #include "flight.h"
 

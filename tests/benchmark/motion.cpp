@@ -5,7 +5,7 @@
 ///     benchmark_motion                 the tables of src/doc/points.md
 ///     benchmark_motion <video|folder>  a plain video: how many frames were placed, and how
 
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_motion.h"
 #include "motion/point_odometry.h"

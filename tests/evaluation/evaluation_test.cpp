@@ -4,7 +4,7 @@
 #include "evaluation/trunk_metrics.h"
 #include "evaluation/visibility.h"
 #include "geometry/so3.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>

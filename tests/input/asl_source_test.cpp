@@ -4,7 +4,7 @@
 
 #include "input/image_file.h"
 
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 
 #include <gmock/gmock.h>
 

@@ -2,8 +2,8 @@
 #include "flight_folder.h"
 #include "messages.h"
 
-#include "input/asl_source.h"
 #include "input/csv_reader.h"
+#include "input/recorded_source.h"
 #include "input/trajectory.h"
 
 #include <gmock/gmock.h>

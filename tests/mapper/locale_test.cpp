@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A host program whose decimals have a comma reads and writes the same bytes.
 #include "exchange/exchange.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "input/trajectory.h"
 #include "mbt/cao_reader.h"
 #include "mbt/trunk_settings.h"

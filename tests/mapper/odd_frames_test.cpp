@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a ViSP user's loop may hand to the mapper by mistake, in the demonstration flight: with odometry and gyro.
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include <bole/vpTrunkMapper.h>
 
 #include <gmock/gmock.h>

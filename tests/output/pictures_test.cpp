@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What people look at: the overlay, the videos, the map.
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include "output/map_svg.h"
 #include "output/video_writer.h"
 #include <bole/overlay.h>
