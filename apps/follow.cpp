@@ -15,9 +15,8 @@
 #include "input/live_video.h"
 #include "input/secrets.h"
 #include "mbt/cao_reader.h"
-#include "output/figure.h"
+#include "output/summary_json.h"
 #include "output/trajectory_writer.h"
-#include "output/versions.h"
 #include "output/video_writer.h"
 #include "progress.h"
 #include <bole/cylinder.h>

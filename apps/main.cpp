@@ -5,7 +5,7 @@
 
 #include "input/secrets.h"
 #include "input/suggestion.h"
-#include "output/versions.h"
+#include "output/summary_json.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -2,12 +2,15 @@
 #include "report/report_page.h"
 
 #include "input/atomic_file.h"
-#include "output/base64.h"
 #include "report_template.h" // made of page.html
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+extern "C" {
+#include <libavutil/base64.h>
+}
 
 namespace bole
 {
@@ -18,6 +21,15 @@ using Json = nlohmann::json;
 constexpr std::size_t kMostPoints = 400; // of a curve: more are not seen
 constexpr std::size_t kMostSteps = 4000; // of a line on the map
 constexpr std::size_t kEllipses = 30;    // of the trajectory
+
+/// \p jpeg in one text, as a page holds it.
+std::string asText(const std::string &jpeg)
+{
+  std::string text(AV_BASE64_SIZE(jpeg.size()), '\0'); // with a zero at its end
+  av_base64_encode(text.data(), static_cast<int>(text.size()), reinterpret_cast<const std::uint8_t *>(jpeg.data()),
+                   static_cast<int>(jpeg.size()));
+  return "data:image/jpeg;base64," + std::string(text.c_str());
+}
 
 double secondsSince(const RunRecord &run, std::int64_t stamp_ns)
 {
@@ -71,7 +83,7 @@ Json trunkJson(const RunRecord &run, const TrunkRecord &trunk)
                {"last", trunk.last_seen_s},
                {"probability", trunk.probability}});
   if (const auto view = run.views_jpeg.find(trunk.id); view != run.views_jpeg.end())
-    json["picture"] = "data:image/jpeg;base64," + base64(view->second);
+    json["picture"] = asText(view->second);
   std::vector<TrunkTrace> views;
   std::vector<std::size_t> measured;
   for (const TrunkTrace &view : run.trace.views)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a run says of itself.
-#include "output/verdict.h"
+#include "output/summary_json.h"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
