@@ -3,7 +3,7 @@
 /// \file
 /// What a run was made of and what came out, for people and scripts.
 
-#include "output/timing_csv.h"
+#include "output/flight_trace.h"
 #include <bole/frame.h>
 #include <bole/open_source.h>
 #include <bole/trunk_record.h>
