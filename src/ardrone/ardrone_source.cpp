@@ -4,7 +4,6 @@
 #include "ardrone/drone_link.h"
 #include "ardrone/socket.h"
 #include "geometry/failure.h"
-#include "input/frame_health.h"
 #include "input/rectifier.h"
 
 #include <atomic>
@@ -63,7 +62,7 @@ struct ArDroneSource::State
   vpArDroneGrabber grabber;
   MountedCamera mounted;
   std::unique_ptr<Rectifier> rectifier;
-  std::optional<FrameHealth> health;
+  std::optional<FrameJudge> judge;
   std::atomic<bool> running{true};
   bool first_is_waiting = false; // the frame that the constructor waited for
   std::size_t index = 0;
@@ -81,7 +80,7 @@ struct ArDroneSource::State
       mounted.model = fitted(mounted.model, width, height, address.camera_path);
     }
     rectifier = std::make_unique<Rectifier>(mounted.model, options.max_width_px);
-    health.emplace(mounted.model.pinhole, mounted.bMc);
+    judge.emplace(mounted.model.pinhole, mounted.bMc);
   }
 
   /// The first frames have no odometry worth the name: the delays of the link are not known yet.
@@ -119,7 +118,7 @@ struct ArDroneSource::State
       frame.wMb_odometry = live.body->wMb;
     if (live.status == FrameStatus::ok || live.status == FrameStatus::stale)
       frame.image = image;
-    health->judge(frame);
+    judge->judge(frame);
     if (frame.image.getSize() > 0 && frame.status != FrameStatus::resized)
       rectifier->apply(frame.image);
   }

@@ -53,7 +53,7 @@ FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &opt
       m_bMc(camera.bMc),
       m_recording(corrected(std::move(recording), options.calibration)),
       m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9)),
-      m_health(camera.model.pinhole, camera.bMc)
+      m_judge(camera.model.pinhole, camera.bMc)
 {
 }
 
@@ -81,7 +81,7 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
 void FrameBuilder::complete(Frame &frame)
 {
   judgePicture(frame, m_rectifier.inputWidth(), m_rectifier.inputHeight());
-  m_health.judge(frame);
+  m_judge.judge(frame);
   if (frame.image.getSize() > 0)
     m_rectifier.apply(frame.image);
 }

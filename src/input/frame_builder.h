@@ -3,7 +3,6 @@
 /// \file
 /// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
 
-#include "input/frame_health.h"
 #include "input/image_file.h"
 
 #include "input/rectifier.h"
@@ -41,7 +40,7 @@ struct Recording
 /// \p recording without the constant errors of its sensors.
 Recording corrected(Recording recording, const SensorCalibration &calibration);
 
-/// Adds what the motion sensors measured, judges the images (FrameHealth) and rectifies them.
+/// Adds what the motion sensors measured, judges the images (FrameJudge) and rectifies them.
 class FrameBuilder
 {
 public:
@@ -66,7 +65,7 @@ private:
   Pose m_bMc;
   Recording m_recording;
   std::int64_t m_max_gap_ns;
-  FrameHealth m_health;
+  FrameJudge m_judge;
   std::optional<std::int64_t> m_last_stamp_ns;
   std::size_t m_gyro_at = 0;
   std::size_t m_index = 0;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/frame_health.h"
 #include <bole/open_source.h>
 
 #include "geometry/median.h"
 #include "geometry/so3.h"
+#include "input/image_health.h"
 
 #include <algorithm>
+#include <deque>
 #include <fmt/format.h>
 
 namespace bole
@@ -37,34 +38,46 @@ std::optional<Eigen::Vector3d> integrated(const std::vector<GyroSample> &gyro, s
 }
 } // namespace
 
-FrameHealth::FrameHealth(const PinholeCamera &camera, const Pose &bMc) : m_focal_px(camera.fx), m_bMc(bMc) {}
+struct FrameJudge::State
+{
+  void judgeInterval(Frame &frame);
+  MeasuredRotation motionTo(const Frame &frame) const;
+  void judge(Frame &frame);
 
-MeasuredRotation FrameHealth::motionTo(const Frame &frame) const
+  double focal_px;
+  Pose bMc;
+  ImageHealth health = ImageHealth();
+  std::optional<std::int64_t> last_stamp_ns = {};
+  std::deque<double> intervals_s = {}; ///< the last ones
+  std::optional<Pose> last_odometry = {};
+};
+
+MeasuredRotation FrameJudge::State::motionTo(const Frame &frame) const
 {
   MeasuredRotation motion;
-  motion.focal_px = m_focal_px;
-  if (!m_last_stamp_ns)
+  motion.focal_px = focal_px;
+  if (!last_stamp_ns)
     return motion;
-  motion.elapsed_s = 1e-9 * static_cast<double>(frame.stamp_ns - *m_last_stamp_ns);
-  const Eigen::Matrix3d cRb = m_bMc.R.transpose();
-  if (const auto angle = integrated(frame.gyro, *m_last_stamp_ns, frame.stamp_ns);
+  motion.elapsed_s = 1e-9 * static_cast<double>(frame.stamp_ns - *last_stamp_ns);
+  const Eigen::Matrix3d cRb = bMc.R.transpose();
+  if (const auto angle = integrated(frame.gyro, *last_stamp_ns, frame.stamp_ns);
       angle && angle->norm() < kLargestTurn_rad)
     motion.gyro = cRb * *angle;
-  if (m_last_odometry && frame.wMb_odometry)
-    motion.odometry = cRb * logSo3(orthonormalized(m_last_odometry->R.transpose() * frame.wMb_odometry->R));
+  if (last_odometry && frame.wMb_odometry)
+    motion.odometry = cRb * logSo3(orthonormalized(last_odometry->R.transpose() * frame.wMb_odometry->R));
   return motion;
 }
 
-void FrameHealth::judgeInterval(Frame &frame)
+void FrameJudge::State::judgeInterval(Frame &frame)
 {
-  if (!m_last_stamp_ns)
+  if (!last_stamp_ns)
     return;
-  const double interval_s = 1e-9 * static_cast<double>(frame.stamp_ns - *m_last_stamp_ns);
-  const double usual_s = medianOf({m_intervals_s.begin(), m_intervals_s.end()});
-  m_intervals_s.push_back(interval_s);
-  if (m_intervals_s.size() > kMostIntervals)
-    m_intervals_s.pop_front();
-  if (frame.status == FrameStatus::missing || m_intervals_s.size() <= kFewestIntervals ||
+  const double interval_s = 1e-9 * static_cast<double>(frame.stamp_ns - *last_stamp_ns);
+  const double usual_s = medianOf({intervals_s.begin(), intervals_s.end()});
+  intervals_s.push_back(interval_s);
+  if (intervals_s.size() > kMostIntervals)
+    intervals_s.pop_front();
+  if (frame.status == FrameStatus::missing || intervals_s.size() <= kFewestIntervals ||
       interval_s <= std::max(kLeastGap_s, kUnusual * usual_s))
     return;
   frame.gap_s = interval_s;
@@ -72,27 +85,25 @@ void FrameHealth::judgeInterval(Frame &frame)
     frame.message = fmt::format("no picture for {:.1f} s before it", interval_s);
 }
 
-void FrameHealth::judge(Frame &frame)
+void FrameJudge::State::judge(Frame &frame)
 {
   const MeasuredRotation motion = motionTo(frame);
   judgeInterval(frame);
-  m_last_stamp_ns = frame.stamp_ns;
-  m_last_odometry = frame.wMb_odometry;
+  last_stamp_ns = frame.stamp_ns;
+  last_odometry = frame.wMb_odometry;
   if (frame.status != FrameStatus::ok || frame.image.getSize() == 0)
-    return m_health.skip(motion);
-  const ImageFault fault = m_health.check(frame.image, motion);
+    return health.skip(motion);
+  const ImageFault fault = health.check(frame.image, motion);
   if (fault == ImageFault::none)
     return;
   frame.status = fault == ImageFault::frozen       ? FrameStatus::stale
                  : fault == ImageFault::wrong_size ? FrameStatus::resized
                                                    : FrameStatus::doubtful;
-  frame.message = m_health.reason();
+  frame.message = health.reason();
 }
 
-FrameJudge::FrameJudge(const PinholeCamera &camera, const Pose &bMc)
-    : m_health(std::make_unique<FrameHealth>(camera, bMc))
-{
-}
+FrameJudge::FrameJudge(const PinholeCamera &camera, const Pose &bMc) : m_state(new State{camera.fx, bMc}) {}
 FrameJudge::~FrameJudge() = default;
-void FrameJudge::judge(Frame &frame) { m_health->judge(frame); }
+FrameJudge::FrameJudge(FrameJudge &&) noexcept = default;
+void FrameJudge::judge(Frame &frame) { m_state->judge(frame); }
 } // namespace bole

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/frame_health.h"
+#include <bole/open_source.h>
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ std::vector<double> gapsOf(const std::vector<double> &intervals_s, FrameStatus s
 {
   PinholeCamera camera;
   camera.fx = camera.fy = 50;
-  FrameHealth health(camera, Pose());
+  FrameJudge health(camera, Pose());
   std::vector<double> gaps;
   double time_s = 7;
   for (std::size_t i = 0; i <= intervals_s.size(); ++i) {
@@ -38,7 +38,7 @@ std::vector<double> gapsOf(const std::vector<double> &intervals_s, FrameStatus s
 std::vector<double> steady(std::size_t count, double interval_s) { return std::vector<double>(count, interval_s); }
 } // namespace
 
-TEST(FrameHealth, TellsOfATimeWithoutAPicture)
+TEST(FrameJudge, TellsOfATimeWithoutAPicture)
 {
   std::vector<double> intervals = steady(40, 0.1);
   intervals[20] = 2.1;
@@ -47,21 +47,21 @@ TEST(FrameHealth, TellsOfATimeWithoutAPicture)
   EXPECT_NEAR(gaps[0], 2.1, 1e-9);
 }
 
-TEST(FrameHealth, APauseAfterEachBurstIsAGap)
+TEST(FrameJudge, APauseAfterEachBurstIsAGap)
 {
   std::vector<double> intervals = steady(60, 0.1);
   intervals[20] = intervals[30] = intervals[40] = intervals[50] = 1;
   EXPECT_EQ(gapsOf(intervals).size(), 4u);
 }
 
-TEST(FrameHealth, AGapThatTheSourceFillsWithMissingFramesIsNoneOnceMore)
+TEST(FrameJudge, AGapThatTheSourceFillsWithMissingFramesIsNoneOnceMore)
 {
   std::vector<double> intervals = steady(40, 0.1);
   intervals[20] = 2.1;
   EXPECT_TRUE(gapsOf(intervals, FrameStatus::missing).empty());
 }
 
-TEST(FrameHealth, ACameraOfAnyRateThatVariesHasNoGap)
+TEST(FrameJudge, ACameraOfAnyRateThatVariesHasNoGap)
 {
   std::mt19937 random(1);
   for (const double usual_s : {0.01, 0.033, 0.1, 0.4, 1.0, 5.0}) {
@@ -72,7 +72,7 @@ TEST(FrameHealth, ACameraOfAnyRateThatVariesHasNoGap)
   }
 }
 
-TEST(FrameHealth, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
+TEST(FrameJudge, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
 {
   std::vector<double> intervals = steady(20, 0.1);
   const std::vector<double> slow = steady(100, 0.4);
@@ -80,7 +80,7 @@ TEST(FrameHealth, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
   EXPECT_TRUE(gapsOf(intervals).empty());
 }
 
-TEST(FrameHealth, ACameraThatGoesOnVerySlowlyIsToldOnlyUntilThatIsUsual)
+TEST(FrameJudge, ACameraThatGoesOnVerySlowlyIsToldOnlyUntilThatIsUsual)
 {
   std::vector<double> intervals = steady(20, 0.1);
   const std::vector<double> slow = steady(100, 1);
