@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/flight_folder.h"
 #include "geometry/failure.h"
-#include "input/picture_codec.h"
+#include "input/codec.h"
 #include <bole/open_source.h>
 
 #include <cerrno>

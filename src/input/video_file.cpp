@@ -2,7 +2,6 @@
 #include "input/video_file.h"
 #include "geometry/failure.h"
 #include "input/codec.h"
-#include "input/libav.h"
 #include "input/regular_file.h"
 #include "input/secrets.h"
 
@@ -33,10 +32,22 @@ struct CloseFormat
   void operator()(AVFormatContext *format) const { avformat_close_input(&format); }
 };
 
+/// The matrix that brings the pictures of \p stream upright, as av_display_rotation_get() takes it; nullptr for none.
+const std::uint8_t *displayMatrix(const AVStream &stream)
+{
+#if LIBAVCODEC_VERSION_INT >= AV_VERSION_INT(60, 31, 100)
+  const AVPacketSideData *data = av_packet_side_data_get(
+      stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data, AV_PKT_DATA_DISPLAYMATRIX);
+  return data == nullptr ? nullptr : data->data;
+#else
+  return av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+#endif
+}
+
 /// Quarter turns, clockwise, that bring the picture upright.
 int quarterTurns(AVStream &stream)
 {
-  const std::uint8_t *matrix = libav::displayMatrix(stream);
+  const std::uint8_t *matrix = displayMatrix(stream);
   if (matrix == nullptr)
     return 0;
   std::array<std::int32_t, 9> values;

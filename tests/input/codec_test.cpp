@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Pictures are read as OpenCV reads them.
-#include "input/picture_codec.h"
+#include "input/codec.h"
 
 #include <gtest/gtest.h>
 
