@@ -2,9 +2,9 @@
 #include <bole/ardrone_source.h>
 
 #include "ardrone/drone_link.h"
-#include "ardrone/socket.h"
 #include "geometry/failure.h"
 #include "input/rectifier.h"
+#include "input/steady_clock.h"
 
 #include <atomic>
 #include <cmath>

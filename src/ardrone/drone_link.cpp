@@ -2,8 +2,9 @@
 #include "ardrone/drone_link.h"
 #include "geometry/failure.h"
 
+#include "ardrone/drone_clock.h"
 #include "ardrone/receivers.h"
-#include "ardrone/video_stamps.h"
+#include "input/steady_clock.h"
 
 #include <condition_variable>
 #include <fmt/format.h>
@@ -195,8 +196,6 @@ void LinkOptions::validate() const
   requireRange("frozen_m", frozen_m, 1e-9, 10);
   requireRange("frozen_rad", frozen_rad, 1e-9, 3);
 }
-
-DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options{}) {}
 
 DroneLink::DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap)
 {

@@ -44,7 +44,6 @@ class DroneLink
 public:
   using Options = LinkOptions;
 
-  explicit DroneLink(const ArDroneAddress &address);
   DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap = {});
   ~DroneLink();
   DroneLink(const DroneLink &) = delete;

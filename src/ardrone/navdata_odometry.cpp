@@ -60,13 +60,6 @@ Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw)
       .toRotationMatrix();
 }
 
-Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb)
-{
-  const double roll = std::atan2(wRb(2, 1), wRb(2, 2));
-  const double pitch_up = std::asin(std::clamp(wRb(2, 0), -1.0, 1.0));
-  return {roll, pitch_up, -yawOf(wRb)};
-}
-
 void NavdataOdometry::restart()
 {
   if (!m_history.empty())

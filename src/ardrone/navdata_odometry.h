@@ -19,8 +19,6 @@ namespace bole
 /// takes one to the other, so wRb = F Rz(yaw) Ry(pitch) Rx(roll) F = Rz(-yaw) Ry(-pitch) Rx(roll).
 /// Law (a test): the drone turned about one of its axes turns the right way about ours, each axis alone.
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw);
-/// Roll, pitch, yaw [rad] as the drone counts them.
-Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb);
 /// A vector in the drone's axes (y right, z down) in ours, and back: y and z change their signs.
 inline Eigen::Vector3d flipDroneAxes(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/receivers.h"
 
-#include "input/retry_pause.h"
+#include "input/steady_clock.h"
 
 #include <array>
 

@@ -2,8 +2,8 @@
 #include <bole/vpArDroneGrabber.h>
 
 #include "ardrone/drone_link.h"
-#include "ardrone/socket.h"
 #include "geometry/failure.h"
+#include "input/steady_clock.h"
 
 #include <algorithm>
 #include <fmt/format.h>

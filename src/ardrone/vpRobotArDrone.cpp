@@ -4,9 +4,9 @@
 #include <bole/vpRobotArDrone.h>
 
 #include "ardrone/drone_link.h"
-#include "ardrone/socket.h"
 #include "geometry/failure.h"
 #include "geometry/so3.h"
+#include "input/steady_clock.h"
 
 #include <algorithm>
 #include <atomic>

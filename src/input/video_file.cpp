@@ -4,9 +4,9 @@
 #include "input/codec.h"
 #include "input/regular_file.h"
 #include "input/secrets.h"
+#include "input/steady_clock.h"
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
@@ -140,11 +140,6 @@ namespace
 {
 constexpr double kOpening_s = 10, kSilence_s = 3; ///< that an address may take to answer, and between two packets
 
-std::int64_t steady_ns()
-{
-  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 /// Pictures one after the other as cameras push them: without stamps, and whatever length is said, without an end.
 bool isMultipart(const AVFormatContext &format) { return std::strcmp(format.iformat->name, "mpjpeg") == 0; }
 
@@ -152,7 +147,7 @@ bool isMultipart(const AVFormatContext &format) { return std::strcmp(format.ifor
 int isOver(void *limit)
 {
   const auto *of = static_cast<const ReadLimit *>(limit);
-  return of->is_stopped || steady_ns() > of->until_ns ? 1 : 0;
+  return of->is_stopped || steadyNowNs() > of->until_ns ? 1 : 0;
 }
 /// Whether the file begins as an MP4 or a QuickTime does.
 bool isMp4(const std::string &path)
@@ -178,7 +173,7 @@ VideoFile::VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limi
 void VideoFile::allowReading(double seconds) const
 {
   if (m_limit)
-    m_limit->until_ns = steady_ns() + static_cast<std::int64_t>(seconds * 1e9);
+    m_limit->until_ns = steadyNowNs() + static_cast<std::int64_t>(seconds * 1e9);
 }
 
 void VideoFile::open(const std::string &url)

@@ -13,7 +13,6 @@ TEST(AtCommand, WritesFloatsAsTheDeveloperGuideDoes)
   EXPECT_EQ(atFloat(-0.8f), "-1085485875");
   EXPECT_EQ(atFloat(0), "0");
   EXPECT_EQ(atFloat(0.75f), "1061158912");
-  EXPECT_FLOAT_EQ(atFloatValue("-1085485875"), -0.8f);
 }
 
 TEST(AtCommand, ReadsSeveralCommandsOfADatagram)

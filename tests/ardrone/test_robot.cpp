@@ -3,6 +3,7 @@
 
 #include "flight.h"
 
+#include <cstring>
 #include <gtest/gtest.h>
 #include <visp3/core/vpException.h>
 
@@ -11,6 +12,15 @@ using test::eventually;
 
 namespace
 {
+/// The inverse of atFloat().
+float atFloatValue(const std::string &text)
+{
+  const std::int32_t bits = std::stoi(text);
+  float value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
 struct Flying
 {
   std::unique_ptr<ArDroneEmulator> emulator = test::emulate(2, 40, {}, true);

@@ -2,7 +2,7 @@
 // Streams by their address, from a camera behind HTTP on this machine.
 #include "input/live_video.h"
 
-#include "input/retry_pause.h"
+#include "input/steady_clock.h"
 #include "output/video_writer.h"
 
 #include <arpa/inet.h>

@@ -1,13 +1,21 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// How long one waits before an attempt that failed is made again.
+/// Time as it passes: the clock that arrivals are stamped with, and how long one waits before an attempt that failed is
+/// made again.
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 
 namespace bole
 {
+/// [ns] of the steady clock.
+inline std::int64_t steadyNowNs()
+{
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 /// Twice as long after each attempt, up to a limit, so that nobody who closes at once is asked thousands of times.
 class RetryPause
 {
