@@ -4,7 +4,6 @@
 #include "interrupt.h"
 
 #include "ardrone/flight_folder.h"
-#include "ardrone/recording.h"
 #include "progress.h"
 #include <bole/ardrone_source.h>
 

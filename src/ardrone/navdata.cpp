@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/navdata.h"
-#include <cmath>
+#include "ardrone/navdata_odometry.h"
 
 #include "ardrone/bytes.h"
 #include "geometry/names.h"

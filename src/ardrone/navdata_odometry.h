@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Where the drone says it has flown: odometry from navdata.
+/// Navigation data of the AR.Drone 1 and 2: one datagram in, named numbers out, and where the drone says it has flown.
 
-#include "ardrone/navdata.h"
-#include <bole/vpArDroneGrabber.h>
+#include <bole/ardrone_wire.h>
 
 #include <cstdint>
 #include <deque>
@@ -13,6 +12,21 @@
 
 namespace bole
 {
+enum class NavdataError
+{
+  none,
+  too_short,
+  header,
+  option_size,
+  no_checksum,
+  checksum
+};
+const char *toString(NavdataError error);
+
+/// Reads one datagram. Only packets with a right checksum get through.
+/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input terminates.
+NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
+
 /// Attitude wRb from the drone's angles roll, pitch, yaw [rad].
 ///
 /// The drone's frames have y to the right and z down, ours y left and z up; half a turn about x, F,

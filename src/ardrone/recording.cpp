@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/recording.h"
+#include "ardrone/flight_folder.h"
 
 #include "ardrone/bytes.h"
 #include "geometry/failure.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/navdata.h"
+#include "ardrone/navdata_odometry.h"
 
 #include "files.h"
 
