@@ -2,7 +2,7 @@
 #include "saliency/saliency.h"
 #include "geometry/names.h"
 #include "geometry/so3.h"
-#include "saliency/label_loops.h"
+#include "saliency/saliency_loops.h"
 
 #include <algorithm>
 #include <cmath>

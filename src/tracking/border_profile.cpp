@@ -2,7 +2,7 @@
 #include "tracking/border_profile.h"
 
 #include "geometry/median.h"
-#include "tracking/profile_loops.h"
+#include "tracking/tracking_loops.h"
 
 #include <algorithm>
 #include <array>

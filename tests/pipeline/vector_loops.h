@@ -7,13 +7,9 @@
 #include "gradient/line_loops.h"
 #include "motion/epipolar_loops.h"
 #include "motion/window_loops.h"
-#include "saliency/evidence_loops.h"
-#include "saliency/label_loops.h"
-#include "saliency/pyramid_loops.h"
-#include "saliency/rotation_loops.h"
+#include "saliency/saliency_loops.h"
 #include "smoothing/front_loops.h"
-#include "tracking/patch_loops.h"
-#include "tracking/profile_loops.h"
+#include "tracking/tracking_loops.h"
 
 #include <cmath>
 #include <cstddef>

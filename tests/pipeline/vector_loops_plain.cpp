@@ -10,13 +10,9 @@
 #include "gradient/line_loops.cpp"
 #include "motion/epipolar_loops.cpp"
 #include "motion/window_loops.cpp"
-#include "saliency/evidence_loops.cpp"
-#include "saliency/label_loops.cpp"
-#include "saliency/pyramid_loops.cpp"
-#include "saliency/rotation_loops.cpp"
+#include "saliency/saliency_loops.cpp"
 #include "smoothing/front_loops.cpp"
-#include "tracking/patch_loops.cpp"
-#include "tracking/profile_loops.cpp"
+#include "tracking/tracking_loops.cpp"
 #include "vector_loops.h"
 
 std::vector<double> outputsOfPlainLoops() { return bole_plain::LoopOutputs().all(); }
