@@ -13,10 +13,10 @@
 #include "input/atomic_file.h"
 #include "input/csv_reader.h"
 #include "input/live_video.h"
-#include "input/secrets.h"
+#include "input/trajectory.h"
+#include "input/user_text.h"
 #include "mbt/cao_reader.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/video_writer.h"
 #include "progress.h"
 #include <bole/cylinder.h>

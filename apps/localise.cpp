@@ -7,7 +7,7 @@
 #include "localiser.h"
 
 #include "input/atomic_file.h"
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 #include "progress.h"
 #include <bole/open_source.h>
 #include <bole/output_folder.h>

@@ -10,7 +10,7 @@
 #include "track_output.h"
 
 #include "input/live_video.h"
-#include "input/secrets.h"
+#include "input/user_text.h"
 #include "motion/sensor_calibration.h"
 #include "pipeline/measured_camera.h"
 #include "progress.h"

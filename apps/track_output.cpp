@@ -4,7 +4,7 @@
 #include "geometry/so3.h"
 #include "input/atomic_file.h"
 #include "input/recorded_source.h"
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/graph.h>
 #include <bole/open_source.h>

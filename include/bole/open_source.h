@@ -71,9 +71,6 @@ struct SourceOptions
   std::string odometry_path; ///< trajectory file (readTrajectory()); empty: the one of the folder, or none
   /// [s], added to the stamps of odometry_path so that they count as the video's do. Default 0.
   double odometry_offset_s = 0;
-  /// [s], > 0: between odometry samples further apart than this nothing is interpolated. Default 1:
-  /// a body in flight is not where a straight line says after longer.
-  double max_odometry_gap_s = 1;
   /// [Hz], > 0, 1e-3 to 1e4: rate of numbered images, which have no stamps of their own.
   /// Default: `rate_hz` of the camera file, else 25.
   std::optional<double> frame_rate_hz;

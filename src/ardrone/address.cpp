@@ -2,7 +2,7 @@
 #include "ardrone/address.h"
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
-#include "input/secrets.h"
+#include "input/user_text.h"
 
 #include <fmt/format.h>
 

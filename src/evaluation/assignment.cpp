@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "evaluation/assignment.h"
+#include "evaluation/trunk_metrics.h"
 
 #include <limits>
 

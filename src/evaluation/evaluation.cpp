@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
-#include "evaluation/visibility.h"
 #include "geometry/failure.h"
 #include "input/recorded_source.h"
+#include "input/trajectory.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 #include <bole/open_source.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trunk_metrics.h"
 
-#include "evaluation/assignment.h"
 #include "geometry/median.h"
 
 #include <algorithm>

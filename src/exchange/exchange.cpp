@@ -4,9 +4,9 @@
 #include "geometry/failure.h"
 #include "input/atomic_file.h"
 #include "input/regular_file.h"
+#include "input/trajectory.h"
 #include "mbt/cao_reader.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/cylinder.h>
 #include <bole/graph.h>

@@ -4,7 +4,7 @@
 #include "geometry/so3.h"
 #include "input/csv_reader.h"
 #include "input/recorded_source.h"
-#include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

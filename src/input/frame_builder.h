@@ -3,8 +3,6 @@
 /// \file
 /// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
 
-#include "input/image_file.h"
-
 #include "input/rectifier.h"
 #include "input/trajectory.h"
 #include <bole/frame.h>
@@ -14,6 +12,18 @@
 
 namespace bole
 {
+struct ImageFile
+{
+  FrameStatus status = FrameStatus::ok; ///< ok, corrupt, missing or resized
+  std::string message;                  ///< why not ok
+  vpImage<unsigned char> image;         ///< grey; empty when not ok
+};
+
+/// Decodes \p path as grey. A file that ends early is corrupt even where its decoder would fill the
+/// rest with grey (JPEG) or leave the last rows undefined.
+/// \param width, height [px] of the images before: one of another size is `resized` and not decoded; 0: any size.
+ImageFile readImageFile(const std::string &path, int width = 0, int height = 0);
+
 /// Which of SourceOptions a source has a use for.
 struct SourceKind
 {
@@ -64,7 +74,6 @@ private:
   Rectifier m_rectifier;
   Pose m_bMc;
   Recording m_recording;
-  std::int64_t m_max_gap_ns;
   FrameJudge m_judge;
   std::optional<std::int64_t> m_last_stamp_ns;
   std::size_t m_gyro_at = 0;

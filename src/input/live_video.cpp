@@ -2,8 +2,8 @@
 #include "input/live_video.h"
 #include "geometry/failure.h"
 #include "input/recorded_source.h"
-#include "input/secrets.h"
 #include "input/steady_clock.h"
+#include "input/user_text.h"
 
 #include <bole/visp.h>
 #include <chrono>

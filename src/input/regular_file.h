@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace bole
 {
@@ -47,4 +48,17 @@ private:
   std::string m_name, m_line;
   std::size_t m_number = 0;
 };
+
+/// An element of the part of XML that settings and calibrations use (nested elements with text, comments, a
+/// declaration): of an innermost one the text.
+struct XmlElement
+{
+  std::string path; ///< "conf/camera/u0"
+  std::string text; ///< without the blanks around it
+  int line = 0;     ///< of its end
+};
+
+/// The elements of a file of at most 1 MB in the order of their ends, so that an element follows those in it.
+/// Attributes are passed over. \throw vpException "path:line: ...".
+std::vector<XmlElement> readXml(const std::string &path);
 } // namespace bole

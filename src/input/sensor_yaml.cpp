@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"

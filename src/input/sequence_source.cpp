@@ -2,7 +2,7 @@
 #include "input/recorded_source.h"
 
 #include "geometry/failure.h"
-#include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 
 #include <algorithm>
 #include <charconv>

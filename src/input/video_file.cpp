@@ -3,8 +3,8 @@
 #include "geometry/failure.h"
 #include "input/codec.h"
 #include "input/regular_file.h"
-#include "input/secrets.h"
 #include "input/steady_clock.h"
+#include "input/user_text.h"
 
 #include <array>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/failure.h"
 #include "input/recorded_source.h"
-#include "input/secrets.h"
+#include "input/user_text.h"
 #include "input/video_file.h"
 
 #include <limits>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/xml_file.h"
 #include "geometry/failure.h"
+#include "input/regular_file.h"
 #include "input/yaml_file.h"
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include "geometry/median.h"
 #include "input/atomic_file.h"
 #include "input/csv_reader.h"
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "evaluation/assignment.h"
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
-#include "evaluation/visibility.h"
 #include "geometry/so3.h"
 #include "input/recorded_source.h"
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 

@@ -4,7 +4,7 @@
 //   APE  E_i = P_ref,i^-1 P_est,i                                    translation |t(E_i)|, rotation angle of R(E_i)
 //   RPE  E_i = (P_ref,i^-1 P_ref,i+1)^-1 (P_est,i^-1 P_est,i+1)      the same parts; both as RMSE over i
 #include "evaluation/trajectory_metrics.h"
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>

@@ -4,9 +4,9 @@
 #include "exchange/exchange.h"
 #include "geometry/so3.h"
 #include "input/flight_folder.h"
+#include "input/trajectory.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include "support/shell.h"
 #include <bole/cylinder.h>

@@ -2,7 +2,7 @@
 #include "flight_folder.h"
 #include "messages.h"
 
-#include "input/image_file.h"
+#include "input/frame_builder.h"
 
 #include "input/recorded_source.h"
 

@@ -7,7 +7,6 @@
 #include "mbt/trunk_settings.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include "support/german_locale.h"
 #include <bole/config.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
 #include "input/atomic_file.h"
+#include "input/trajectory.h"
 #include "output/flight_trace.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 
 #include <gmock/gmock.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A real cylinder: ViSP's sequence of a cube and a cylinder that are pushed over a table by hand. ViSP's tracker
 // follows the cube alone, which gives the odometry of the camera in the cube's frame; bole maps the cylinder in it.
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/open_source.h>
 #include <bole/pose.h>

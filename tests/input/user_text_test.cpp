@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/secrets.h"
+#include "input/user_text.h"
 
 #include <gtest/gtest.h>
 
