@@ -5,7 +5,7 @@
 #include "geometry/failure.h"
 #include "input_checks.h"
 #include "interrupt.h"
-#include "localiser.h"
+#include "localise.h"
 #include "overlay_window.h"
 
 #include "geometry/so3.h"
