@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// bole follow: vpMbTrunkTracker over a video of one's own, in the map of an earlier flight.
+// The module bole_commands.so (command_module.h): bole follow, vpMbTrunkTracker over a video of one's own in the map of
+// an earlier flight, and the window that shows an overlay.
 #include "commands.h"
 #include "data_files.h"
 #include "geometry/failure.h"
@@ -455,3 +456,10 @@ void addFollow(CLI::App &app)
   });
 }
 } // namespace bole::apps
+
+extern "C" void boleAddCommands(CLI::App &app) { bole::apps::addFollow(app); }
+
+extern "C" vpDisplay *boleMakeWindow(vpImage<vpRGBa> &picture, const std::string &title)
+{
+  return new vpDisplayX(picture, 100, 100, title);
+}
