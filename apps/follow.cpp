@@ -187,14 +187,14 @@ private:
 };
 
 /// What of the model the camera should see.
-std::vector<OverlayTrunk> modelInView(const std::vector<Cylinder> &model, const Pose &cMo, const PinholeCamera &camera,
-                                      bool is_held)
+std::vector<TrunkInView> modelInView(const std::vector<Cylinder> &model, const Pose &cMo, const PinholeCamera &camera,
+                                     bool is_held)
 {
   constexpr double kThinnest_px = 3;
-  std::vector<OverlayTrunk> trunks;
+  std::vector<TrunkInView> trunks;
   for (std::size_t i = 0; i < model.size(); ++i) {
     const Cylinder trunk = cMo * model[i];
-    OverlayTrunk drawn;
+    TrunkInView drawn;
     drawn.relative = relativeTrunk(trunk);
     if (!drawn.relative.isFinite() || drawn.relative.cRt(2, 0) <= 0.1 ||
         2 * camera.fx * drawn.relative.ratio() < kThinnest_px)
@@ -204,7 +204,7 @@ std::vector<OverlayTrunk> modelInView(const std::vector<Cylinder> &model, const 
     drawn.tan_low = drawn.relative.cRt.col(2).dot(trunk.foot) / drawn.distance;
     drawn.tan_high = drawn.relative.cRt.col(2).dot(trunk.top) / drawn.distance;
     drawn.status = TrunkStatus::confirmed;
-    drawn.is_observed = is_held;
+    drawn.is_tracked = is_held;
     trunks.push_back(drawn);
   }
   return trunks;

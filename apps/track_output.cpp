@@ -227,11 +227,9 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
 {
   Overlay overlay;
   std::size_t candidates = 0;
-  for (const TrunkInView &trunk : report.trunks) {
-    overlay.trunks.push_back(
-        {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
+  overlay.trunks = report.trunks;
+  for (const TrunkInView &trunk : report.trunks)
     candidates += trunk.is_tracked && trunk.status == TrunkStatus::candidate ? 1 : 0;
-  }
   overlay.is_warning = report.frame_status != FrameStatus::ok;
   overlay.text = fmt::format("{:.1f} s  {} trunk{}, {} candidate{}  {}", 1e-9 * static_cast<double>(frame.stamp_ns),
                              m_in_view, m_in_view == 1 ? "" : "s", candidates, candidates == 1 ? "" : "s",

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// The map as users get it: its trunks with position, radius, what is known of their errors and their life, and where
-/// its scale and the direction of gravity come from.
+/// The map as users get it: its trunks with position, radius, what is known of their errors and their life, those that
+/// a frame sees, and where its scale and the direction of gravity come from.
+
+#include <bole/trunk.h>
 
 #include <Eigen/Core>
 
@@ -69,6 +71,19 @@ struct TrunkRecord
   Eigen::Matrix2d covarianceXy() const { return covariance.topLeftCorner<2, 2>(); }         ///< [m^2]
   double positionSigma() const { return std::sqrt(std::max(0.0, covarianceXy().trace())); } ///< [m]
   double radiusSigma() const { return std::sqrt(std::max(0.0, covariance(2, 2))); }         ///< [m]
+};
+
+/// A known trunk that was looked for in the frame.
+struct TrunkInView
+{
+  int id = 0;                                  ///< in the map
+  TrunkStatus status = TrunkStatus::candidate; ///< in the map
+  bool is_tracked = false;                     ///< measured in this frame
+  const char *outcome = "";                    ///< of the search for it: "tracked", "occluded", ...
+  RelativeTrunk relative;                      ///< as measured, else as predicted
+  double tan_low = 0;                          ///< part looked at: tangents of elevation
+  double tan_high = 0;                         ///< part looked at: tangents of elevation
+  double distance = 0;                         ///< from the camera to the axis [m]; 0 where no range is known
 };
 
 /// Where the scale of the map comes from.
