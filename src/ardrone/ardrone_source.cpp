@@ -177,7 +177,6 @@ bool ArDroneSource::next(Frame &frame)
 PinholeCamera ArDroneSource::camera() const { return m_state->rectifier->camera(); }
 Pose ArDroneSource::bMc() const { return m_state->mounted.bMc; }
 std::string ArDroneSource::name() const { return m_state->address.toString(); }
-bool ArDroneSource::hasGyro() const { return m_state->options.grabber.link.full_navdata; }
 void ArDroneSource::stop() noexcept { m_state->running = false; }
 LinkCounters ArDroneSource::counters() const
 {
