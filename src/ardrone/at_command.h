@@ -4,7 +4,6 @@
 /// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
 
 #include "ardrone/socket.h"
-#include <bole/ardrone_wire.h>
 
 #include <mutex>
 

@@ -34,14 +34,6 @@ std::int64_t navdataTimeMicroseconds(std::uint32_t time)
   return std::int64_t{time >> 21} * 1'000'000 + (time & 0x1fffff);
 }
 
-std::uint32_t navdataTimeWord(std::int64_t microseconds)
-{
-  std::int64_t reduced = microseconds % kNavdataTimePeriod_us;
-  if (reduced < 0)
-    reduced += kNavdataTimePeriod_us;
-  return static_cast<std::uint32_t>(reduced / 1'000'000) << 21 | static_cast<std::uint32_t>(reduced % 1'000'000);
-}
-
 bool ClockFit::add(std::int64_t drone_ns, std::int64_t host_ns)
 {
   const std::int64_t offset = host_ns - drone_ns;

@@ -42,7 +42,7 @@ struct LiveFrame
 class DroneLink
 {
 public:
-  DroneLink(const ArDroneAddress &address, const LinkTap &tap);
+  explicit DroneLink(const ArDroneAddress &address, const LinkTap &tap = {});
   ~DroneLink();
   DroneLink(const DroneLink &) = delete;
   DroneLink &operator=(const DroneLink &) = delete;

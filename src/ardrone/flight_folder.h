@@ -5,7 +5,6 @@
 /// a form that survives being cut anywhere.
 
 #include "ardrone/drone_link.h"
-#include <bole/ardrone_wire.h>
 #include <bole/open_source.h>
 
 #include <mutex>

@@ -14,12 +14,7 @@ namespace
 constexpr std::uint32_t kHeader = 0x55667788, kHeaderAlso = 0x55667789;
 constexpr std::size_t kHeaderSize = 16, kOptionHead = 4;
 constexpr std::uint16_t kDemo = 0, kTime = 1, kPhysical = 3, kChecksum = 0xFFFF;
-constexpr std::size_t kDemoSize = 144, kDemoUsed = 40, kPhysicalSize = 42, kPhysicalUsed = 30;
-
-std::uint32_t checksum(const std::uint8_t *data, std::size_t size)
-{
-  return std::accumulate(data, data + size, std::uint32_t{0});
-}
+constexpr std::size_t kDemoUsed = 40, kPhysicalUsed = 30;
 
 Eigen::Vector3f readVector(const std::uint8_t *p)
 {
@@ -62,35 +57,6 @@ void readTypedOptions(Navdata &navdata)
       navdata.physical = physical;
   }
 }
-
-void appendVector(std::vector<std::uint8_t> &out, const Eigen::Vector3f &v)
-{
-  for (int i = 0; i < 3; ++i)
-    appendLittleEndian(out, v[i]);
-}
-
-std::vector<std::uint8_t> encodeDemo(const Navdata::Demo &demo)
-{
-  std::vector<std::uint8_t> out;
-  appendLittleEndian(out, demo.control_state);
-  appendLittleEndian(out, demo.battery_percent);
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.y());
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.x());
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.z());
-  appendLittleEndian(out, demo.altitude_mm);
-  appendVector(out, demo.velocity_mm_s);
-  out.resize(kDemoSize, 0);
-  return out;
-}
-
-std::vector<std::uint8_t> encodePhysical(const Navdata::Physical &physical)
-{
-  std::vector<std::uint8_t> out(6, 0); // temperatures
-  appendVector(out, physical.acceleration_mg);
-  appendVector(out, physical.rate_deg_s);
-  out.resize(kPhysicalSize, 0);
-  return out;
-}
 } // namespace
 
 const char *toString(NavdataError error)
@@ -119,7 +85,8 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
     if (id == kChecksum) {
       if (length != kOptionHead + 4 || at + length != size)
         return NavdataError::option_size;
-      if (readLittleEndian<std::uint32_t>(data + at + kOptionHead) != checksum(data, at))
+      if (readLittleEndian<std::uint32_t>(data + at + kOptionHead) !=
+          std::accumulate(data, data + at, std::uint32_t{0}))
         return NavdataError::checksum;
       readTypedOptions(navdata);
       return NavdataError::none;
@@ -128,33 +95,5 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
     at += length;
   }
   return NavdataError::no_checksum;
-}
-
-std::vector<std::uint8_t> encodeNavdata(const Navdata &navdata)
-{
-  std::vector<std::uint8_t> out;
-  appendLittleEndian(out, kHeader);
-  appendLittleEndian(out, navdata.state);
-  appendLittleEndian(out, navdata.sequence);
-  appendLittleEndian(out, std::uint32_t{navdata.vision_defined});
-  auto options = navdata.options;
-  if (navdata.demo)
-    options[kDemo] = encodeDemo(*navdata.demo);
-  if (navdata.time) {
-    options[kTime].clear();
-    appendLittleEndian(options[kTime], *navdata.time);
-  }
-  if (navdata.physical)
-    options[kPhysical] = encodePhysical(*navdata.physical);
-  for (const auto &[id, bytes] : options) {
-    appendLittleEndian(out, id);
-    appendLittleEndian(out, static_cast<std::uint16_t>(bytes.size() + kOptionHead));
-    out.insert(out.end(), bytes.begin(), bytes.end());
-  }
-  const std::uint32_t sum = checksum(out.data(), out.size());
-  appendLittleEndian(out, kChecksum);
-  appendLittleEndian(out, std::uint16_t{kOptionHead + 4});
-  appendLittleEndian(out, sum);
-  return out;
 }
 } // namespace bole

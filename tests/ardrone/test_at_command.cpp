@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/address.h"
 #include "ardrone/at_command.h"
+#include "emulator/wire_format.h"
 
 #include <bole/visp.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/navdata_odometry.h"
+#include "emulator/wire_format.h"
 
 #include "files.h"
 

@@ -2,6 +2,7 @@
 #include "ardrone/flight_folder.h"
 
 #include "ardrone/bytes.h"
+#include "emulator/recording_reader.h"
 
 #include "flight.h"
 
@@ -147,7 +148,7 @@ TEST(Recording, ARecordedFlightIsServedAgain)
     {
       RecordingWriter writer(folder.path);
       const auto emulator = test::emulate(generation, 40);
-      DroneLink link(ArDroneAddress::parse(emulator->address()), {},
+      DroneLink link(ArDroneAddress::parse(emulator->address()),
                      [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
                        writer.write(channel, arrival_ns, data, size);
                      });

@@ -3,6 +3,7 @@
 // read must be read again from its own encoding, and the odometry must stay finite.
 #include "ardrone/drone_clock.h"
 #include "ardrone/navdata_odometry.h"
+#include "emulator/wire_format.h"
 
 #include <cstdlib>
 #include <numeric>
