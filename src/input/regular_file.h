@@ -16,6 +16,8 @@ std::ifstream openRegularFile(const std::string &path);
 
 /// All of a file of at most \p most_bytes. \throw vpException(ioError) naming it.
 std::string readWholeFile(const std::string &path, std::size_t most_bytes);
+/// All of a file that people write, at most 1 MB. \throw vpException(ioError) naming it.
+std::string readSmallFile(const std::string &path);
 
 /// The lines of a text, counted. A line of more than 100,000 characters is refused before it is in the memory; the byte
 /// order mark of UTF-8 and the carriage returns of other systems are left out.

@@ -18,9 +18,6 @@ namespace bole
 /// \throw vpException(ioError) "path:line: ...".
 YAML::Node loadYaml(const std::string &path);
 
-/// All of a file that people write, at most 1 MB. \throw vpException(ioError) naming it.
-std::string readSmallFile(const std::string &path);
-
 /// "path:line" of \p mark.
 std::string placeOf(const std::string &path, const YAML::Mark &mark);
 
