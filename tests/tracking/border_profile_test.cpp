@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/so3.h"
 #include "gradient/gradient.h"
-#include "tracking/border_scan.h"
+#include "tracking/border_profile.h"
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
