@@ -201,11 +201,6 @@ bool LiveVideoSource::accepts(const std::string &address)
                                !std::filesystem::exists(address, error));
 }
 
-LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s)
-    : LiveVideoSource(address, options, give_up_s, nullptr)
-{
-}
-
 LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s,
                                  std::unique_ptr<VideoFile> file)
 {
