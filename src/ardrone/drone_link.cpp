@@ -113,9 +113,9 @@ struct DroneLink::State
   std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
   {
     Navdata packet;
-    const NavdataError error = parseNavdata(data, size, packet);
+    const bool is_good = parseNavdata(data, size, packet);
     const std::lock_guard<std::mutex> lock(mutex);
-    if (error != NavdataError::none) {
+    if (!is_good) {
       ++counters.navdata_refused;
       return std::nullopt;
     }
@@ -234,5 +234,4 @@ LinkCounters DroneLink::counters() const
   return m_state->counters;
 }
 AtChannel &DroneLink::commands() { return m_state->commands; }
-const ArDroneAddress &DroneLink::address() const { return m_state->address; }
 } // namespace bole

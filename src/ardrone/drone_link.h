@@ -59,7 +59,6 @@ public:
   LinkCounters counters() const;
   /// The drone's command port. Flight commands are for vpRobotArDrone.
   AtChannel &commands();
-  const ArDroneAddress &address() const;
 
 private:
   struct State;

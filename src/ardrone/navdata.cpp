@@ -2,7 +2,6 @@
 #include "ardrone/navdata_odometry.h"
 
 #include "ardrone/bytes.h"
-#include "geometry/names.h"
 
 #include <cmath>
 #include <numeric>
@@ -59,20 +58,14 @@ void readTypedOptions(Navdata &navdata)
 }
 } // namespace
 
-const char *toString(NavdataError error)
-{
-  return nameOf(error, {"none", "too short", "not a navdata header", "an option runs past the end", "no checksum",
-                        "wrong checksum"});
-}
-
-NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata)
+bool parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata)
 {
   navdata = {};
   if (size < kHeaderSize)
-    return NavdataError::too_short;
+    return false;
   const auto header = readLittleEndian<std::uint32_t>(data);
   if (header != kHeader && header != kHeaderAlso)
-    return NavdataError::header;
+    return false;
   navdata.state = readLittleEndian<std::uint32_t>(data + 4);
   navdata.sequence = readLittleEndian<std::uint32_t>(data + 8);
   navdata.vision_defined = readLittleEndian<std::uint32_t>(data + 12) != 0;
@@ -81,19 +74,19 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
     const auto id = readLittleEndian<std::uint16_t>(data + at);
     const auto length = readLittleEndian<std::uint16_t>(data + at + 2);
     if (length < kOptionHead || at + length > size)
-      return NavdataError::option_size;
+      return false;
     if (id == kChecksum) {
       if (length != kOptionHead + 4 || at + length != size)
-        return NavdataError::option_size;
+        return false;
       if (readLittleEndian<std::uint32_t>(data + at + kOptionHead) !=
           std::accumulate(data, data + at, std::uint32_t{0}))
-        return NavdataError::checksum;
+        return false;
       readTypedOptions(navdata);
-      return NavdataError::none;
+      return true;
     }
     navdata.options[id].assign(data + at + kOptionHead, data + at + length); // at most a datagram
     at += length;
   }
-  return NavdataError::no_checksum;
+  return false;
 }
 } // namespace bole

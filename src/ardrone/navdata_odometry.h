@@ -12,20 +12,9 @@
 
 namespace bole
 {
-enum class NavdataError
-{
-  none,
-  too_short,
-  header,
-  option_size,
-  no_checksum,
-  checksum
-};
-const char *toString(NavdataError error);
-
-/// Reads one datagram. Only packets with a right checksum get through.
+/// Reads one datagram; false where it is no navdata, or its checksum is wrong.
 /// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input terminates.
-NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
+bool parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
 
 /// Attitude wRb from the drone's angles roll, pitch, yaw [rad].
 ///

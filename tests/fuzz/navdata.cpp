@@ -14,11 +14,10 @@ namespace
 void use(const std::vector<std::uint8_t> &bytes)
 {
   bole::Navdata navdata, again;
-  if (bole::parseNavdata(bytes.data(), bytes.size(), navdata) != bole::NavdataError::none)
+  if (!bole::parseNavdata(bytes.data(), bytes.size(), navdata))
     return;
   const auto encoded = bole::encodeNavdata(navdata);
-  if (bole::parseNavdata(encoded.data(), encoded.size(), again) != bole::NavdataError::none ||
-      again.time != navdata.time)
+  if (!bole::parseNavdata(encoded.data(), encoded.size(), again) || again.time != navdata.time)
     std::abort();
   static bole::NavdataOdometry odometry;
   static bole::ClockUnwrapper clock(bole::kNavdataTimePeriod_us);
