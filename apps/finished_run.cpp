@@ -23,8 +23,7 @@ void addEvaluate(CLI::App &app)
   struct EvaluateArguments
   {
     std::string run, sequence, json;
-    EvaluationOptions options;
-    bool is_verbose = false, is_quiet = false;
+    bool is_time_aligned = false, is_verbose = false, is_quiet = false;
   };
   const auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App *command = app.add_subcommand("evaluate", "Compare a run with the ground truth of its sequence");
@@ -38,7 +37,7 @@ void addEvaluate(CLI::App &app)
   command->add_flag("-v,--verbose", arguments->is_verbose, "List every match, miss and false positive");
   command->add_flag("-q,--quiet", arguments->is_quiet, "No table");
   command->add_option("--json", arguments->json, "File for all figures (default RUN/evaluation.json)");
-  command->add_flag("--align-time", arguments->options.align_time,
+  command->add_flag("--align-time", arguments->is_time_aligned,
                     "Shift the run's stamps so that its motion fits: for live runs, whose stamps are "
                     "the drone's");
   command->footer("Prints a table and writes all figures as JSON. \"-\" and null: there was nothing to measure.\n"
@@ -47,7 +46,7 @@ void addEvaluate(CLI::App &app)
                   "  bole evaluate run/live data/park-forward --align-time --json live.json\n"
                   "  bole evaluate run/live run/park --align-time");
   command->callback([arguments] {
-    const Evaluation evaluation = evaluate(arguments->run, arguments->sequence, arguments->options);
+    const Evaluation evaluation = evaluate(arguments->run, arguments->sequence, arguments->is_time_aligned);
     if (!arguments->is_quiet)
       std::fputs(toTable(evaluation, arguments->is_verbose).c_str(), stdout);
     writeAtomically(arguments->json.empty() ? arguments->run + "/evaluation.json" : arguments->json,

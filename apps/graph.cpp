@@ -59,15 +59,11 @@ void solve(const std::string &file, const std::string &output, double tolerance)
 
 void addGraph(CLI::App &app)
 {
-  struct GraphArguments
-  {
-    std::string run;
-  };
-  const auto arguments = std::make_shared<GraphArguments>();
+  const auto run = std::make_shared<std::string>();
   CLI::App *command = app.add_subcommand("graph", "Statistics of the graph of a run");
-  command->add_option("RUN", arguments->run, "folder that `bole track` wrote (holds graph.g2o)")->required();
+  command->add_option("RUN", *run, "folder that `bole track` wrote (holds graph.g2o)")->required();
   command->footer("`bole export RUN g2o` writes it.\nExample:\n  bole graph run");
-  command->callback([arguments] { printStatistics(readG2o(arguments->run + "/graph.g2o")); });
+  command->callback([run] { printStatistics(readG2o(*run + "/graph.g2o")); });
 }
 
 void addSolve(CLI::App &app)

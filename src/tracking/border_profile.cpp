@@ -106,7 +106,7 @@ std::vector<float> meanAcross(const vpImage<float> &g, const BorderLine &line, d
   whole.assign(std::size_t(padded), 0.f);
   between.assign(std::size_t(padded), 0.f);
   std::vector<float> mean;
-  const AcrossLine across{line.rows() > 0 ? g[line.row_begin] : nullptr, columns, line.rows(), line.x_top, line.slope};
+  const LineSamples across{line.rows() > 0 ? g[line.row_begin] : nullptr, columns, line.rows(), line.x_top, line.slope};
   for (int i = 0; i < line.rows(); ++i) {
     i = addAcrossRows(across, i, padded, half, whole.data(), between.data());
     if (i == line.rows())

@@ -38,7 +38,7 @@ inline void addRow(const float *pixels, int n, float share, float *__restrict wh
 } // namespace
 
 BOLE_VECTOR_CLONES
-int addAcrossRows(const AcrossLine &line, int row, int n, int half, float *__restrict whole, float *__restrict between)
+int addAcrossRows(const LineSamples &line, int row, int n, int half, float *__restrict whole, float *__restrict between)
 {
   const double x_top = line.x_top, slope = line.slope;
   const int columns = line.columns, rows = line.rows;

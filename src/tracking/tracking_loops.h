@@ -2,6 +2,8 @@
 #pragma once
 // Private to the stage: sums over pixels of a patch, and across a line of a gradient image.
 
+#include "gradient/line_loops.h"
+
 namespace bole
 {
 /// Of the pixels of an image under a patch, in grey levels.
@@ -15,16 +17,8 @@ struct PatchSums
 /// Adds the \p n pixels of a row.
 void addPatchRow(const unsigned char *pixels, const float *patch, int n, PatchSums &sums);
 
-/// A line x = x_top + slope * row in an image of which \p pixels is the first of the line's first row.
-struct AcrossLine
-{
-  const float *pixels;
-  int columns, rows;
-  double x_top, slope;
-};
-
 /// Adds, for each row from \p row on, the \p n pixels from x - \p half on, and those from half a pixel farther on,
 /// linear between pixels, to \p whole and \p between. Returns the first row in which they reach beyond the image, or
 /// the number of rows.
-int addAcrossRows(const AcrossLine &line, int row, int n, int half, float *whole, float *between);
+int addAcrossRows(const LineSamples &line, int row, int n, int half, float *whole, float *between);
 } // namespace bole

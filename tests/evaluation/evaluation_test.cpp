@@ -432,7 +432,7 @@ TEST_F(RunAgainst, TheClockOfALiveRunIsFoundByItsMotionWhenAsked)
   late.erase(late.begin(), late.begin() + 3);
   writeTrajectory(run + "/trajectory.tum", late);
   EXPECT_THROW(evaluate(run, kFlight), vpException);
-  const Evaluation evaluation = evaluate(run, kFlight, {true});
+  const Evaluation evaluation = evaluate(run, kFlight, true);
   ASSERT_TRUE(evaluation.time_shift_s);
   EXPECT_NEAR(*evaluation.time_shift_s, -100.037, 0.0011);
   EXPECT_EQ(evaluation.smoothed.absolute[0].poses, late.size());
