@@ -5,7 +5,6 @@
 #include "data_files.h"
 #include "geometry/failure.h"
 #include "input_checks.h"
-#include "interrupt.h"
 #include "localise.h"
 #include "overlay_window.h"
 

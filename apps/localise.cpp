@@ -4,7 +4,6 @@
 #include "commands.h"
 #include "data_files.h"
 #include "input_checks.h"
-#include "interrupt.h"
 
 #include "geometry/failure.h"
 #include "input/atomic_file.h"

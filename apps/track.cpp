@@ -4,7 +4,6 @@
 #include "data_files.h"
 #include "geometry/failure.h"
 #include "input_checks.h"
-#include "interrupt.h"
 #include "overlay_window.h"
 #include "track_arguments.h"
 #include "track_output.h"

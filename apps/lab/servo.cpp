@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole servo: flying by trunks, closed over rendered images and the tracker.
 #include "data_files.h"
-#include "interrupt.h"
 #include "lab_commands.h"
 #include "overlay_window.h"
 #include "support/text.h"
