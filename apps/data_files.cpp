@@ -2,7 +2,7 @@
 #include "data_files.h"
 #include "geometry/failure.h"
 
-#include "input/suggestion.h"
+#include "input/user_text.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// bole follow: vpMbTrunkTracker over a video of one's own, in the map of an earlier flight.
+// The module bole_commands.so (command_module.h): bole follow, vpMbTrunkTracker over a video of one's own in the map of
+// an earlier flight, and the window that shows an overlay.
 #include "commands.h"
 #include "data_files.h"
 #include "geometry/failure.h"
 #include "input_checks.h"
-#include "interrupt.h"
-#include "localiser.h"
+#include "localise.h"
 #include "overlay_window.h"
 
 #include "geometry/so3.h"
@@ -13,11 +13,10 @@
 #include "input/atomic_file.h"
 #include "input/csv_reader.h"
 #include "input/live_video.h"
-#include "input/secrets.h"
+#include "input/trajectory.h"
+#include "input/user_text.h"
 #include "mbt/cao_reader.h"
-#include "output/figure.h"
-#include "output/trajectory_writer.h"
-#include "output/versions.h"
+#include "output/summary_json.h"
 #include "output/video_writer.h"
 #include "progress.h"
 #include <bole/cylinder.h>
@@ -187,14 +186,14 @@ private:
 };
 
 /// What of the model the camera should see.
-std::vector<OverlayTrunk> modelInView(const std::vector<Cylinder> &model, const Pose &cMo, const PinholeCamera &camera,
-                                      bool is_held)
+std::vector<TrunkInView> modelInView(const std::vector<Cylinder> &model, const Pose &cMo, const PinholeCamera &camera,
+                                     bool is_held)
 {
   constexpr double kThinnest_px = 3;
-  std::vector<OverlayTrunk> trunks;
+  std::vector<TrunkInView> trunks;
   for (std::size_t i = 0; i < model.size(); ++i) {
     const Cylinder trunk = cMo * model[i];
-    OverlayTrunk drawn;
+    TrunkInView drawn;
     drawn.relative = relativeTrunk(trunk);
     if (!drawn.relative.isFinite() || drawn.relative.cRt(2, 0) <= 0.1 ||
         2 * camera.fx * drawn.relative.ratio() < kThinnest_px)
@@ -204,7 +203,7 @@ std::vector<OverlayTrunk> modelInView(const std::vector<Cylinder> &model, const 
     drawn.tan_low = drawn.relative.cRt.col(2).dot(trunk.foot) / drawn.distance;
     drawn.tan_high = drawn.relative.cRt.col(2).dot(trunk.top) / drawn.distance;
     drawn.status = TrunkStatus::confirmed;
-    drawn.is_observed = is_held;
+    drawn.is_tracked = is_held;
     trunks.push_back(drawn);
   }
   return trunks;
@@ -456,3 +455,10 @@ void addFollow(CLI::App &app)
   });
 }
 } // namespace bole::apps
+
+extern "C" void boleAddCommands(CLI::App &app) { bole::apps::addFollow(app); }
+
+extern "C" vpDisplay *boleMakeWindow(vpImage<vpRGBa> &picture, const std::string &title)
+{
+  return new vpDisplayX(picture, 100, 100, title);
+}

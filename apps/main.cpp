@@ -3,9 +3,8 @@
 #include "command_module.h"
 #include "commands.h"
 
-#include "input/secrets.h"
-#include "input/suggestion.h"
-#include "output/versions.h"
+#include "input/user_text.h"
+#include "output/summary_json.h"
 
 #include <algorithm>
 #include <cstdio>

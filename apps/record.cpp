@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole record`: a live flight, as raw bytes and as an ASL folder.
 #include "commands.h"
-#include "interrupt.h"
 
 #include "ardrone/flight_folder.h"
-#include "ardrone/recording.h"
 #include "progress.h"
 #include <bole/ardrone_source.h>
 

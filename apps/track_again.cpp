@@ -2,11 +2,10 @@
 // bole track --again and --resume: a run is repeated or completed from what its folder holds.
 #include "geometry/failure.h"
 #include "track_arguments.h"
+#include "track_output.h"
 
 #include "input/regular_file.h"
-#include "output/run_folder.h"
 #include "output/summary_json.h"
-#include "output/versions.h"
 
 #include <filesystem>
 #include <fmt/format.h>
@@ -141,7 +140,7 @@ void trackAgain(const CLI::App &command, const TrackArguments &given)
     endWith(ExitCode::doubtful);
   }
   if (given.run.empty())
-    removeFiles(repeated.string(), RunFolder::kFiles);
+    removeFiles(repeated.string(), kRunFiles);
 }
 
 void resume(const CLI::App &command, const TrackArguments &given)

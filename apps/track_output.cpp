@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "track_output.h"
-#include "interrupt.h"
 
 #include "geometry/so3.h"
-#include "input/asl_source.h"
 #include "input/atomic_file.h"
+#include "input/recorded_source.h"
+#include "input/trajectory.h"
+#include "output/trunks_csv.h"
 #include <bole/graph.h>
 #include <bole/open_source.h>
 #include <bole/overlay.h>
@@ -20,8 +21,32 @@
 
 namespace bole::apps
 {
+const FileNames kRunFiles = {
+    "summary.json", "trajectory.tum", "trajectory_online.tum", "trunks.csv",  "hypotheses.csv", "bearings.csv",
+    "map.svg",      "timing.csv",     "options.yaml",          "graph.g2o",   "frames.csv",     "views.csv",
+    "evidence.csv", "overlay.mp4",    "saliency.mp4",          "views/*.jpg", "report.html"};
+
 namespace
 {
+/// Trajectories, trunks, hypotheses, map, timing, options and summary. Where no range is known (summary.reference)
+/// trunks.csv has no rows, and bearings.csv holds what the camera saw.
+void writeFiles(const OutputFolder &folder, const MapPicture &picture, const RunSummary &summary)
+{
+  writeTrajectory(folder.file("trajectory.tum"), picture.smoothed);
+  writeTrajectory(folder.file("trajectory_online.tum"), picture.online);
+  const bool has_ranges = summary.reference.has_ranges;
+  writeTrunks(folder.file("trunks.csv"), has_ranges ? summary.trunks : std::vector<TrunkRecord>());
+  writeHypotheses(folder.file("hypotheses.csv"), has_ranges ? summary.trunks : std::vector<TrunkRecord>());
+  if (has_ranges)
+    removeFiles(folder.path(), {"bearings.csv"});
+  else
+    writeBearings(folder.file("bearings.csv"), summary.trunks, picture.camera);
+  writeMap(folder.file("map.svg"), picture);
+  writeTiming(folder.file("timing.csv"), summary.timing);
+  writeAtomically(folder.file("options.yaml"), summary.options);
+  writeSummary(folder.file("summary.json"), summary);
+}
+
 vpImage<float> foregroundOf(const SaliencyField &saliency)
 {
   vpImage<float> foreground(saliency.p_background.getHeight(), saliency.p_background.getWidth());
@@ -64,7 +89,7 @@ std::size_t confirmedIn(const FrameReport &report)
 
 TrackOutput::TrackOutput(const std::string &run, RunSummary made, const FrameSource &source, bool has_video,
                          bool has_pictures, bool is_shown_again)
-    : m_folder(run),
+    : m_folder(run, kRunFiles),
       m_summary(std::move(made)),
       m_bMc(source.bMc()),
       m_has_pictures(has_pictures),
@@ -202,11 +227,9 @@ vpImage<vpRGBa> TrackOutput::draw(const Frame &frame, const FrameReport &report)
 {
   Overlay overlay;
   std::size_t candidates = 0;
-  for (const TrunkInView &trunk : report.trunks) {
-    overlay.trunks.push_back(
-        {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
+  overlay.trunks = report.trunks;
+  for (const TrunkInView &trunk : report.trunks)
     candidates += trunk.is_tracked && trunk.status == TrunkStatus::candidate ? 1 : 0;
-  }
   overlay.is_warning = report.frame_status != FrameStatus::ok;
   overlay.text = fmt::format("{:.1f} s  {} trunk{}, {} candidate{}  {}", 1e-9 * static_cast<double>(frame.stamp_ns),
                              m_in_view, m_in_view == 1 ? "" : "s", candidates, candidates == 1 ? "" : "s",
@@ -286,9 +309,8 @@ void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
   measureMotion(m_picture.smoothed, m_summary);
   if (!m_picture.smoothed.empty()) {
     m_summary.first_place = m_picture.smoothed.front().wMb.t.head<2>();
-    m_camera_place = (m_picture.smoothed.front().wMb * m_bMc).t.head<2>();
+    m_picture.camera = (m_picture.smoothed.front().wMb * m_bMc).t.head<2>();
   }
-  m_picture.camera = m_camera_place;
 }
 
 void TrackOutput::waitForKeeping()
@@ -328,12 +350,12 @@ void TrackOutput::keep(const Pipeline &pipeline)
   take(pipeline, false);
   m_summary.has_ended = false;
   m_keeping = std::async(std::launch::async,
-                         [this, picture = m_picture, summary = m_summary, camera = m_camera_place,
-                          trace = confirmedTrace(), graph = pipeline.graph()]() -> std::string {
+                         [this, picture = m_picture, summary = m_summary, trace = confirmedTrace(),
+                          graph = pipeline.graph()]() -> std::string {
                            try {
                              writeTrace(m_folder.path(), trace);
                              writeG2o(m_folder.file("graph.g2o"), graph);
-                             m_folder.write(picture, summary, camera);
+                             writeFiles(m_folder, picture, summary);
                            }
                            catch (const std::exception &error) {
                              return error.what();
@@ -352,11 +374,11 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
   take(pipeline, is_complete);
   m_summary.has_ended = true;
   try {
-    m_folder.write(m_picture, m_summary, m_camera_place);
+    writeFiles(m_folder, m_picture, m_summary);
   }
   catch (const vpException &error) {
     loseVideos(error.what());
-    m_folder.write(m_picture, m_summary, m_camera_place);
+    writeFiles(m_folder, m_picture, m_summary);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
   keepViewsOfTrunks();

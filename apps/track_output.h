@@ -3,14 +3,15 @@
 /// \file
 /// What `bole track` gathers while it runs and writes into the folder of the run.
 
-#include "ardrone/drone_link.h"
 #include "output/best_view.h"
 #include "output/flight_trace.h"
-#include "output/run_folder.h"
-#include "output/verdict.h"
+#include "output/map_svg.h"
+#include "output/summary_json.h"
 #include "output/video_writer.h"
 #include "worker.h"
+#include <bole/output_folder.h>
 #include <bole/pipeline.h>
+#include <bole/vpArDroneGrabber.h>
 
 #include <atomic>
 #include <future>
@@ -20,6 +21,9 @@
 
 namespace bole::apps
 {
+/// What `bole track` writes, summary.json first.
+extern const FileNames kRunFiles;
+
 class TrackOutput
 {
 public:
@@ -66,15 +70,14 @@ private:
   void waitForFilm();
   void waitForKeeping();
 
-  RunFolder m_folder;
+  OutputFolder m_folder;
   std::size_t m_frames_before = 0; ///< of the run that was in the folder
   RunSummary m_summary;
   std::vector<SensorVerdict> m_sensors_before; ///< that were left out from the start
   MapPicture m_picture;
   FlightTrace m_trace; ///< of all hypotheses until the end
   BestViews m_best_views;
-  std::set<int> m_given_up;                                 ///< whose part of m_trace is still to go
-  Eigen::Vector2d m_camera_place = Eigen::Vector2d::Zero(); ///< of the first frame [m]
+  std::set<int> m_given_up; ///< whose part of m_trace is still to go
   Pose m_bMc;
   bool m_has_pictures, m_is_overlay_due; ///< the overlay is drawn by the map at hand
   std::unique_ptr<VideoWriter> m_overlay, m_saliency;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole compare: our tracker against ViSP's edge trackers on the same frames, model and first pose.
-#include "interrupt.h"
 #include "lab_commands.h"
 #include "support/text.h"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole emulate`: a sequence or video served as an AR.Drone serves its flight.
-#include "interrupt.h"
 #include "lab_commands.h"
 
 #include "emulator/emulator.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // bole servo: flying by trunks, closed over rendered images and the tracker.
 #include "data_files.h"
-#include "interrupt.h"
 #include "lab_commands.h"
 #include "overlay_window.h"
 #include "support/text.h"
@@ -71,9 +70,7 @@ struct SeenFrame
 vpImage<vpRGBa> pictureOf(const SeenFrame &frame, const LoopSample &sample, const PinholeCamera &camera)
 {
   Overlay overlay;
-  for (const TrunkInView &trunk : frame.trunks)
-    overlay.trunks.push_back(
-        {trunk.id, trunk.relative, trunk.distance, trunk.tan_low, trunk.tan_high, trunk.status, trunk.is_tracked});
+  overlay.trunks = frame.trunks;
   overlay.is_warning = sample.is_lost;
   overlay.text = fmt::format("{:.1f} s  {}", sample.time_s, sample.reason);
   for (const auto &[name, value] : sample.real)

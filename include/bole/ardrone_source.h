@@ -59,8 +59,8 @@ public:
   std::string name() const override;
   /// An AR.Drone tells its motion in its navdata.
   bool hasOdometry() const override { return true; }
-  /// Whether the navdata hold a gyro (AR.Drone 2).
-  bool hasGyro() const override;
+  /// The navdata hold a gyro.
+  bool hasGyro() const override { return true; }
   bool isCompressed() const override { return true; }
 
   /// Ends a wait for the next frame, from any thread.

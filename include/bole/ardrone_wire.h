@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What an AR.Drone 1 or 2 says and is told on the wire, as plain data: for programs that stand in for a drone, or read
-/// what one has sent.
+/// What an AR.Drone 1 or 2 says on the wire, as plain data: for programs that stand in for a drone, or read what one
+/// has sent.
 
 #include <bole/vpArDroneGrabber.h>
 
-#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace bole
@@ -60,24 +58,8 @@ struct Navdata
   std::uint32_t flightPhase() const { return demo ? demo->control_state >> 16 : 0; }
 };
 
-/// The datagram of \p navdata: its typed options 0, 1 and 3 where they are set (with zeros for what the struct leaves
-/// out), the others as bytes, and the checksum.
-std::vector<std::uint8_t> encodeNavdata(const Navdata &navdata);
-
-/// Navdata::time of \p microseconds since any start, reduced to the 2048 s that the word holds.
-std::uint32_t navdataTimeWord(std::int64_t microseconds);
 constexpr std::int64_t kNavdataTimePeriod_us = 2048LL * 1'000'000; ///< after which Navdata::time wraps
 constexpr std::int64_t kPaveTimePeriod_ms = std::int64_t{1} << 32; ///< after which PaveHeader::timestamp_ms wraps
-
-/// A command: `AT*NAME=sequence,arguments\r`.
-struct AtCommand
-{
-  std::string name;                   ///< "REF", "PCMD", "CONFIG", "COMWDG", ...
-  std::int64_t sequence = 0;          ///< rising
-  std::vector<std::string> arguments; ///< without quotes
-};
-/// The commands of a datagram; what is not a command is left out.
-std::vector<AtCommand> parseAtCommands(const std::string &datagram);
 
 /// Kinds of video frames of the AR.Drone 2.
 enum class PaveFrameType : std::uint8_t
@@ -113,36 +95,4 @@ struct PaveHeader
   /// True when the fields are such as a drone can send: the signature alone appears in payloads by chance.
   bool isPlausible() const;
 };
-/// The bytes of \p header, header_size long.
-std::vector<std::uint8_t> encodePaveHeader(const PaveHeader &header);
-
-/// One received piece.
-struct RecordedPiece
-{
-  LinkChannel channel = LinkChannel::video; ///< that it came by
-  std::int64_t arrival_ns = 0;              ///< host's steady clock
-  std::vector<std::uint8_t> bytes;          ///< as received
-};
-
-/// Reads raw.bin, which `bole record` writes. A damaged or cut piece is skipped, and the next whole one searched for,
-/// until four times the file was summed in vain: a file made so that each of its bytes could be the beginning of a long
-/// piece. Law (a test): of a file cut at any byte, every piece that ends before the cut is read.
-class RecordingReader
-{
-public:
-  /// Throws vpException when there is no recording in \p folder (or \p folder is no raw.bin).
-  explicit RecordingReader(const std::string &folder);
-  /// From memory.
-  explicit RecordingReader(std::vector<std::uint8_t> bytes);
-  /// The next piece; false at the end.
-  bool next(RecordedPiece &piece);
-  std::size_t skippedBytes() const { return m_skipped; } ///< of damaged pieces
-
-private:
-  std::vector<std::uint8_t> m_bytes;
-  std::size_t m_at = 0, m_skipped = 0, m_in_vain = 0;
-};
-
-/// Generation of the drone that made the recording: what its video looks like.
-int recordedGeneration(const std::string &folder);
 } // namespace bole

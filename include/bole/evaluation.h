@@ -136,13 +136,6 @@ struct TrunkMetrics
   std::vector<Unmatched> misses;          ///< expected ones of the truth without partner
 };
 
-/// How a run is compared.
-struct EvaluationOptions
-{
-  /// For live flights, whose stamps are the drone's: shifts the run's stamps so that its motion is that of the truth.
-  bool align_time = false;
-};
-
 /// A run against the truth of its sequence, or against another run.
 struct Evaluation
 {
@@ -169,8 +162,10 @@ void writeRun(const std::string &run, const std::vector<TrunkRecord> &map, const
 /// its smoothed trajectory and its trunks stand for the truth, all of them expected, and what is measured is how alike
 /// two runs are. Where the summary of the run says that its scale is not odometry's, trunks are matched after alignment
 /// in scale too; where its world stands at the height of the first camera, the mean height is aligned.
+/// \p align_time: for live flights, whose stamps are the drone's: shifts the run's stamps so that its motion is that of
+/// the truth.
 /// \throw vpException naming the file that is missing or faulty, or that has no common stamps with the truth.
-Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options = {});
+Evaluation evaluate(const std::string &run, const std::string &sequence, bool align_time = false);
 
 /// The table for a terminal. \p verbose lists every trunk of the truth that counts with its match or its nearest
 /// neighbour, and every false positive and duplicate.

@@ -71,9 +71,6 @@ struct SourceOptions
   std::string odometry_path; ///< trajectory file (readTrajectory()); empty: the one of the folder, or none
   /// [s], added to the stamps of odometry_path so that they count as the video's do. Default 0.
   double odometry_offset_s = 0;
-  /// [s], > 0: between odometry samples further apart than this nothing is interpolated. Default 1:
-  /// a body in flight is not where a straight line says after longer.
-  double max_odometry_gap_s = 1;
   /// [Hz], > 0, 1e-3 to 1e4: rate of numbered images, which have no stamps of their own.
   /// Default: `rate_hz` of the camera file, else 25.
   std::optional<double> frame_rate_hz;
@@ -100,8 +97,13 @@ struct SourceOptions
 /// \endcode
 std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOptions &options = {});
 
-/// Gives frames that were filled by hand the status that those of openSource() have: one that was `ok` becomes `stale`,
-/// `resized` or `doubtful` with a message, by its image, gyro and odometry against those of the frames before.
+/// The one judge of frames: gives each its status and the reason, as those of openSource() have them, with the gyro and
+/// the odometry that came with it. One that was `ok` becomes `stale`, `resized` or `doubtful` with a message, by its
+/// image, gyro and odometry against those of the frames before; others stay as they are. Images may be raw or
+/// rectified, but always the same.
+///
+/// A frame that comes far later than usual after the one before tells so (Frame::gap_s) and is used. Usual is the
+/// median of the last intervals, so that a camera whose rate changes is one that changes its rate.
 class FrameJudge
 {
 public:
@@ -109,10 +111,12 @@ public:
   /// \param bMc the camera in the body, to which gyro and odometry belong
   FrameJudge(const PinholeCamera &camera, const Pose &bMc);
   ~FrameJudge();
-  void judge(Frame &frame); ///< in the order of time
+  FrameJudge(FrameJudge &&) noexcept; ///< Moves what it knows of the frames before.
+  void judge(Frame &frame);           ///< in the order of time
 
 private:
-  std::unique_ptr<class FrameHealth> m_health;
+  struct State;
+  std::unique_ptr<State> m_state;
 };
 
 /// A trunk of the truth. Position and radius are those at breast height, 1.3 m above the ground, where forest

@@ -4,7 +4,6 @@
 /// Pictures of what the pipeline sees: trunks drawn into the image, and the saliency field.
 
 #include <bole/camera.h>
-#include <bole/trunk.h>
 #include <bole/trunk_record.h>
 
 #include <bole/visp.h>
@@ -15,25 +14,13 @@
 
 namespace bole
 {
-/// A trunk as the current camera sees it.
-struct OverlayTrunk
-{
-  int id = 0;                                  ///< in the map
-  RelativeTrunk relative;                      ///< as seen from the camera
-  double distance = 0;                         ///< camera to axis [m]; 0 when not known
-  double tan_low = -0.3;                       ///< part of the borders to draw, tangents of elevation
-  double tan_high = 0.6;                       ///< tangent of the elevation up to which it is drawn
-  TrunkStatus status = TrunkStatus::candidate; ///< decides the colour
-  bool is_observed = true;                     ///< measured in this frame; else drawn dashed, as predicted
-};
-
 /// What goes into one picture.
 struct Overlay
 {
-  std::vector<OverlayTrunk> trunks; ///< what is drawn
-  vpImage<float> foreground;        ///< probability of being near, 0 .. 1, any size, for the inset; may be empty
-  std::string text;                 ///< one line below the image
-  bool is_warning = false;          ///< the line is about a frame that is not ok
+  std::vector<TrunkInView> trunks; ///< what is drawn; dashed where it was not measured in this frame
+  vpImage<float> foreground;       ///< probability of being near, 0 .. 1, any size, for the inset; may be empty
+  std::string text;                ///< one line below the image
+  bool is_warning = false;         ///< the line is about a frame that is not ok
 };
 
 /// Draws \p overlay on \p image, enlarged by a whole number to about 640 columns or more, with a line of text below.

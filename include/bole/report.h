@@ -6,9 +6,7 @@
 /// Frames: w world, b body, c camera. Lengths are in metres as far as the scale is known then.
 
 #include <bole/frame.h>
-#include <bole/trunk.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
 #include <string>
 #include <utility>
@@ -16,19 +14,6 @@
 
 namespace bole
 {
-/// A known trunk that was looked for in the frame.
-struct TrunkInView
-{
-  int id = 0;                                  ///< in the map
-  TrunkStatus status = TrunkStatus::candidate; ///< in the map
-  bool is_tracked = false;                     ///< measured in this frame
-  const char *outcome = "";                    ///< of the search for it: "tracked", "occluded", ...
-  RelativeTrunk relative;                      ///< as measured, else as predicted
-  double tan_low = 0;                          ///< part looked at: tangents of elevation
-  double tan_high = 0;                         ///< part looked at: tangents of elevation
-  double distance = 0;                         ///< from the camera to the axis [m]; 0 where no range is known
-};
-
 /// A trunk of the map, whether it is in view or not.
 struct KnownTrunk
 {

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// One trunk of the map as users get it: position, radius, what is known of their errors, its life.
+/// The map as users get it: its trunks with position, radius, what is known of their errors and their life, those that
+/// a frame sees, and where its scale and the direction of gravity come from.
+
+#include <bole/trunk.h>
 
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace bole
 {
@@ -68,4 +72,52 @@ struct TrunkRecord
   double positionSigma() const { return std::sqrt(std::max(0.0, covarianceXy().trace())); } ///< [m]
   double radiusSigma() const { return std::sqrt(std::max(0.0, covariance(2, 2))); }         ///< [m]
 };
+
+/// A known trunk that was looked for in the frame.
+struct TrunkInView
+{
+  int id = 0;                                  ///< in the map
+  TrunkStatus status = TrunkStatus::candidate; ///< in the map
+  bool is_tracked = false;                     ///< measured in this frame
+  const char *outcome = "";                    ///< of the search for it: "tracked", "occluded", ...
+  RelativeTrunk relative;                      ///< as measured, else as predicted
+  double tan_low = 0;                          ///< part looked at: tangents of elevation
+  double tan_high = 0;                         ///< part looked at: tangents of elevation
+  double distance = 0;                         ///< from the camera to the axis [m]; 0 where no range is known
+};
+
+/// Where the scale of the map comes from.
+enum class ScaleSource
+{
+  odometry, ///< the pose filter
+  height,   ///< a known height over the ground
+  prior     ///< the radius a trunk usually has: distances are right only as far as that is
+};
+/// As summary.json writes it.
+const char *toString(ScaleSource source);
+
+/// Where the direction of gravity comes from.
+enum class GravitySource
+{
+  odometry, ///< the pose filter
+  trunks,   ///< the common vanishing point of the trunks
+  assumed   ///< the first image is taken to be upright
+};
+/// As summary.json writes it.
+const char *toString(GravitySource source);
+
+/// Where the scale and the direction of gravity of a map come from.
+struct WorldReference
+{
+  ScaleSource scale = ScaleSource::odometry; ///< source of the scale
+  double scale_sigma = 0; ///< relative standard deviation of all lengths together, 0 where the source does not say
+  GravitySource gravity = GravitySource::odometry; ///< source of the direction of gravity
+  double gravity_sigma = 0;                        ///< of up [rad], 0 where the source does not say
+  /// False: the camera only turned, so that trunks have a bearing and a width; their ranges are those of the prior on
+  /// the radius.
+  bool has_ranges = true;
+};
+
+/// "scale: prior on the radius (+- 19 %); up: trunks (+- 0.8 degrees)"; for pictures and tables.
+std::string describe(const WorldReference &reference);
 } // namespace bole

@@ -71,18 +71,6 @@ enum class LinkChannel : std::uint8_t
 /// Sees every received byte first; called from the receiving threads, must be quick and
 /// thread-safe.
 using LinkTap = std::function<void(LinkChannel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size)>;
-
-/// How the connection behaves.
-struct LinkOptions
-{
-  bool full_navdata = true; ///< 200 Hz with gyro; else the drone's 15 Hz "demo" packets without a time
-  double silence_s = 0.8;   ///< [s], (0.1, 30): a link this long silent is opened anew
-  double retry_s = 0.1;     ///< [s], (0.01, 5): pause between attempts
-  double frozen_m = 0.1;    ///< [m], (0, 10): a motion that no scene among trees can hide
-  double frozen_rad = 0.02; ///< [rad], (0, 3): 4 px at 320 columns
-  /// \throws vpException where a value is out of range, with what is allowed
-  void validate() const;
-};
 } // namespace bole
 
 /// Grabs the newest image of an AR.Drone's front camera with the navdata of the same instant.
@@ -115,7 +103,6 @@ public:
   {
     double open_timeout_s = 5;    ///< [s], (0.1, 600): a key frame comes every half second
     double frame_timeout_s = 0.4; ///< [s], (0.02, 60): acquire() gives up then, the status is `missing`
-    bole::LinkOptions link;       ///< addresses, ports and times
     /// \throws vpException where a value is out of range, with what is allowed
     void validate() const;
   };

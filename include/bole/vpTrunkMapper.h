@@ -32,7 +32,6 @@
 
 #include <bole/frame.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
 #include <bole/visp.h>
 #include <memory>

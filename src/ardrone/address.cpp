@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/address.h"
 #include "geometry/failure.h"
-#include "input/secrets.h"
+#include "geometry/parse_number.h"
+#include "input/user_text.h"
 
-#include <charconv>
 #include <fmt/format.h>
 
 namespace bole
@@ -14,11 +14,10 @@ const std::string kScheme = "ardrone://";
 
 double readNumber(const std::string &address, const std::string &key, const std::string &value, double low, double high)
 {
-  double number = 0;
-  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-  if (error != std::errc() || end != value.data() + value.size() || !(number >= low && number <= high))
+  const auto number = parseNumber<double>(value);
+  if (!number || !(*number >= low && *number <= high))
     throw badValue("{}: {} = {}, must be a number from {} to {}", address, key, value, low, high);
-  return number;
+  return *number;
 }
 } // namespace
 

@@ -2,11 +2,9 @@
 #include <bole/ardrone_source.h>
 
 #include "ardrone/drone_link.h"
-#include "ardrone/socket.h"
 #include "geometry/failure.h"
-#include "geometry/require_range.h"
-#include "input/frame_health.h"
 #include "input/rectifier.h"
+#include "input/steady_clock.h"
 
 #include <atomic>
 #include <cmath>
@@ -64,7 +62,7 @@ struct ArDroneSource::State
   vpArDroneGrabber grabber;
   MountedCamera mounted;
   std::unique_ptr<Rectifier> rectifier;
-  std::optional<FrameHealth> health;
+  std::optional<FrameJudge> judge;
   std::atomic<bool> running{true};
   bool first_is_waiting = false; // the frame that the constructor waited for
   std::size_t index = 0;
@@ -82,7 +80,7 @@ struct ArDroneSource::State
       mounted.model = fitted(mounted.model, width, height, address.camera_path);
     }
     rectifier = std::make_unique<Rectifier>(mounted.model, options.max_width_px);
-    health.emplace(mounted.model.pinhole, mounted.bMc);
+    judge.emplace(mounted.model.pinhole, mounted.bMc);
   }
 
   /// The first frames have no odometry worth the name: the delays of the link are not known yet.
@@ -120,7 +118,7 @@ struct ArDroneSource::State
       frame.wMb_odometry = live.body->wMb;
     if (live.status == FrameStatus::ok || live.status == FrameStatus::stale)
       frame.image = image;
-    health->judge(frame);
+    judge->judge(frame);
     if (frame.image.getSize() > 0 && frame.status != FrameStatus::resized)
       rectifier->apply(frame.image);
   }
@@ -179,7 +177,6 @@ bool ArDroneSource::next(Frame &frame)
 PinholeCamera ArDroneSource::camera() const { return m_state->rectifier->camera(); }
 Pose ArDroneSource::bMc() const { return m_state->mounted.bMc; }
 std::string ArDroneSource::name() const { return m_state->address.toString(); }
-bool ArDroneSource::hasGyro() const { return m_state->options.grabber.link.full_navdata; }
 void ArDroneSource::stop() noexcept { m_state->running = false; }
 LinkCounters ArDroneSource::counters() const
 {

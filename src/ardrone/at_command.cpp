@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/at_command.h"
 
-#include <charconv>
 #include <cstring>
 #include <fmt/format.h>
 
@@ -11,66 +10,13 @@ namespace
 {
 // Bits 18, 20, 22, 24 and 28 are always set in AT*REF.
 constexpr std::uint32_t kReferenceBase = 0x11540000, kTakeOff = 1u << 9, kEmergency = 1u << 8;
-
-bool parseInteger(const std::string &text, std::int64_t &value)
-{
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-/// Cuts at commas outside quotes and drops the quotes.
-std::vector<std::string> splitArguments(const std::string &text)
-{
-  std::vector<std::string> out(1);
-  bool quoted = false;
-  for (const char c : text)
-    if (c == '"')
-      quoted = !quoted;
-    else if (c == ',' && !quoted)
-      out.emplace_back();
-    else
-      out.back() += c;
-  return out;
-}
 } // namespace
-
-std::vector<AtCommand> parseAtCommands(const std::string &datagram)
-{
-  std::vector<AtCommand> commands;
-  for (std::size_t at = 0; (at = datagram.find("AT*", at)) != std::string::npos;) {
-    at += 3;
-    const std::size_t end = datagram.find_first_of("\r\n", at);
-    const std::string line = datagram.substr(at, end == std::string::npos ? end : end - at);
-    const std::size_t equals = line.find('=');
-    if (equals == std::string::npos)
-      continue;
-    AtCommand command;
-    command.name = line.substr(0, equals);
-    command.arguments = splitArguments(line.substr(equals + 1));
-    if (!parseInteger(command.arguments.front(), command.sequence))
-      continue;
-    command.arguments.erase(command.arguments.begin());
-    commands.push_back(std::move(command));
-  }
-  return commands;
-}
 
 std::string atFloat(float value)
 {
   std::int32_t bits = 0;
   std::memcpy(&bits, &value, 4);
   return std::to_string(bits);
-}
-
-float atFloatValue(const std::string &text)
-{
-  std::int64_t number = 0;
-  if (!parseInteger(text, number))
-    return 0;
-  const auto bits = static_cast<std::int32_t>(number);
-  float value = 0;
-  std::memcpy(&value, &bits, 4);
-  return value;
 }
 
 AtChannel::AtChannel(const std::string &host, std::uint16_t port) : m_socket(Socket::connectUdp(host, port)) {}

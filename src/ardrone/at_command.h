@@ -4,7 +4,6 @@
 /// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
 
 #include "ardrone/socket.h"
-#include <bole/ardrone_wire.h>
 
 #include <mutex>
 
@@ -12,8 +11,6 @@ namespace bole
 {
 /// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
 std::string atFloat(float value);
-/// The inverse of atFloat().
-float atFloatValue(const std::string &text);
 
 /// Sends commands with rising sequence numbers. Thread-safe: the drone refuses numbers that go
 /// back, so a program must have one channel to a drone.

@@ -33,30 +33,19 @@ std::int64_t navdataTimeMicroseconds(std::uint32_t time);
 ///
 /// Idea: arrival minus stamp is the offset plus a delay that is never negative, so its running minimum is the offset
 /// plus the shortest delay. The minimum is let rise by the largest drift between two quartz clocks, so that it follows
-/// one that falls behind. A jump beyond \p jump_s is a reboot: it starts anew.
+/// one that falls behind. A jump beyond what any link delays is a reboot: it starts anew.
 class ClockFit
 {
 public:
-  struct Options
-  {
-    double drift = 200e-6; ///< [s/s] largest drift of two cheap quartz clocks, (1e-6, 1e-2)
-    double jump_s = 5;     ///< [s] beyond any delay of a link that still works, (0.1, 100)
-    double settle_s = 0.3; ///< [s], [0, 60]: until some packet will have come without delay
-    void validate() const;
-  };
-  ClockFit();
-  explicit ClockFit(const Options &options);
-
   /// \return false when the drone's clock jumped and the fit began anew.
   bool add(std::int64_t drone_ns, std::int64_t host_ns);
-  /// Whether it has seen settle_s of packets: before, the offset may hold the delay of the first.
+  /// Whether it has seen enough packets: before, the offset may hold the delay of the first.
   bool isReady() const;
   std::int64_t toHost(std::int64_t drone_ns) const { return drone_ns + m_offset_ns.value_or(0); }
   std::int64_t toDrone(std::int64_t host_ns) const { return host_ns - m_offset_ns.value_or(0); }
   void reset() { m_offset_ns.reset(); }
 
 private:
-  Options m_options;
   std::optional<std::int64_t> m_offset_ns;
   std::int64_t m_first_host_ns = 0, m_last_host_ns = 0;
 };
@@ -75,5 +64,36 @@ private:
     std::int64_t drone_ns, host_ns;
   };
   std::deque<Instant> m_instants; ///< at most one every 50 ms
+};
+
+/// Stamps frames by the drone's video clock; wraps and reboots do not stop it.
+///
+/// A clock that jumps by more than any link delays a packet is believed when two frames agree on
+/// it: one alone may have a damaged stamp. Not thread-safe.
+class VideoStamps
+{
+public:
+  struct Stamp
+  {
+    std::int64_t ns = 0;
+    bool is_measured = false; ///< by the drone; else a guess that rises
+  };
+  /// \param timestamp_ms nothing for an AR.Drone 1, which says nothing about time: then the arrival.
+  Stamp next(const std::optional<std::uint32_t> &timestamp_ms, std::int64_t arrival_ns);
+  /// Jumps so far: reboots.
+  std::size_t jumps() const { return m_jumps; }
+
+private:
+  Stamp onDroneClock(std::int64_t raw_ns, std::int64_t arrival_ns);
+
+  struct Jump
+  {
+    std::int64_t raw_ns, arrival_ns;
+  };
+  ClockUnwrapper m_unwrapper{kPaveTimePeriod_ms};
+  std::int64_t m_shift_ns = 0, m_last_ns = 0, m_last_arrival_ns = 0;
+  bool m_has_last = false;
+  std::optional<Jump> m_jumped;
+  std::size_t m_jumps = 0;
 };
 } // namespace bole

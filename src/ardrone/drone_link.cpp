@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_link.h"
-#include "geometry/require_range.h"
 
+#include "ardrone/drone_clock.h"
 #include "ardrone/receivers.h"
-#include "ardrone/video_stamps.h"
+#include "input/steady_clock.h"
 
 #include <condition_variable>
 #include <fmt/format.h>
@@ -14,15 +14,16 @@ namespace bole
 namespace
 {
 constexpr std::int64_t kSilence_ns = 1'000'000'000;
+constexpr double kFrozen_m = 0.1;    // a motion that no scene among trees can hide
+constexpr double kFrozen_rad = 0.02; // 4 px at 320 columns
 } // namespace
 
 /// What the two receiving threads bring together for the consumer.
 struct DroneLink::State
 {
-  State(const ArDroneAddress &a, const Options &o) : address(a), options(o), commands(a.host, a.at_port) {}
+  explicit State(const ArDroneAddress &a) : address(a), commands(a.host, a.at_port) {}
 
   const ArDroneAddress address;
-  const Options options;
   AtChannel commands;
 
   mutable std::mutex mutex; // guards all below but the receivers
@@ -60,9 +61,8 @@ struct DroneLink::State
     of_navdata.packet = [this](const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns) {
       return takeNavdata(data, size, arrival_ns);
     };
-    video_receiver = std::make_unique<VideoReceiver>(address, options, std::move(of_video));
-    navdata_receiver =
-        std::make_unique<NavdataReceiver>(address, options.full_navdata, commands, std::move(of_navdata));
+    video_receiver = std::make_unique<VideoReceiver>(address, std::move(of_video));
+    navdata_receiver = std::make_unique<NavdataReceiver>(address, commands, std::move(of_navdata));
   }
 
   void publish(DecodedFrame &&decoded, std::int64_t arrival_ns)
@@ -113,9 +113,9 @@ struct DroneLink::State
   std::optional<std::uint32_t> takeNavdata(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)
   {
     Navdata packet;
-    const NavdataError error = parseNavdata(data, size, packet);
+    const bool is_good = parseNavdata(data, size, packet);
     const std::lock_guard<std::mutex> lock(mutex);
-    if (error != NavdataError::none) {
+    if (!is_good) {
       ++counters.navdata_refused;
       return std::nullopt;
     }
@@ -164,7 +164,7 @@ struct DroneLink::State
       return;
     }
     const Vector6d moved = frame.body->wMb.minus(then->wMb);
-    if (moved.head<3>().norm() > options.frozen_m || moved.tail<3>().norm() > options.frozen_rad) {
+    if (moved.head<3>().norm() > kFrozen_m || moved.tail<3>().norm() > kFrozen_rad) {
       frame.status = FrameStatus::stale;
       frame.message = "the picture stays though the body moves";
     }
@@ -188,20 +188,8 @@ struct DroneLink::State
   }
 };
 
-void LinkOptions::validate() const
+DroneLink::DroneLink(const ArDroneAddress &address, const LinkTap &tap) : m_state(std::make_unique<State>(address))
 {
-  requireRange("silence_s", silence_s, 0.1, 30);
-  requireRange("retry_s", retry_s, 0.01, 5);
-  requireRange("frozen_m", frozen_m, 1e-9, 10);
-  requireRange("frozen_rad", frozen_rad, 1e-9, 3);
-}
-
-DroneLink::DroneLink(const ArDroneAddress &address) : DroneLink(address, Options{}) {}
-
-DroneLink::DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap)
-{
-  options.validate();
-  m_state = std::make_unique<State>(address, options);
   m_state->start(tap);
 }
 
@@ -246,5 +234,4 @@ LinkCounters DroneLink::counters() const
   return m_state->counters;
 }
 AtChannel &DroneLink::commands() { return m_state->commands; }
-const ArDroneAddress &DroneLink::address() const { return m_state->address; }
 } // namespace bole

@@ -35,17 +35,14 @@ struct LiveFrame
 /// keeps only the newest frame for the consumer: a slow consumer gets fewer frames, never old ones. A second thread
 /// integrates navdata. The two streams have clocks of their own; each is fitted to the host's (ClockFit), and a frame
 /// exposed video_delay_s before its fastest arrival finds its navdata that way. A picture that hardly differs from an
-/// earlier one although the navdata say that the body moved on by more than frozen_m or frozen_rad is `stale`: the
-/// camera is frozen. A link silent for silence_s is opened anew, every retry_s.
+/// earlier one although the navdata say that the body moved on by more than 0.1 m or 0.02 rad is `stale`: the
+/// camera is frozen. A link silent for 0.8 s is opened anew, every 0.1 s.
 ///
 /// Thread-safe. Cost: H.264 640x360 about 2 ms a frame on its own thread.
 class DroneLink
 {
 public:
-  using Options = LinkOptions;
-
-  explicit DroneLink(const ArDroneAddress &address);
-  DroneLink(const ArDroneAddress &address, const Options &options, LinkTap tap = {});
+  explicit DroneLink(const ArDroneAddress &address, const LinkTap &tap = {});
   ~DroneLink();
   DroneLink(const DroneLink &) = delete;
   DroneLink &operator=(const DroneLink &) = delete;
@@ -62,7 +59,6 @@ public:
   LinkCounters counters() const;
   /// The drone's command port. Flight commands are for vpRobotArDrone.
   AtChannel &commands();
-  const ArDroneAddress &address() const;
 
 private:
   struct State;

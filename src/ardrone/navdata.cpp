@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/navdata.h"
-#include <cmath>
+#include "ardrone/navdata_odometry.h"
 
 #include "ardrone/bytes.h"
-#include "geometry/names.h"
 
 #include <cmath>
 #include <numeric>
@@ -15,12 +13,7 @@ namespace
 constexpr std::uint32_t kHeader = 0x55667788, kHeaderAlso = 0x55667789;
 constexpr std::size_t kHeaderSize = 16, kOptionHead = 4;
 constexpr std::uint16_t kDemo = 0, kTime = 1, kPhysical = 3, kChecksum = 0xFFFF;
-constexpr std::size_t kDemoSize = 144, kDemoUsed = 40, kPhysicalSize = 42, kPhysicalUsed = 30;
-
-std::uint32_t checksum(const std::uint8_t *data, std::size_t size)
-{
-  return std::accumulate(data, data + size, std::uint32_t{0});
-}
+constexpr std::size_t kDemoUsed = 40, kPhysicalUsed = 30;
 
 Eigen::Vector3f readVector(const std::uint8_t *p)
 {
@@ -63,51 +56,16 @@ void readTypedOptions(Navdata &navdata)
       navdata.physical = physical;
   }
 }
-
-void appendVector(std::vector<std::uint8_t> &out, const Eigen::Vector3f &v)
-{
-  for (int i = 0; i < 3; ++i)
-    appendLittleEndian(out, v[i]);
-}
-
-std::vector<std::uint8_t> encodeDemo(const Navdata::Demo &demo)
-{
-  std::vector<std::uint8_t> out;
-  appendLittleEndian(out, demo.control_state);
-  appendLittleEndian(out, demo.battery_percent);
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.y());
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.x());
-  appendLittleEndian(out, demo.phi_theta_psi_mdeg.z());
-  appendLittleEndian(out, demo.altitude_mm);
-  appendVector(out, demo.velocity_mm_s);
-  out.resize(kDemoSize, 0);
-  return out;
-}
-
-std::vector<std::uint8_t> encodePhysical(const Navdata::Physical &physical)
-{
-  std::vector<std::uint8_t> out(6, 0); // temperatures
-  appendVector(out, physical.acceleration_mg);
-  appendVector(out, physical.rate_deg_s);
-  out.resize(kPhysicalSize, 0);
-  return out;
-}
 } // namespace
 
-const char *toString(NavdataError error)
-{
-  return nameOf(error, {"none", "too short", "not a navdata header", "an option runs past the end", "no checksum",
-                        "wrong checksum"});
-}
-
-NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata)
+bool parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata)
 {
   navdata = {};
   if (size < kHeaderSize)
-    return NavdataError::too_short;
+    return false;
   const auto header = readLittleEndian<std::uint32_t>(data);
   if (header != kHeader && header != kHeaderAlso)
-    return NavdataError::header;
+    return false;
   navdata.state = readLittleEndian<std::uint32_t>(data + 4);
   navdata.sequence = readLittleEndian<std::uint32_t>(data + 8);
   navdata.vision_defined = readLittleEndian<std::uint32_t>(data + 12) != 0;
@@ -116,46 +74,19 @@ NavdataError parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &n
     const auto id = readLittleEndian<std::uint16_t>(data + at);
     const auto length = readLittleEndian<std::uint16_t>(data + at + 2);
     if (length < kOptionHead || at + length > size)
-      return NavdataError::option_size;
+      return false;
     if (id == kChecksum) {
       if (length != kOptionHead + 4 || at + length != size)
-        return NavdataError::option_size;
-      if (readLittleEndian<std::uint32_t>(data + at + kOptionHead) != checksum(data, at))
-        return NavdataError::checksum;
+        return false;
+      if (readLittleEndian<std::uint32_t>(data + at + kOptionHead) !=
+          std::accumulate(data, data + at, std::uint32_t{0}))
+        return false;
       readTypedOptions(navdata);
-      return NavdataError::none;
+      return true;
     }
     navdata.options[id].assign(data + at + kOptionHead, data + at + length); // at most a datagram
     at += length;
   }
-  return NavdataError::no_checksum;
-}
-
-std::vector<std::uint8_t> encodeNavdata(const Navdata &navdata)
-{
-  std::vector<std::uint8_t> out;
-  appendLittleEndian(out, kHeader);
-  appendLittleEndian(out, navdata.state);
-  appendLittleEndian(out, navdata.sequence);
-  appendLittleEndian(out, std::uint32_t{navdata.vision_defined});
-  auto options = navdata.options;
-  if (navdata.demo)
-    options[kDemo] = encodeDemo(*navdata.demo);
-  if (navdata.time) {
-    options[kTime].clear();
-    appendLittleEndian(options[kTime], *navdata.time);
-  }
-  if (navdata.physical)
-    options[kPhysical] = encodePhysical(*navdata.physical);
-  for (const auto &[id, bytes] : options) {
-    appendLittleEndian(out, id);
-    appendLittleEndian(out, static_cast<std::uint16_t>(bytes.size() + kOptionHead));
-    out.insert(out.end(), bytes.begin(), bytes.end());
-  }
-  const std::uint32_t sum = checksum(out.data(), out.size());
-  appendLittleEndian(out, kChecksum);
-  appendLittleEndian(out, std::uint16_t{kOptionHead + 4});
-  appendLittleEndian(out, sum);
-  return out;
+  return false;
 }
 } // namespace bole

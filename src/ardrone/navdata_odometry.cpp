@@ -2,7 +2,6 @@
 #include "ardrone/navdata_odometry.h"
 #include "geometry/constants.h"
 #include "geometry/so3.h"
-#include "geometry/yaw.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -59,13 +58,6 @@ Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw)
   return (Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
           Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
       .toRotationMatrix();
-}
-
-Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb)
-{
-  const double roll = std::atan2(wRb(2, 1), wRb(2, 2));
-  const double pitch_up = std::asin(std::clamp(wRb(2, 0), -1.0, 1.0));
-  return {roll, pitch_up, -yawOf(wRb)};
 }
 
 void NavdataOdometry::restart()

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Where the drone says it has flown: odometry from navdata.
+/// Navigation data of the AR.Drone 1 and 2: one datagram in, named numbers out, and where the drone says it has flown.
 
-#include "ardrone/navdata.h"
-#include <bole/vpArDroneGrabber.h>
+#include <bole/ardrone_wire.h>
 
 #include <cstdint>
 #include <deque>
@@ -13,14 +12,16 @@
 
 namespace bole
 {
+/// Reads one datagram; false where it is no navdata, or its checksum is wrong.
+/// Laws (each a test): parse(encode(n)) == n; any single changed byte is an error; any input terminates.
+bool parseNavdata(const std::uint8_t *data, std::size_t size, Navdata &navdata);
+
 /// Attitude wRb from the drone's angles roll, pitch, yaw [rad].
 ///
 /// The drone's frames have y to the right and z down, ours y left and z up; half a turn about x, F,
 /// takes one to the other, so wRb = F Rz(yaw) Ry(pitch) Rx(roll) F = Rz(-yaw) Ry(-pitch) Rx(roll).
 /// Law (a test): the drone turned about one of its axes turns the right way about ours, each axis alone.
 Eigen::Matrix3d attitudeFromDrone(double roll, double pitch, double yaw);
-/// Roll, pitch, yaw [rad] as the drone counts them.
-Eigen::Vector3d attitudeToDrone(const Eigen::Matrix3d &wRb);
 /// A vector in the drone's axes (y right, z down) in ours, and back: y and z change their signs.
 inline Eigen::Vector3d flipDroneAxes(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
 

@@ -50,36 +50,6 @@ std::optional<PaveHeader> parsePaveHeader(const std::uint8_t *data, std::size_t 
   return header;
 }
 
-std::vector<std::uint8_t> encodePaveHeader(const PaveHeader &header)
-{
-  std::vector<std::uint8_t> out(kSignature, kSignature + 4);
-  out.push_back(header.version);
-  out.push_back(header.codec);
-  appendLittleEndian(out, header.header_size);
-  appendLittleEndian(out, header.payload_size);
-  appendLittleEndian(out, header.coded_width);
-  appendLittleEndian(out, header.coded_height);
-  appendLittleEndian(out, header.display_width);
-  appendLittleEndian(out, header.display_height);
-  appendLittleEndian(out, header.frame_number);
-  appendLittleEndian(out, header.timestamp_ms);
-  out.push_back(1); // chunks of this frame
-  out.push_back(0); // index of this chunk
-  out.push_back(static_cast<std::uint8_t>(header.frame_type));
-  out.push_back(0); // control
-  appendLittleEndian(out, header.stream_position);
-  appendLittleEndian(out, std::uint32_t{0});
-  appendLittleEndian(out, header.stream_id);
-  out.push_back(1); // slices of this frame
-  out.push_back(0); // index of this slice
-  out.push_back(header.header1_size);
-  out.push_back(header.header2_size);
-  appendLittleEndian(out, std::uint16_t{0});
-  appendLittleEndian(out, header.advertised_size);
-  out.resize(header.header_size, 0);
-  return out;
-}
-
 void PaveParser::push(const std::uint8_t *data, std::size_t size)
 {
   if (m_begin > 0 && m_begin >= m_buffer.size() / 2) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/receivers.h"
 
-#include "input/retry_pause.h"
+#include "input/steady_clock.h"
 
 #include <array>
 
@@ -14,12 +14,22 @@ constexpr std::size_t kLargestRead = 1 << 16;
 constexpr Milliseconds kPoll{50};
 // With the pause and half a second to a key frame: within a second.
 constexpr Milliseconds kConnect{250};
+constexpr double kSilence_s = 0.8;                  // after which the video is opened anew
+constexpr double kRetry_s = 0.1;                    // between two attempts
 constexpr double kLongestPause_s = 1;               // between two connections that the drone closes at once
 constexpr std::int64_t kKeepAlive_ns = 250'000'000; // the drone's watchdog bites after 2 s
 constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
 constexpr int kMostDatagrams = 1000;          // a second: the drone sends 15, an emulator at its fastest 600
 constexpr std::size_t kLargestNavdata = 8192; // bytes
 constexpr std::int64_t kWakeAgain_ns = 500'000'000;
+
+/// Whether the drone, by the \p bits of its state, sends less than all its navdata, which have the gyro and a time.
+bool asksForConfig(std::uint32_t bits)
+{
+  constexpr auto kAsks =
+      static_cast<std::uint32_t>(DroneState::bootstrap) | static_cast<std::uint32_t>(DroneState::demo_mode);
+  return (bits & kAsks) != 0;
+}
 
 /// Whether the drone can have sent so many datagrams: what is more is a flood.
 class DatagramCount
@@ -40,9 +50,8 @@ private:
 };
 } // namespace
 
-VideoReceiver::VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks)
+VideoReceiver::VideoReceiver(const ArDroneAddress &address, Callbacks callbacks)
     : m_address(address),
-      m_options(options),
       m_callbacks(std::move(callbacks)),
       m_generation(address.generation),
       m_thread([this] { run(); })
@@ -58,7 +67,7 @@ VideoReceiver::~VideoReceiver()
 void VideoReceiver::run()
 {
   std::vector<std::uint8_t> buffer(kLargestRead);
-  RetryPause pause(m_options.retry_s, std::max(m_options.retry_s, kLongestPause_s));
+  RetryPause pause(kRetry_s, kLongestPause_s);
   while (m_running) {
     const int wanted = m_generation;
     if (wanted != 1) {
@@ -74,7 +83,7 @@ void VideoReceiver::run()
     }
     if (wanted != 2)
       receiveDatagrams(buffer);
-    wait(std::chrono::duration<double>(m_options.retry_s));
+    wait(std::chrono::duration<double>(kRetry_s));
   }
 }
 
@@ -94,7 +103,7 @@ void VideoReceiver::begin(DroneVideoDecoder &video)
 
 bool VideoReceiver::isSilent(std::int64_t since_ns) const
 {
-  return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > m_options.silence_s;
+  return static_cast<double>(steadyNowNs() - since_ns) * 1e-9 > kSilence_s;
 }
 
 DroneVideoDecoder &VideoReceiver::decoderFor(int generation)
@@ -165,13 +174,8 @@ void VideoReceiver::handle(DroneVideoDecoder &video, const std::uint8_t *data, s
   m_callbacks.counted(video.counters());
 }
 
-NavdataReceiver::NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands,
-                                 Callbacks callbacks)
-    : m_address(address),
-      m_full_navdata(full_navdata),
-      m_commands(commands),
-      m_callbacks(std::move(callbacks)),
-      m_thread([this] { run(); })
+NavdataReceiver::NavdataReceiver(const ArDroneAddress &address, AtChannel &commands, Callbacks callbacks)
+    : m_address(address), m_commands(commands), m_callbacks(std::move(callbacks)), m_thread([this] { run(); })
 {
 }
 
@@ -210,16 +214,10 @@ void NavdataReceiver::run()
       m_callbacks.tap(LinkChannel::navdata, last_data_ns, buffer.data(), size);
     const auto state = m_callbacks.packet(buffer.data(), size, last_data_ns);
     if (state && last_data_ns - last_config_ns > kWakeAgain_ns && asksForConfig(*state)) {
-      m_commands.config("general:navdata_demo", m_full_navdata ? "FALSE" : "TRUE");
+      m_commands.config("general:navdata_demo", "FALSE");
       m_commands.acknowledgeConfig();
       last_config_ns = last_data_ns;
     }
   }
-}
-
-bool NavdataReceiver::asksForConfig(std::uint32_t bits) const
-{
-  const auto has = [bits](DroneState bit) { return (bits & static_cast<std::uint32_t>(bit)) != 0; };
-  return has(DroneState::bootstrap) || has(DroneState::demo_mode) == m_full_navdata;
 }
 } // namespace bole

@@ -25,7 +25,7 @@ public:
     std::function<void(DecodedFrame &&, std::int64_t arrival_ns)> frame;
     std::function<void(const DroneVideoDecoder::Counters &)> counted; ///< after what came, frames or not
   };
-  VideoReceiver(const ArDroneAddress &address, const DroneLink::Options &options, Callbacks callbacks);
+  VideoReceiver(const ArDroneAddress &address, Callbacks callbacks);
   ~VideoReceiver();
   int generation() const { return m_generation; }
 
@@ -40,7 +40,6 @@ private:
   void wait(std::chrono::duration<double> pause) const;
 
   const ArDroneAddress m_address;
-  const DroneLink::Options m_options;
   const Callbacks m_callbacks;
   std::atomic<int> m_generation; ///< 0: not known yet
   std::optional<DroneVideoDecoder> m_decoder;
@@ -60,15 +59,13 @@ public:
     std::function<std::optional<std::uint32_t>(const std::uint8_t *data, std::size_t size, std::int64_t arrival_ns)>
         packet;
   };
-  NavdataReceiver(const ArDroneAddress &address, bool full_navdata, AtChannel &commands, Callbacks callbacks);
+  NavdataReceiver(const ArDroneAddress &address, AtChannel &commands, Callbacks callbacks);
   ~NavdataReceiver();
 
 private:
   void run();
-  bool asksForConfig(std::uint32_t bits) const;
 
   const ArDroneAddress m_address;
-  const bool m_full_navdata;
   AtChannel &m_commands;
   const Callbacks m_callbacks;
   std::atomic<bool> m_running{true};

@@ -12,13 +12,6 @@ namespace bole
 {
 using Milliseconds = std::chrono::milliseconds;
 
-/// [ns] of the steady clock that every arrival is stamped with.
-inline std::int64_t steadyNowNs()
-{
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 class Socket
 {
 public:

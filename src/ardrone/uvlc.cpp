@@ -36,6 +36,8 @@ const std::array<std::array<float, 8>, 8> &dctBasis()
   return basis;
 }
 
+std::uint8_t clampToByte(double value) { return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0)); }
+
 /// Dequantises, transforms and writes one block at \p out.
 void reconstruct(const std::array<int, 64> &levels, bool has_ac, std::uint8_t *out, int stride)
 {
@@ -185,6 +187,26 @@ struct Decoder
   }
 };
 } // namespace
+
+void YuvPicture::toGrey(vpImage<unsigned char> &image) const
+{
+  image.resize(static_cast<unsigned>(height), static_cast<unsigned>(width));
+  std::copy(y.begin(), y.end(), image.bitmap);
+}
+
+void YuvPicture::toColour(vpImage<vpRGBa> &image) const
+{
+  image.resize(static_cast<unsigned>(height), static_cast<unsigned>(width));
+  const int half = (width + 1) / 2;
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u) {
+      const std::size_t at = static_cast<std::size_t>(v) * width + u;
+      const std::size_t colour = static_cast<std::size_t>(v / 2) * half + u / 2;
+      const double luma = y[at], blue = cb[colour] - 128.0, red = cr[colour] - 128.0;
+      image.bitmap[at] = vpRGBa(clampToByte(luma + 1.402 * red), clampToByte(luma - 0.344136 * blue - 0.714136 * red),
+                                clampToByte(luma + 1.772 * blue));
+    }
+}
 
 UvlcBits::UvlcBits(const std::uint8_t *data, std::size_t size) : m_data(data), m_size_bits(size / 4 * 32) {}
 

@@ -28,17 +28,30 @@
 /// Deviation: (a) prints the DC as a signed number; intra pictures only have DC >= 0, and a bright
 /// block (mean above 191) needs all ten bits, so it is read without sign, as (d) does.
 
-#include "ardrone/h264.h"
+#include <bole/visp.h>
 
 #include <array>
-#include <bole/visp.h>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
+#include <visp3/core/vpImage.h>
+#include <visp3/core/vpRGBa.h>
 
 namespace bole
 {
+/// A decoded picture in the planes of YCbCr 4:2:0, colour planes at half the size.
+struct YuvPicture
+{
+  int width = 0, height = 0;           ///< [px]
+  std::vector<std::uint8_t> y, cb, cr; ///< rows without padding; colour rows of (width + 1) / 2
+  std::uint32_t number = 0;            ///< frame number as the drone counts
+
+  bool empty() const { return y.empty(); }
+  void toGrey(vpImage<unsigned char> &image) const;
+  void toColour(vpImage<vpRGBa> &image) const;
+};
+
 /// Reads bits from little-endian 32-bit words, most significant first. Past the end it gives zeros and says so.
 class UvlcBits
 {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/video_decoder.h"
-#include "ardrone/uvlc.h"
 
+#include <algorithm>
+#include <cstdlib>
 #include <fmt/format.h>
 
-#include <cstdlib>
+extern "C" {
+#include <libavutil/frame.h>
+}
 
 namespace bole
 {
@@ -30,6 +33,14 @@ double blockChange(const YuvPicture &a, const YuvPicture &b)
     }
   return blocks > 0 ? total / blocks : 0;
 }
+
+void copyPlane(const std::uint8_t *from, int stride, int width, int height, std::vector<std::uint8_t> &to)
+{
+  to.resize(static_cast<std::size_t>(width) * height);
+  for (int row = 0; row < height; ++row)
+    std::copy_n(from + static_cast<std::ptrdiff_t>(row) * stride, width,
+                to.begin() + static_cast<std::ptrdiff_t>(row) * width);
+}
 } // namespace
 
 DroneVideoDecoder::DroneVideoDecoder(int generation) : m_generation(generation) {}
@@ -40,6 +51,25 @@ void DroneVideoDecoder::restart()
   m_parser.reset();
   m_h264.flush();
   m_needs_key = true;
+}
+
+/// Why there is no whole picture, empty where there is one. Whatever libavcodec says about damage (an error, a missing
+/// reference, concealed blocks) counts: it conceals by copying, which for a tracker is worse than nothing.
+std::string DroneVideoDecoder::decodeH264(const PaveFrame &frame, YuvPicture &picture)
+{
+  if (!m_h264.send(frame.payload.data(), frame.payload.size()))
+    return "the decoder refused the frame";
+  const AVFrame *decoded = m_h264.receive();
+  if (decoded == nullptr)
+    return m_h264.hasFailed() ? "the frame could not be decoded" : "the decoder gave no picture";
+  if (!PictureDecoder::isYuv420(*decoded))
+    return "the frame is not YCbCr 4:2:0";
+  picture.width = std::min<int>(frame.header.display_width, decoded->width);
+  picture.height = std::min<int>(frame.header.display_height, decoded->height);
+  copyPlane(decoded->data[0], decoded->linesize[0], picture.width, picture.height, picture.y);
+  copyPlane(decoded->data[1], decoded->linesize[1], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cb);
+  copyPlane(decoded->data[2], decoded->linesize[2], (picture.width + 1) / 2, (picture.height + 1) / 2, picture.cr);
+  return PictureDecoder::isDamaged(*decoded) ? "parts of the frame were concealed" : "";
 }
 
 DecodedFrame DroneVideoDecoder::decodePave(const PaveFrame &frame)
@@ -54,13 +84,11 @@ DecodedFrame DroneVideoDecoder::decodePave(const PaveFrame &frame)
     out.message = "waits for a key frame";
     return out;
   }
-  const auto result =
-      m_h264.decode(frame.payload, frame.header.display_width, frame.header.display_height, out.picture);
-  if (result != H264Decoder::Result::picture) {
+  out.message = decodeH264(frame, out.picture);
+  if (!out.message.empty()) {
     m_needs_key = true;
     m_h264.flush();
     out.status = FrameStatus::corrupt;
-    out.message = result == H264Decoder::Result::nothing ? "the decoder gave no picture" : m_h264.message();
   }
   out.picture.number = out.number;
   return out;

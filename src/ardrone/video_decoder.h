@@ -3,8 +3,9 @@
 /// \file
 /// The drone's video from bytes to pictures with a status; knows nothing of sockets or clocks.
 
-#include "ardrone/h264.h"
 #include "ardrone/pave.h"
+#include "ardrone/uvlc.h"
+#include "input/codec.h"
 #include <bole/vpArDroneGrabber.h>
 
 #include <cstdint>
@@ -52,12 +53,13 @@ public:
 
 private:
   DecodedFrame decodePave(const PaveFrame &frame);
+  std::string decodeH264(const PaveFrame &frame, YuvPicture &picture);
   void judge(DecodedFrame &frame);
 
   int m_generation;
   std::optional<std::uint32_t> m_last_number; ///< of an AR.Drone 1's pictures
   PaveParser m_parser;
-  H264Decoder m_h264;
+  PictureDecoder m_h264 = PictureDecoder::h264();
   bool m_needs_key = true;
   YuvPicture m_last; ///< the last whole picture
   int m_width = 0, m_height = 0;

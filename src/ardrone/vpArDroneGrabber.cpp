@@ -2,9 +2,8 @@
 #include <bole/vpArDroneGrabber.h>
 
 #include "ardrone/drone_link.h"
-#include "ardrone/socket.h"
 #include "geometry/failure.h"
-#include "geometry/require_range.h"
+#include "input/steady_clock.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -13,7 +12,6 @@ void vpArDroneGrabber::Options::validate() const
 {
   bole::requireRange("open_timeout_s", open_timeout_s, 0.1, 600);
   bole::requireRange("frame_timeout_s", frame_timeout_s, 0.02, 60);
-  link.validate();
 }
 
 struct vpArDroneGrabber::State
@@ -53,7 +51,7 @@ const bole::LiveFrame &vpArDroneGrabber::getFrame() const { return m_state->fram
 void vpArDroneGrabber::connect()
 {
   if (!m_state->link)
-    m_state->link = std::make_unique<bole::DroneLink>(m_state->address, m_state->options.link, m_state->tap);
+    m_state->link = std::make_unique<bole::DroneLink>(m_state->address, m_state->tap);
 }
 
 void vpArDroneGrabber::waitForFirstImage()

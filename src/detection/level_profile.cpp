@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/level_profile.h"
 
-#include "geometry/parabola.h"
+#include "geometry/median.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -2,7 +2,6 @@
 #include "detection/photo_consistency.h"
 
 #include "geometry/median.h"
-#include "geometry/parabola.h"
 
 #include <algorithm>
 #include <cmath>

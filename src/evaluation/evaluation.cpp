@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
-#include "evaluation/visibility.h"
 #include "geometry/failure.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
+#include "input/trajectory.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 #include <bole/open_source.h>
@@ -162,7 +161,7 @@ void writeRun(const std::string &run, const std::vector<TrunkRecord> &map, const
   writeTrunks(run + "/trunks.csv", map);
 }
 
-Evaluation evaluate(const std::string &run, const std::string &sequence, const EvaluationOptions &options)
+Evaluation evaluate(const std::string &run, const std::string &sequence, bool align_time)
 {
   const auto in_run = [&](const char *name) { return (std::filesystem::path(run) / name).string(); };
   if (!std::filesystem::is_directory(run))
@@ -175,7 +174,7 @@ Evaluation evaluate(const std::string &run, const std::string &sequence, const E
   const Reference reference = evaluation.is_against_run ? readRun(sequence) : readSequence(sequence);
   evaluation.frames = reference.frames;
   std::int64_t shift_ns = 0;
-  if (options.align_time) {
+  if (align_time) {
     shift_ns = shiftOf(in_run("trajectory.tum"), reference);
     evaluation.time_shift_s = static_cast<double>(shift_ns) * 1e-9;
   }

@@ -5,7 +5,6 @@
 
 #include "geometry/names.h"
 #include "geometry/so3.h"
-#include "geometry/yaw.h"
 
 #include <Eigen/LU>
 #include <cmath>

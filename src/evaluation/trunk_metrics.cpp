@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "evaluation/trunk_metrics.h"
 
-#include "evaluation/assignment.h"
 #include "geometry/median.h"
+#include "geometry/silhouette.h"
 
 #include <algorithm>
 #include <cmath>
@@ -197,5 +197,173 @@ TrunkMetrics trunkMetrics(const std::vector<TrunkRecord> &map, const std::vector
   metrics.by_range = binned(metrics, {0, 2, 4, 6, 8.001}, "m", &TrunkVisibility::min_range);
   metrics.by_parallax = binned(metrics, {0, 3, 10, 30, 60, 1e9}, "degrees", &TrunkVisibility::bearing_change);
   return metrics;
+}
+
+namespace
+{
+/// A trunk seen from above by one camera.
+struct View
+{
+  double range = 0;
+  double bearing = 0;    ///< in the world [rad]
+  double half_width = 0; ///< asin(r/d) [rad]
+  bool is_in_image = false;
+};
+
+double wrapped(double angle) { return std::remainder(angle, 2 * M_PI); }
+
+View viewOf(const TruthTrunk &trunk, const Pose &wMc, const PinholeCamera &camera)
+{
+  View view;
+  const Eigen::Vector2d to = trunk.xy - wMc.t.head<2>();
+  view.range = to.norm();
+  view.bearing = std::atan2(to.y(), to.x());
+  if (trunk.radius <= 0 || view.range <= trunk.radius)
+    return view;
+  view.half_width = silhouetteHalfWidth(trunk.radius, view.range);
+  view.is_in_image = true;
+  for (const double side : {-1.0, 1.0}) {
+    const double angle = view.bearing + side * view.half_width;
+    const Eigen::Vector3d direction = wMc.R.transpose() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+    view.is_in_image = view.is_in_image && direction.z() > 1e-6 && camera.contains(camera.project(direction));
+  }
+  return view;
+}
+
+/// Share of the width of views[at] that nearer trunks cover.
+double hiddenShare(const std::vector<View> &views, std::size_t at)
+{
+  const View &view = views[at];
+  std::vector<std::pair<double, double>> covers;
+  for (const View &other : views) {
+    if (other.half_width <= 0 || other.range >= view.range)
+      continue;
+    const double middle = wrapped(other.bearing - view.bearing);
+    const double from = std::max(middle - other.half_width, -view.half_width);
+    const double to = std::min(middle + other.half_width, view.half_width);
+    if (to > from)
+      covers.emplace_back(from, to);
+  }
+  std::sort(covers.begin(), covers.end());
+  double covered = 0, reached = -view.half_width;
+  for (const auto &[from, to] : covers) {
+    covered += std::max(0.0, to - std::max(from, reached));
+    reached = std::max(reached, to);
+  }
+  return covered / (2 * view.half_width);
+}
+} // namespace
+
+std::vector<TrunkVisibility> trunkVisibility(const std::vector<TruthTrunk> &trunks, const std::vector<Pose> &wMb,
+                                             const Pose &bMc, const PinholeCamera &camera)
+{
+  constexpr double kMaxRange = 8;         // [m], horizontal, from the camera to the axis
+  constexpr double kMaxHidden = 0.5;      // share of the trunk's width that nearer trunks may hide
+  constexpr std::size_t kMinFrames = 8;   // in which all of this holds
+  constexpr double kMinBearingChange = 3; // over those frames, in the world [degrees]
+  struct Range
+  {
+    double first = 0, least = 0, most = 0;
+  };
+  std::vector<TrunkVisibility> result(trunks.size());
+  std::vector<Range> bearings(trunks.size());
+  std::vector<View> views(trunks.size());
+  for (const Pose &pose : wMb) {
+    const Pose wMc = pose * bMc;
+    std::transform(trunks.begin(), trunks.end(), views.begin(),
+                   [&](const TruthTrunk &trunk) { return viewOf(trunk, wMc, camera); });
+    for (std::size_t i = 0; i < trunks.size(); ++i) {
+      const View &view = views[i];
+      if (!view.is_in_image || view.range > kMaxRange || hiddenShare(views, i) >= kMaxHidden)
+        continue;
+      TrunkVisibility &seen = result[i];
+      Range &range = bearings[i];
+      if (seen.frames++ == 0) {
+        range.first = view.bearing;
+        seen.min_range = view.range;
+      }
+      const double change = wrapped(view.bearing - range.first);
+      range.least = std::min(range.least, change);
+      range.most = std::max(range.most, change);
+      seen.min_range = std::min(seen.min_range, view.range);
+    }
+  }
+  for (std::size_t i = 0; i < trunks.size(); ++i) {
+    result[i].bearing_change = (bearings[i].most - bearings[i].least) * 180 / M_PI;
+    result[i].is_expected = result[i].frames >= kMinFrames && result[i].bearing_change >= kMinBearingChange;
+  }
+  return result;
+}
+
+namespace
+{
+/// Least-cost assignment of every row of \p cost, rows <= columns, by shortest augmenting paths.
+std::vector<int> assignRows(const Eigen::MatrixXd &cost)
+{
+  const Eigen::Index rows = cost.rows(), columns = cost.cols();
+  const Eigen::Index none = columns; // a column that does not exist: where each search starts
+  Eigen::VectorXd row_price = Eigen::VectorXd::Zero(rows), column_price = Eigen::VectorXd::Zero(columns + 1);
+  std::vector<Eigen::Index> row_of(static_cast<std::size_t>(columns) + 1, -1);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    Eigen::VectorXd slack = Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
+    std::vector<Eigen::Index> came_from(static_cast<std::size_t>(columns), none);
+    std::vector<bool> is_done(static_cast<std::size_t>(columns) + 1, false);
+    Eigen::Index at = none;
+    row_of[static_cast<std::size_t>(none)] = row;
+    while (row_of[static_cast<std::size_t>(at)] >= 0) {
+      is_done[static_cast<std::size_t>(at)] = true;
+      const Eigen::Index r = row_of[static_cast<std::size_t>(at)];
+      double least = std::numeric_limits<double>::infinity();
+      Eigen::Index nearest = none;
+      for (Eigen::Index c = 0; c < columns; ++c) {
+        if (is_done[static_cast<std::size_t>(c)])
+          continue;
+        const double reduced = cost(r, c) - row_price[r] - column_price[c];
+        if (reduced < slack[c]) {
+          slack[c] = reduced;
+          came_from[static_cast<std::size_t>(c)] = at;
+        }
+        if (slack[c] < least) {
+          least = slack[c];
+          nearest = c;
+        }
+      }
+      for (Eigen::Index c = 0; c <= columns; ++c)
+        if (is_done[static_cast<std::size_t>(c)]) {
+          row_price[row_of[static_cast<std::size_t>(c)]] += least;
+          column_price[c] -= least;
+        }
+        else if (c < columns)
+          slack[c] -= least;
+      at = nearest;
+    }
+    while (at != none) {
+      const Eigen::Index before = came_from[static_cast<std::size_t>(at)];
+      row_of[static_cast<std::size_t>(at)] = row_of[static_cast<std::size_t>(before)];
+      at = before;
+    }
+  }
+  std::vector<int> column_of(static_cast<std::size_t>(rows), -1);
+  for (Eigen::Index c = 0; c < columns; ++c)
+    if (row_of[static_cast<std::size_t>(c)] >= 0)
+      column_of[static_cast<std::size_t>(row_of[static_cast<std::size_t>(c)])] = static_cast<int>(c);
+  return column_of;
+}
+} // namespace
+
+std::vector<int> assign(const Eigen::MatrixXd &cost, double gate)
+{
+  if (cost.rows() == 0 || cost.cols() == 0)
+    return std::vector<int>(static_cast<std::size_t>(cost.rows()), -1);
+  // A pair beyond the gate costs more than all pairs within it together, so it is never preferred;
+  // spare columns let every row stay alone at that price.
+  const double alone = (gate + 1) * static_cast<double>(cost.rows() + 1);
+  Eigen::MatrixXd padded = Eigen::MatrixXd::Constant(cost.rows(), cost.cols() + cost.rows(), alone);
+  padded.leftCols(cost.cols()) = (cost.array() <= gate).select(cost.array(), 4 * alone).matrix();
+  std::vector<int> column_of = assignRows(padded);
+  for (int &column : column_of)
+    if (column >= cost.cols())
+      column = -1;
+  return column_of;
 }
 } // namespace bole

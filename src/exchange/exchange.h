@@ -3,12 +3,9 @@
 /// \file
 /// Maps and trajectories for other tools, from what the folder of a run holds.
 
-#include "input/trajectory.h"
 #include <bole/camera.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,27 +38,6 @@ struct MapOfRun
 };
 /// \throw vpException naming the file of \p run that is missing or faulty, or when the run knows no ranges.
 MapOfRun readMapOfRun(const std::string &run);
-
-/// The pictures that a run was made of, as they lie on the disk.
-struct PicturesOfRun
-{
-  CameraModel lens;                          ///< that they were taken with
-  std::map<std::int64_t, std::string> names; ///< by their stamps [ns]
-  std::string note;                          ///< what a user has to know of them
-};
-/// Where the input of \p run is not there any more: the rectified camera of \p map, and names made of the stamps.
-PicturesOfRun picturesOf(const std::string &run, const MapOfRun &map);
-
-// The formats as text; each is read back by an independent reader in a test.
-std::string toPly(const MapOfRun &map); ///< ASCII: a mesh of the trunks, the trajectory as points
-/// Points of the trunks with their figures and a line of the trajectory: in degrees where \p origin tells how, else in
-/// metres of the world, which the file says.
-std::string toGeoJson(const MapOfRun &map, const std::optional<GeoOrigin> &origin);
-std::string toDxf(const MapOfRun &map);       ///< release 12: circles and ids of the trunks, the trajectory
-std::string toInventory(const MapOfRun &map); ///< a line a tree: place, diameter at breast height, basal area, lean
-std::string toColmapCamera(const CameraModel &lens);
-std::string toColmapImages(const MapOfRun &map, const PicturesOfRun &pictures);
-std::string toColmapPoints(const MapOfRun &map); ///< on the surfaces of the trunks
 
 /// A format by the name that `bole export` takes.
 struct ExportFormat

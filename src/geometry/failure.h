@@ -27,4 +27,11 @@ inline constexpr Failure<vpException::ioError> ioError;
 inline constexpr Failure<vpException::memoryAllocationError> memoryAllocationError;
 inline constexpr Failure<vpException::notImplementedError> notImplementedError;
 inline constexpr Failure<vpException::notInitialized> notInitialized;
+
+/// One line of an Options::validate(): throws "name = value, must be in [low, high]", also where \p value is NaN.
+inline void requireRange(const char *name, double value, double low, double high)
+{
+  if (!(value >= low && value <= high))
+    throw badValue("{} = {:g}, must be in [{:g}, {:g}]", name, value, low, high);
+}
 } // namespace bole

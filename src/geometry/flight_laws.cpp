@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/flight_laws.h>
 
-#include "geometry/require_range.h"
+#include "geometry/failure.h"
 
 #include <Eigen/Geometry>
 

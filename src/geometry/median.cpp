@@ -33,4 +33,10 @@ double quantileOf(std::vector<double> values, double share)
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
+
+double peakOffset(double before, double middle, double after)
+{
+  const double bend = before - 2 * middle + after;
+  return bend < 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0;
+}
 } // namespace bole

@@ -25,4 +25,14 @@ bool Silhouette::covers(const Eigen::Vector3d &ray) const
   return m.x() > 0 && std::abs(m.y()) < m_tan_half_width * m.x() && m.z() >= m_tan_low * m.x() &&
          m.z() <= m_tan_high * m.x();
 }
+
+HorizontalView horizontalView(const Pose &wMc, const Trunk &trunk)
+{
+  HorizontalView view;
+  view.offset = trunk.axisAt(wMc.t.z()).head<2>() - wMc.t.head<2>();
+  view.bearing = std::atan2(view.offset.y(), view.offset.x());
+  view.range = view.offset.norm();
+  view.half_angle = silhouetteHalfWidth(trunk.radius(), view.range);
+  return view;
+}
 } // namespace bole

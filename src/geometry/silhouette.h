@@ -31,4 +31,16 @@ private:
   Eigen::Matrix3d m_tRc;
   double m_tan_half_width, m_tan_low, m_tan_high;
 };
+
+/// The silhouette of a trunk in the horizontal plane through the camera centre.
+struct HorizontalView
+{
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero(); ///< from the camera to the axis, world axes [m]
+  double bearing = 0;                               ///< of the axis in the world [rad]
+  double range = 0;                                 ///< from the camera to the axis [m]
+  double half_angle = 0;                            ///< of the silhouette [rad]
+};
+
+/// A trunk that leans stands elsewhere at the height of the camera than at z = 0: 3 degrees are 6 cm at eye height.
+HorizontalView horizontalView(const Pose &wMc, const Trunk &trunk);
 } // namespace bole

@@ -2,7 +2,6 @@
 #include "geometry/so3.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
 
 namespace bole
 {
@@ -50,4 +49,10 @@ Matrix3d inverseRightJacobianSo3(const Vector3d &phi)
 }
 
 Matrix3d orthonormalized(const Matrix3d &R) { return Eigen::Quaterniond(R).normalized().toRotationMatrix(); }
+
+bool isRotation(const Matrix3d &R)
+{
+  constexpr double kLoosest = 1e-3;
+  return (R * R.transpose() - Matrix3d::Identity()).norm() < kLoosest && R.determinant() > 0;
+}
 } // namespace bole

@@ -9,7 +9,9 @@
 /// Laws (each a test): Exp(Log(R)) == R; Log(Exp(phi)) == phi for |phi| < pi;
 /// Log(Exp(phi) * Exp(d)) - phi == Jr(phi)^-1 d to first order.
 
-#include <Eigen/Core>
+#include <bole/pose.h>
+
+#include <cmath>
 
 namespace bole
 {
@@ -27,4 +29,12 @@ Eigen::Matrix3d inverseRightJacobianSo3(const Eigen::Vector3d &phi);
 
 /// A rotation beside \p R, at most twice as far as the nearest; removes the drift of long products.
 Eigen::Matrix3d orthonormalized(const Eigen::Matrix3d &R);
+
+/// Whether a matrix that somebody hands over is a rotation, but for the few digits with which matrices are written;
+/// never where a number is not finite.
+bool isRotation(const Eigen::Matrix3d &R);
+
+/// Angle about the vertical from the world's x axis to the x axis of a body with its z axis up [rad], -pi to pi.
+inline double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
+inline double yawOf(const Pose &wMb) { return yawOf(wMb.R); }
 } // namespace bole

@@ -6,6 +6,7 @@
 #include <bole/camera.h>
 #include <bole/trunk.h>
 
+#include <array>
 #include <visp3/core/vpImage.h>
 
 namespace bole
@@ -22,6 +23,9 @@ struct BorderLine
   /// The same line moved to the right by \p top at its first row and by \p bottom at its last.
   BorderLine moved(double top, double bottom) const;
 };
+
+/// Both borders of a trunk, to go over.
+inline constexpr std::array<Border, 2> kBorders{Border::left, Border::right};
 
 /// Part of a border that may be seen: tangents of the elevation above the horizontal plane of the camera.
 struct ElevationRange

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
-// Private to the stage: sums of a gradient image along a line, a sample a row.
+// Private to the stage and to tracking: sums of a gradient image along a line, a sample a row.
 
 namespace bole
 {

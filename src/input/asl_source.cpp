@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/asl_source.h"
 #include "geometry/failure.h"
 #include "geometry/median.h"
 #include "geometry/so3.h"
 #include "input/csv_reader.h"
-#include "input/sensor_yaml.h"
+#include "input/recorded_source.h"
+#include "input/yaml_file.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <set>
 
 namespace bole
 {
@@ -217,4 +221,75 @@ bool AslSource::accepts(const std::string &path)
 {
   return fs::is_directory(path) && fs::is_regular_file(sensorRoot(path) / "cam0" / "data.csv");
 }
+
+namespace
+{
+void readTrees(const std::string &path, bool is_far, std::set<int> &ids, std::vector<TruthTrunk> &trunks)
+{
+  CsvReader csv(path, is_far ? CsvFormat{3, ',', "id,x [m],y [m]"}
+                             : CsvFormat{5, ',', "id,x [m],y [m],radius [m],lean [deg]"});
+  while (csv.next()) {
+    TruthTrunk trunk;
+    trunk.id = static_cast<int>(csv.integer(0, "id"));
+    if (!ids.insert(trunk.id).second)
+      csv.fail(fmt::format("id = {}, must not come twice", trunk.id));
+    trunk.xy = {csv.number(1, "x"), csv.number(2, "y")};
+    if (!is_far) {
+      trunk.radius = csv.number(3, "radius");
+      trunk.lean = csv.number(4, "lean") * M_PI / 180;
+      if (!(trunk.radius > 0))
+        csv.fail(fmt::format("radius = {}, must be above 0 m", trunk.radius));
+    }
+    trunks.push_back(trunk);
+  }
+}
+} // namespace
+
+std::vector<TruthTrunk> readTruthTrunks(const std::string &sequence)
+{
+  const std::filesystem::path folder(sequence);
+  std::vector<TruthTrunk> trunks;
+  std::set<int> ids;
+  if (!std::filesystem::exists(folder / "trees.csv"))
+    return trunks;
+  readTrees((folder / "trees.csv").string(), false, ids, trunks);
+  if (std::filesystem::exists(folder / "trees_far.csv"))
+    readTrees((folder / "trees_far.csv").string(), true, ids, trunks);
+  return trunks;
+}
+
+namespace asl
+{
+std::string sensorYaml(const MountedCamera &camera, const std::string &comment, double rate_hz)
+{
+  std::string matrix;
+  const Eigen::Matrix<double, 3, 4> T = (Eigen::Matrix<double, 3, 4>() << camera.bMc.R, camera.bMc.t).finished();
+  for (int k = 0; k < 12; ++k)
+    matrix += fmt::format("{}, ", T(k / 4, k % 4) + 0.0); // no -0
+  const Distortion distortion = camera.model.distortion;
+  const int count = distortion == Distortion::none ? 0 : distortion == Distortion::fov ? 1 : 4;
+  const auto &c = camera.model.coefficients;
+  const PinholeCamera &p = camera.model.pinhole;
+  return fmt::format("sensor_type: camera\ncomment: {}\nT_BS:\n  cols: 4\n  rows: 4\n"
+                     "  data: [{}0.0, 0.0, 0.0, 1.0]\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n"
+                     "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
+                     comment, matrix, rate_hz, p.width, p.height, p.fx, p.fy, p.cx, p.cy, toString(distortion),
+                     fmt::join(c.begin(), c.begin() + count, ", "));
+}
+
+std::string imuLine(std::int64_t stamp_ns, const Eigen::Vector3d &w, const Eigen::Vector3d &a)
+{
+  return fmt::format("{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", stamp_ns, w.x(), w.y(), w.z(), a.x(), a.y(),
+                     a.z());
+}
+
+std::string poseLine(std::int64_t stamp_ns, const Pose &pose)
+{
+  Eigen::Quaterniond q(pose.R);
+  if (q.w() < 0)
+    q.coeffs() = -q.coeffs();
+  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp_ns, pose.t.x(), pose.t.y(),
+                     pose.t.z(), q.w(), q.x(), q.y(), q.z());
+}
+} // namespace asl
 } // namespace bole

@@ -3,8 +3,7 @@
 #include "geometry/names.h"
 #include "geometry/parse_number.h"
 #include "input/camera_plausibility.h"
-#include "input/sensor_yaml.h"
-#include "input/xml_file.h"
+#include "input/regular_file.h"
 #include "input/yaml_file.h"
 
 #include <bole/open_source.h>

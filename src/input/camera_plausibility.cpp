@@ -2,7 +2,7 @@
 #include "input/camera_plausibility.h"
 
 #include "geometry/failure.h"
-#include "geometry/rotation.h"
+#include "geometry/so3.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// One door to libavcodec: every picture of the project is decoded and encoded through it.
+/// What uses libavcodec: decoders of video, single pictures from bytes and to bytes.
 
 #include <bole/visp.h>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 #include <visp3/core/vpImage.h>
+#include <visp3/core/vpRGBa.h>
 
 struct AVCodecContext;
 struct AVCodecParameters;
@@ -77,43 +78,11 @@ private:
   bool m_has_failed = false;
 };
 
-/// Pictures in, packets of H.264 (YUV 4:2:0) out, one thread. Not thread-safe.
-class PictureEncoder
-{
-public:
-  struct Settings
-  {
-    int width = 0, height = 0;        ///< [px], even
-    int ticks_per_second = 1000;      ///< unit of the time stamps
-    double rate_hz = 0;               ///< pictures a second for the rate control; 0: not known
-    double bit_rate = 0;              ///< [bit/s]; 0: constant quality \p quality
-    bool is_bit_rate_limited = false; ///< no second above bit_rate
-    int quality = 21;                 ///< x264's CRF: lower is better
-    int key_interval = 50;            ///< pictures from a key frame to the next
-    bool is_live = false;             ///< baseline profile, each picture comes out at once: as a drone encodes
-    bool has_global_header = false;   ///< for containers that keep the headers apart
-    bool may_be_mpeg4 = false;        ///< where libavcodec has no H.264 encoder
-    std::string x264_parameters;      ///< more for libx264
-  };
-  using Sink = std::function<void(AVPacket &)>;
+/// The grey levels of a PNG, JPEG, BMP, TIFF or PNM, 8 bits of them, colours by ITU-R BT.601, transparency ignored.
+/// False for what cannot be decoded. Never throws.
+bool decodeGrey(const std::vector<unsigned char> &bytes, vpImage<unsigned char> &grey);
 
-  /// Throws vpException when libavcodec has no encoder or it cannot be opened.
-  explicit PictureEncoder(const Settings &settings);
-
-  /// Picture to fill before encode().
-  AVFrame &picture();
-  /// Fills picture() with grey levels; what is beyond the image repeats its last column and row.
-  void fill(const vpImage<unsigned char> &image);
-  /// Encodes picture(); \p stamp in ticks, rising. Packets that are ready go to \p sink.
-  void encode(std::int64_t stamp, const Sink &sink, bool is_key_forced = false);
-  /// Gives the packets that are still inside.
-  void finish(const Sink &sink);
-  const AVCodecContext &context() const { return *m_context; }
-
-private:
-  void send(const AVFrame *frame, const Sink &sink);
-  LibavPtr<AVCodecContext> m_context;
-  LibavPtr<AVFrame> m_frame;
-  LibavPtr<AVPacket> m_packet;
-};
+/// Throw vpException where libavcodec cannot.
+std::string encodePng(const vpImage<unsigned char> &grey);
+std::string encodeJpeg(const vpImage<vpRGBa> &picture);
 } // namespace bole

@@ -52,8 +52,7 @@ FrameBuilder::FrameBuilder(const MountedCamera &camera, const SourceOptions &opt
       m_rectifier(camera.model, options.max_width_px),
       m_bMc(camera.bMc),
       m_recording(corrected(std::move(recording), options.calibration)),
-      m_max_gap_ns(std::llround(options.max_odometry_gap_s * 1e9)),
-      m_health(camera.model.pinhole, camera.bMc)
+      m_judge(camera.model.pinhole, camera.bMc)
 {
 }
 
@@ -67,8 +66,8 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
   frame.image = std::move(file.image);
   if (frame.index == 0)
     m_recording.odometry = withFirstPicture(std::move(m_recording.odometry), stamp_ns);
-  frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns, m_max_gap_ns);
-  frame.wMb_truth = interpolate(m_recording.truth, stamp_ns, m_max_gap_ns);
+  frame.wMb_odometry = interpolate(m_recording.odometry, stamp_ns);
+  frame.wMb_truth = interpolate(m_recording.truth, stamp_ns);
 
   const auto &gyro = m_recording.gyro;
   for (; m_gyro_at < gyro.size() && gyro[m_gyro_at].stamp_ns <= stamp_ns; ++m_gyro_at)
@@ -81,7 +80,7 @@ void FrameBuilder::build(std::int64_t stamp_ns, ImageFile file, Frame &frame)
 void FrameBuilder::complete(Frame &frame)
 {
   judgePicture(frame, m_rectifier.inputWidth(), m_rectifier.inputHeight());
-  m_health.judge(frame);
+  m_judge.judge(frame);
   if (frame.image.getSize() > 0)
     m_rectifier.apply(frame.image);
 }

@@ -3,9 +3,6 @@
 /// \file
 /// What the recorded sources share: from a decoded image and its stamp to a complete Frame.
 
-#include "input/frame_health.h"
-#include "input/image_file.h"
-
 #include "input/rectifier.h"
 #include "input/trajectory.h"
 #include <bole/frame.h>
@@ -15,6 +12,18 @@
 
 namespace bole
 {
+struct ImageFile
+{
+  FrameStatus status = FrameStatus::ok; ///< ok, corrupt, missing or resized
+  std::string message;                  ///< why not ok
+  vpImage<unsigned char> image;         ///< grey; empty when not ok
+};
+
+/// Decodes \p path as grey. A file that ends early is corrupt even where its decoder would fill the
+/// rest with grey (JPEG) or leave the last rows undefined.
+/// \param width, height [px] of the images before: one of another size is `resized` and not decoded; 0: any size.
+ImageFile readImageFile(const std::string &path, int width = 0, int height = 0);
+
 /// Which of SourceOptions a source has a use for.
 struct SourceKind
 {
@@ -41,7 +50,7 @@ struct Recording
 /// \p recording without the constant errors of its sensors.
 Recording corrected(Recording recording, const SensorCalibration &calibration);
 
-/// Adds what the motion sensors measured, judges the images (FrameHealth) and rectifies them.
+/// Adds what the motion sensors measured, judges the images (FrameJudge) and rectifies them.
 class FrameBuilder
 {
 public:
@@ -65,8 +74,7 @@ private:
   Rectifier m_rectifier;
   Pose m_bMc;
   Recording m_recording;
-  std::int64_t m_max_gap_ns;
-  FrameHealth m_health;
+  FrameJudge m_judge;
   std::optional<std::int64_t> m_last_stamp_ns;
   std::size_t m_gyro_at = 0;
   std::size_t m_index = 0;

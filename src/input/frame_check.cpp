@@ -2,7 +2,8 @@
 #include "input/frame_check.h"
 
 #include "geometry/failure.h"
-#include "geometry/rotation.h"
+#include "geometry/names.h"
+#include "geometry/so3.h"
 
 #include <cmath>
 
@@ -64,6 +65,11 @@ std::string faultOf(const Frame &frame, const std::optional<std::int64_t> &last_
   return faultOf(frame.gyro);
 }
 } // namespace
+
+const char *toString(FrameStatus status)
+{
+  return nameOf(status, {"ok", "stale", "corrupt", "missing", "resized", "doubtful"});
+}
 
 void requireSound(const Frame &frame, std::optional<std::size_t> index, std::optional<std::int64_t> last_stamp_ns)
 {

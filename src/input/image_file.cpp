@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/image_file.h"
-#include "input/picture_codec.h"
+#include "input/codec.h"
+#include "input/frame_builder.h"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "input/live_video.h"
 #include "geometry/failure.h"
-#include "input/retry_pause.h"
-#include "input/secrets.h"
-#include "input/video_source.h"
+#include "input/recorded_source.h"
+#include "input/steady_clock.h"
+#include "input/user_text.h"
 
 #include <bole/visp.h>
 #include <chrono>
@@ -25,8 +25,6 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kFrameTimeout_ns = kSecond_ns / 2; ///< without a picture there is a missing frame
 constexpr std::int64_t kShortest_ns = kSecond_ns / 1000;  ///< between the last picture of a connection and the next
 constexpr double kRetry_s = 0.5, kLongestRetry_s = 2;     ///< between two attempts to connect
-
-std::int64_t now_ns() { return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 bool isDevice(const std::string &address) { return address.rfind(kDevice, 0) == 0; }
 
@@ -128,20 +126,20 @@ struct LiveVideoSource::State
   {
     bool is_first = false, is_again = false; // of a connection
     RetryPause pause(kRetry_s, kLongestRetry_s);
-    std::int64_t connected_ns = now_ns(), last_ns = 0;
+    std::int64_t connected_ns = steadyNowNs(), last_ns = 0;
     while (!limit->is_stopped) {
       try {
         if (!reader) {
           reader = openReader(address, limit);
           is_first = is_again = true;
-          connected_ns = now_ns();
+          connected_ns = steadyNowNs();
           const std::lock_guard<std::mutex> lock(mutex);
           ++counters.connections;
         }
         Picture picture;
         if (!reader(picture))
           throw ioError("{}: the stream ended", name);
-        const std::int64_t arrived_ns = now_ns();
+        const std::int64_t arrived_ns = steadyNowNs();
         if (is_again && picture.clock == beginning.clock && picture.image == beginning.image)
           return end();
         if (std::exchange(is_first, false))
@@ -152,7 +150,7 @@ struct LiveVideoSource::State
       }
       catch (const vpException &error) {
         reader = nullptr;
-        if (now_ns() - connected_ns > kSecond_ns)
+        if (steadyNowNs() - connected_ns > kSecond_ns)
           pause.reset();
         std::unique_lock<std::mutex> lock(mutex);
         trouble = error.getStringMessage();
@@ -203,11 +201,6 @@ bool LiveVideoSource::accepts(const std::string &address)
                                !std::filesystem::exists(address, error));
 }
 
-LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s)
-    : LiveVideoSource(address, options, give_up_s, nullptr)
-{
-}
-
 LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s,
                                  std::unique_ptr<VideoFile> file)
 {
@@ -232,7 +225,7 @@ LiveVideoSource::LiveVideoSource(const std::string &address, const SourceOptions
   const MountedCamera camera = cameraFor(options, static_cast<int>(first.image.getWidth()),
                                          static_cast<int>(first.image.getHeight()), m_note, pixel_aspect);
   m_builder = std::make_unique<FrameBuilder>(camera, options, Recording());
-  state.begun_ns = state.heard_ns = now_ns();
+  state.begun_ns = state.heard_ns = steadyNowNs();
   state.take(std::move(first), state.begun_ns);
   state.thread = std::thread([&state, first_ns] { state.read(-first_ns); });
 }
@@ -259,7 +252,7 @@ bool LiveVideoSource::next(Frame &frame)
       state.newest.reset();
     }
     else {
-      const std::int64_t now = now_ns();
+      const std::int64_t now = steadyNowNs();
       if (now - state.heard_ns > state.give_up_ns)
         return false;
       // By the clock of the stream; half a timeout early, so that the picture that comes next is not before.

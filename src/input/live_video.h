@@ -35,11 +35,10 @@ public:
   /// Whether \p address is one for this source (not ardrone://).
   static bool accepts(const std::string &address);
 
-  /// \p give_up_s: silence that ends the stream [s], above 0.
-  explicit LiveVideoSource(const std::string &address, const SourceOptions &options = {}, double give_up_s = 10);
-  /// With what was opened already. \p file: of \p address, and live.
-  LiveVideoSource(const std::string &address, const SourceOptions &options, double give_up_s,
-                  std::unique_ptr<VideoFile> file);
+  /// \p give_up_s: silence that ends the stream [s], above 0. \p file: of \p address, and live, where that was opened
+  /// already.
+  explicit LiveVideoSource(const std::string &address, const SourceOptions &options = {}, double give_up_s = 10,
+                           std::unique_ptr<VideoFile> file = nullptr);
   ~LiveVideoSource() override;
 
   bool next(Frame &frame) override;

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "geometry/failure.h"
-#include "geometry/require_range.h"
-#include "input/asl_source.h"
 #include "input/live_video.h"
-#include "input/sequence_source.h"
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include <bole/open_source.h>
 
 #include <filesystem>
@@ -14,7 +11,6 @@ namespace bole
 void SourceOptions::validate() const
 {
   requireRange("odometry_offset_s", odometry_offset_s, -1e9, 1e9);
-  requireRange("max_odometry_gap_s", max_odometry_gap_s, 1e-9, 1e6);
   if (frame_rate_hz)
     requireRange("frame_rate_hz", *frame_rate_hz, 1e-3, 1e4);
   if (max_width_px != 0) // keeps the size

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/picture_codec.h"
 #include "geometry/failure.h"
 #include "input/codec.h"
 

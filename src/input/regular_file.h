@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace bole
 {
@@ -15,6 +16,8 @@ std::ifstream openRegularFile(const std::string &path);
 
 /// All of a file of at most \p most_bytes. \throw vpException(ioError) naming it.
 std::string readWholeFile(const std::string &path, std::size_t most_bytes);
+/// All of a file that people write, at most 1 MB. \throw vpException(ioError) naming it.
+std::string readSmallFile(const std::string &path);
 
 /// The lines of a text, counted. A line of more than 100,000 characters is refused before it is in the memory; the byte
 /// order mark of UTF-8 and the carriage returns of other systems are left out.
@@ -47,4 +50,17 @@ private:
   std::string m_name, m_line;
   std::size_t m_number = 0;
 };
+
+/// An element of the part of XML that settings and calibrations use (nested elements with text, comments, a
+/// declaration): of an innermost one the text.
+struct XmlElement
+{
+  std::string path; ///< "conf/camera/u0"
+  std::string text; ///< without the blanks around it
+  int line = 0;     ///< of its end
+};
+
+/// The elements of a file of at most 1 MB in the order of their ends, so that an element follows those in it.
+/// Attributes are passed over. \throw vpException "path:line: ...".
+std::vector<XmlElement> readXml(const std::string &path);
 } // namespace bole

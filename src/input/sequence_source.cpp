@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/sequence_source.h"
+#include "input/recorded_source.h"
 
 #include "geometry/failure.h"
-#include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 
 #include <algorithm>
 #include <charconv>

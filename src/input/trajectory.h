@@ -25,4 +25,16 @@ std::optional<Pose> interpolate(const Trajectory &trajectory, std::int64_t stamp
 Trajectory readTrajectory(const std::string &path);
 Trajectory readAslTrajectory(const std::string &path);
 Trajectory readTumTrajectory(const std::string &path);
+
+/// \p stamp_ns as seconds with nine decimals: exact.
+std::string secondsText(std::int64_t stamp_ns);
+
+/// First line of such a file, and the line of a pose.
+extern const char *const kTrajectoryHead;
+std::string trajectoryLine(const StampedPose &pose);
+
+/// Writes "t tx ty tz qx qy qz qw" a line (seconds with nine decimals, metres, body in world, qw >=
+/// 0), atomically. Law (a test): readTumTrajectory() gives the stamps exactly and the poses to
+/// 1e-8.
+void writeTrajectory(const std::string &path, const Trajectory &trajectory);
 } // namespace bole

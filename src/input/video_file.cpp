@@ -2,12 +2,11 @@
 #include "input/video_file.h"
 #include "geometry/failure.h"
 #include "input/codec.h"
-#include "input/libav.h"
 #include "input/regular_file.h"
-#include "input/secrets.h"
+#include "input/steady_clock.h"
+#include "input/user_text.h"
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
@@ -33,10 +32,22 @@ struct CloseFormat
   void operator()(AVFormatContext *format) const { avformat_close_input(&format); }
 };
 
+/// The matrix that brings the pictures of \p stream upright, as av_display_rotation_get() takes it; nullptr for none.
+const std::uint8_t *displayMatrix(const AVStream &stream)
+{
+#if LIBAVCODEC_VERSION_INT >= AV_VERSION_INT(60, 31, 100)
+  const AVPacketSideData *data = av_packet_side_data_get(
+      stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data, AV_PKT_DATA_DISPLAYMATRIX);
+  return data == nullptr ? nullptr : data->data;
+#else
+  return av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+#endif
+}
+
 /// Quarter turns, clockwise, that bring the picture upright.
 int quarterTurns(AVStream &stream)
 {
-  const std::uint8_t *matrix = libav::displayMatrix(stream);
+  const std::uint8_t *matrix = displayMatrix(stream);
   if (matrix == nullptr)
     return 0;
   std::array<std::int32_t, 9> values;
@@ -129,11 +140,6 @@ namespace
 {
 constexpr double kOpening_s = 10, kSilence_s = 3; ///< that an address may take to answer, and between two packets
 
-std::int64_t steady_ns()
-{
-  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 /// Pictures one after the other as cameras push them: without stamps, and whatever length is said, without an end.
 bool isMultipart(const AVFormatContext &format) { return std::strcmp(format.iformat->name, "mpjpeg") == 0; }
 
@@ -141,7 +147,7 @@ bool isMultipart(const AVFormatContext &format) { return std::strcmp(format.ifor
 int isOver(void *limit)
 {
   const auto *of = static_cast<const ReadLimit *>(limit);
-  return of->is_stopped || steady_ns() > of->until_ns ? 1 : 0;
+  return of->is_stopped || steadyNowNs() > of->until_ns ? 1 : 0;
 }
 /// Whether the file begins as an MP4 or a QuickTime does.
 bool isMp4(const std::string &path)
@@ -167,7 +173,7 @@ VideoFile::VideoFile(const std::string &address, std::shared_ptr<ReadLimit> limi
 void VideoFile::allowReading(double seconds) const
 {
   if (m_limit)
-    m_limit->until_ns = steady_ns() + static_cast<std::int64_t>(seconds * 1e9);
+    m_limit->until_ns = steadyNowNs() + static_cast<std::int64_t>(seconds * 1e9);
 }
 
 void VideoFile::open(const std::string &url)

@@ -4,14 +4,12 @@
 #include "input/camera_plausibility.h"
 #include "input/frame_builder.h"
 #include "input/frame_check.h"
-#include "mbt/cao_reader.h"
-#include "output/palette.h"
 #include <bole/config.h>
+#include <bole/cylinder.h>
+#include <bole/overlay.h>
 #include <bole/pipeline.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <fmt/format.h>
 #include <optional>
 #include <visp3/core/vpDisplay.h>
@@ -38,14 +36,6 @@ MountedCamera mountedCamera(const vpCameraParameters &cam, const Pose &bMc)
     throw vpException(vpException::notImplementedError, "vpTrunkMapper: Kannala-Brandt distortion is not supported");
   }
   return camera;
-}
-
-vpColor colorOf(int id)
-{
-  const char *hex = palette::kLines[static_cast<std::size_t>(id) % palette::kLines.size()];
-  const long value = std::strtol(hex + 1, nullptr, 16);
-  return vpColor(static_cast<unsigned char>(value >> 16), static_cast<unsigned char>(value >> 8 & 255),
-                 static_cast<unsigned char>(value & 255));
 }
 } // namespace
 
@@ -154,7 +144,8 @@ void vpTrunkMapper::Impl::display(const vpImage<Pixel> &I, const vpColor &color,
     if (!trunk.is_tracked || !trunk.relative.isFinite())
       continue;
     const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
-    const vpColor &own = color == vpColor::none ? colorOf(trunk.id) : color;
+    const vpRGBa of_id = colourOf(trunk.id);
+    const vpColor own = color == vpColor::none ? vpColor(of_id.R, of_id.G, of_id.B) : color;
     for (const Border border : {Border::left, Border::right})
       displayBorder(I, trunk, border, own, is_confirmed ? thickness : 1);
     const Eigen::Vector3d ray = trunk.relative.borderDirection(Border::right, trunk.tan_low);

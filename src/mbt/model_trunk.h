@@ -20,7 +20,6 @@
 
 #include "geometry/silhouette.h"
 #include "tracking/border_profile.h"
-#include "tracking/borders.h"
 #include <bole/cylinder.h>
 
 #include <bole/vpMbTrunkTracker.h>

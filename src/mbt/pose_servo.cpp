@@ -21,14 +21,6 @@ using Vector9d = Eigen::Matrix<double, 9, 1>;
 
 constexpr double kTukey = 4.6851;   ///< 95 % efficiency
 constexpr double kConverged = 1e-4; ///< norm of the last step, m and rad
-
-Matrix6d twistMatrix(const Pose &aMb)
-{
-  Matrix6d V = Matrix6d::Zero();
-  V.topLeftCorner<3, 3>() = V.bottomRightCorner<3, 3>() = aMb.R;
-  V.topRightCorner<3, 3>() = skew(aMb.t) * aMb.R;
-  return V;
-}
 } // namespace
 
 Pose movedBy(const Pose &cMo, const Vector6d &xi)
@@ -49,8 +41,8 @@ Vector6d PoseEstimator::freePart(const Vector6d &xi) const
 {
   if (is_all_free)
     return xi;
-  const Matrix6d V = twistMatrix(m_pose);
-  return V * free_in_object * twistMatrix(m_pose.inverse()) * xi;
+  const Matrix6d V = adjoint(m_pose);
+  return V * free_in_object * adjoint(m_pose.inverse()) * xi;
 }
 
 void PoseEstimator::linearise()
@@ -127,7 +119,7 @@ void PoseEstimator::servo(const ExpectedPose &expected, double focal_px)
     if (is_all_free)
       xi = normal.H.llt().solve(normal.b);
     else { // only the degrees of freedom to be estimated, which are given in the object frame
-      const Matrix6d VJ = twistMatrix(m_pose) * free_in_object;
+      const Matrix6d VJ = adjoint(m_pose) * free_in_object;
       const Eigen::MatrixXd HJ = VJ.transpose() * normal.H * VJ;
       xi = VJ * HJ.completeOrthogonalDecomposition().solve(VJ.transpose() * normal.b);
     }

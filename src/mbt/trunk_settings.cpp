@@ -3,8 +3,7 @@
 
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
-#include "geometry/require_range.h"
-#include "input/xml_file.h"
+#include "input/regular_file.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "output/best_view.h"
-#include "input/picture_codec.h"
+#include "input/codec.h"
 
 #include <bole/overlay.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/digest.h"
+#include "output/summary_json.h"
 
 #include <algorithm>
 #include <array>

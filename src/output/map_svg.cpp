@@ -2,9 +2,8 @@
 #include "output/map_svg.h"
 
 #include "input/atomic_file.h"
-#include "output/palette.h"
-#include "output/svg.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,118 @@ namespace bole
 {
 namespace
 {
+constexpr const char *kOrange = "#e69f00", *kSkyBlue = "#56b4e9", *kGreen = "#009e73", *kBlue = "#0072b2",
+                     *kVermilion = "#d55e00", *kGrey = "#999999"; // of Okabe and Ito: the colour-blind tell them apart
+
+using SvgPoints = std::vector<std::pair<double, double>>;
+
+std::string pointsText(const SvgPoints &points)
+{
+  std::string text;
+  for (const auto &[x, y] : points)
+    text += fmt::format("{:.1f},{:.1f} ", x, y);
+  return text;
+}
+
+/// \p text as it may stand in XML.
+std::string escaped(const std::string &text)
+{
+  std::string xml;
+  for (const char c : text)
+    xml += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return xml;
+}
+
+/// Shapes on a white sheet. Coordinates [px], y down. \p style: further attributes, such as `fill-opacity=".5"`.
+class SvgDrawing
+{
+public:
+  SvgDrawing(double width, double height)
+      : m_text(fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
+                           "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"sans-serif\" font-size=\"11\">\n"
+                           "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+                           width, height))
+  {
+  }
+
+  void line(double x0, double y0, double x1, double y1, const char *colour, const std::string &style = {})
+  {
+    m_text += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" {}/>\n", x0, y0,
+                          x1, y1, colour, style);
+  }
+
+  void polyline(const SvgPoints &points, const char *colour, const std::string &style = {})
+  {
+    if (!points.empty())
+      m_text +=
+          fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" {}/>\n", pointsText(points), colour, style);
+  }
+
+  void polygon(const SvgPoints &points, const char *colour, const std::string &style = {})
+  {
+    m_text += fmt::format("<polygon points=\"{}\" fill=\"{}\" {}/>\n", pointsText(points), colour, style);
+  }
+
+  void circle(double x, double y, double radius, const char *fill, const std::string &style = {})
+  {
+    m_text +=
+        fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" {}/>\n", x, y, radius, fill, style);
+  }
+
+  void box(double x, double y, double width, double height, const char *fill)
+  {
+    m_text += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.1f}\" fill=\"{}\"/>\n", x, y,
+                          width, height, fill);
+  }
+
+  void text(double x, double y, const std::string &text, const std::string &style = {})
+  {
+    m_text += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" fill=\"#222\" {}>{}</text>\n", x, y, style, escaped(text));
+  }
+  void add(const std::string &element) { m_text += element; }
+  std::string finish() const { return m_text + "</svg>\n"; }
+
+private:
+  std::string m_text;
+};
+
+/// Two sigma of \p covariance round the point (\p x, \p y) of the drawing, \p scale px for one of its units; its second
+/// axis points up.
+std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, double scale, const char *colour)
+{
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
+  const Eigen::Vector2d axes = 2 * scale * eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector2d major = eigen.eigenvectors().col(1);
+  return fmt::format("<ellipse rx=\"{0:.1f}\" ry=\"{1:.1f}\" transform=\"translate({2:.1f} {3:.1f}) rotate({4:.1f})\" "
+                     "fill=\"{5}\" fill-opacity=\".15\" stroke=\"{5}\" stroke-opacity=\".6\"/>\n",
+                     axes(1), axes(0), x, y, -std::atan2(major.y(), major.x()) * 180 / M_PI, colour);
+}
+
+/// Values of ticks between \p low and \p high, about five.
+std::vector<double> ticksBetween(double low, double high)
+{
+  const double raw = std::max(high - low, 1e-9) / 5, base = std::pow(10, std::floor(std::log10(raw)));
+  const double step = base * (raw / base < 1.5 ? 1 : raw / base < 3.5 ? 2 : raw / base < 7.5 ? 5 : 10);
+  constexpr int kMost = 12; // far from zero a step may change nothing
+  const double first = std::ceil(low / step);
+  std::vector<double> ticks;
+  for (int i = 0; i < kMost && (first + i) * step <= high + 1e-9 * step; ++i)
+    ticks.push_back((first + i) * step + 0.0); // no -0
+  return ticks;
+}
+
+/// Every metre between \p low and \p high; of a map of more than 300 m those of ticksBetween().
+std::vector<double> gridBetween(double low, double high)
+{
+  constexpr double kMostLines = 300;
+  if (!(high - low < kMostLines))
+    return ticksBetween(low, high);
+  std::vector<double> lines;
+  for (double m = std::ceil(low); m <= high && lines.size() < kMostLines; ++m)
+    lines.push_back(m);
+  return lines;
+}
+
 constexpr double kPixelsPerMetre = 40, kMargin = 1.5; // [m]
 
 /// x to the right is the world's x, up is the world's y; the legend stands above.
@@ -110,11 +221,11 @@ void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &recor
 {
   const double x = sheet.x(record.xy.x()), y = sheet.y(record.xy.y()), r = record.radius * kPixelsPerMetre;
   if (record.status == TrunkStatus::candidate)
-    drawing.circle(x, y, r, "none", fmt::format("stroke=\"{}\"", palette::kOrange));
+    drawing.circle(x, y, r, "none", fmt::format("stroke=\"{}\"", kOrange));
   if (record.status != TrunkStatus::confirmed)
     return;
-  drawing.add(sigmaEllipse(x, y, record.covarianceXy(), kPixelsPerMetre, palette::kVermilion));
-  drawing.circle(x, y, r, palette::kVermilion, "fill-opacity=\".75\"");
+  drawing.add(sigmaEllipse(x, y, record.covarianceXy(), kPixelsPerMetre, kVermilion));
+  drawing.circle(x, y, r, kVermilion, "fill-opacity=\".75\"");
 }
 
 /// Returns where it ends [px].
@@ -137,16 +248,16 @@ double drawLegend(SvgDrawing &drawing, const MapPicture &picture)
     return record.status == TrunkStatus::candidate;
   });
   if (!picture.has_ranges) {
-    entry(true, palette::kVermilion, "trunks: bearing and width, at no known distance");
+    entry(true, kVermilion, "trunks: bearing and width, at no known distance");
     return y;
   }
-  entry(true, palette::kVermilion, "trunks, two sigma");
-  entry(has_candidates, palette::kOrange, "candidates, not confirmed");
-  entry(!picture.truth_trunks.empty(), palette::kGreen, "trunks, truth");
-  entry(!picture.smoothed.empty(), palette::kBlue, "trajectory, smoothed");
-  entry(!picture.online.empty(), palette::kSkyBlue, "trajectory, online");
-  entry(!picture.odometry.empty(), palette::kGrey, "pose filter");
-  entry(!picture.truth.empty(), palette::kGreen, "trajectory, truth");
+  entry(true, kVermilion, "trunks, two sigma");
+  entry(has_candidates, kOrange, "candidates, not confirmed");
+  entry(!picture.truth_trunks.empty(), kGreen, "trunks, truth");
+  entry(!picture.smoothed.empty(), kBlue, "trajectory, smoothed");
+  entry(!picture.online.empty(), kSkyBlue, "trajectory, online");
+  entry(!picture.odometry.empty(), kGrey, "pose filter");
+  entry(!picture.truth.empty(), kGreen, "trajectory, truth");
   return y;
 }
 
@@ -164,7 +275,7 @@ std::string bearingsSvg(const MapPicture &picture)
     const auto at = [](double angle, double r) {
       return std::pair(kX + r * std::cos(angle), kY - r * std::sin(angle));
     };
-    drawing.polygon({{kX, kY}, at(bearing - half, kRadius), at(bearing + half, kRadius)}, palette::kVermilion,
+    drawing.polygon({{kX, kY}, at(bearing - half, kRadius), at(bearing + half, kRadius)}, kVermilion,
                     "fill-opacity=\".6\"");
     const auto [x, y] = at(bearing, kRadius + 14);
     drawing.text(x, y, fmt::format("{}", record.id), "text-anchor=\"middle\"");
@@ -186,11 +297,11 @@ std::string toSvg(const MapPicture &picture)
   for (const TruthTrunk &truth : picture.truth_trunks)
     if (sheet.box.contains(truth.xy))
       drawing.circle(sheet.x(truth.xy.x()), sheet.y(truth.xy.y()), std::max(truth.radius, 0.05) * kPixelsPerMetre,
-                     palette::kGreen, fmt::format("fill-opacity=\".35\" stroke=\"{}\"", palette::kGreen));
-  drawing.polyline(path(sheet, picture.truth), palette::kGreen, "stroke-width=\"2\"");
-  drawing.polyline(path(sheet, picture.odometry), palette::kGrey, "stroke-dasharray=\"2 3\"");
-  drawing.polyline(path(sheet, picture.online), palette::kSkyBlue);
-  drawing.polyline(path(sheet, picture.smoothed), palette::kBlue, "stroke-width=\"2\"");
+                     kGreen, fmt::format("fill-opacity=\".35\" stroke=\"{}\"", kGreen));
+  drawing.polyline(path(sheet, picture.truth), kGreen, "stroke-width=\"2\"");
+  drawing.polyline(path(sheet, picture.odometry), kGrey, "stroke-dasharray=\"2 3\"");
+  drawing.polyline(path(sheet, picture.online), kSkyBlue);
+  drawing.polyline(path(sheet, picture.smoothed), kBlue, "stroke-width=\"2\"");
   Labels labels(sheet);
   for (const TrunkRecord &record : picture.trunks) {
     drawTrunk(drawing, sheet, record);

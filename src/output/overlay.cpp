@@ -51,7 +51,7 @@ cv::Rect insetBox(const cv::Mat &canvas, const vpImage<float> &foreground)
 }
 
 /// A border as points on the canvas, from low to high; empty where it is behind the camera.
-std::vector<cv::Point2f> borderPoints(const OverlayTrunk &trunk, Border border, const PinholeCamera &camera, int factor)
+std::vector<cv::Point2f> borderPoints(const TrunkInView &trunk, Border border, const PinholeCamera &camera, int factor)
 {
   constexpr int kSteps = 24;
   std::vector<cv::Point2f> points;
@@ -96,7 +96,7 @@ void fillBetween(cv::Mat &canvas, const std::vector<cv::Point2f> &left, const st
   cv::addWeighted(tinted, 0.22, canvas(box), 0.78, 0, canvas(box));
 }
 
-void drawTrunk(cv::Mat &canvas, const OverlayTrunk &trunk, const PinholeCamera &camera, int factor)
+void drawTrunk(cv::Mat &canvas, const TrunkInView &trunk, const PinholeCamera &camera, int factor)
 {
   if (!trunk.relative.isFinite())
     return;
@@ -104,13 +104,13 @@ void drawTrunk(cv::Mat &canvas, const OverlayTrunk &trunk, const PinholeCamera &
   const auto right = borderPoints(trunk, Border::right, camera, factor);
   const bool is_confirmed = trunk.status == TrunkStatus::confirmed;
   const cv::Scalar colour = scalarOf(colourOf(trunk.id));
-  if (is_confirmed && trunk.is_observed)
+  if (is_confirmed && trunk.is_tracked)
     fillBetween(canvas, left, right, colour);
-  drawLine(canvas, left, colour, is_confirmed ? 2 : 1, !trunk.is_observed);
-  drawLine(canvas, right, colour, is_confirmed ? 2 : 1, !trunk.is_observed);
+  drawLine(canvas, left, colour, is_confirmed ? 2 : 1, !trunk.is_tracked);
+  drawLine(canvas, right, colour, is_confirmed ? 2 : 1, !trunk.is_tracked);
 }
 
-std::string labelOf(const OverlayTrunk &trunk)
+std::string labelOf(const TrunkInView &trunk)
 {
   if (trunk.status != TrunkStatus::confirmed)
     return fmt::format("{}", trunk.id);
@@ -137,7 +137,7 @@ void drawLabels(cv::Mat &canvas, const Overlay &overlay, const PinholeCamera &ca
     return std::none_of(taken.begin(), taken.end(), [&](const cv::Rect &other) { return (other & box).area() > 0; });
   };
   for (const bool is_confirmed : {true, false})
-    for (const OverlayTrunk &trunk : overlay.trunks) {
+    for (const TrunkInView &trunk : overlay.trunks) {
       if (!trunk.relative.isFinite() || (trunk.status == TrunkStatus::confirmed) != is_confirmed)
         continue;
       const auto points = borderPoints(trunk, Border::right, camera, factor);
@@ -237,7 +237,7 @@ vpImage<vpRGBa> drawOverlay(const vpImage<unsigned char> &image, const PinholeCa
 {
   cv::Mat canvas = canvasOf(image, camera);
   const int factor = enlargement(camera);
-  for (const OverlayTrunk &trunk : overlay.trunks)
+  for (const TrunkInView &trunk : overlay.trunks)
     drawTrunk(canvas, trunk, camera, factor);
   drawLabels(canvas, overlay, camera, factor);
   drawInset(canvas, overlay.foreground);

@@ -5,8 +5,6 @@
 #include "geometry/names.h"
 #include "input/atomic_file.h"
 #include "input/regular_file.h"
-#include "output/verdict.h"
-#include "output/versions.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -3,13 +3,13 @@
 /// \file
 /// What a run was made of and what came out, for people and scripts.
 
-#include "output/digest.h"
-#include "output/timing_csv.h"
+#include "output/flight_trace.h"
 #include <bole/frame.h>
 #include <bole/open_source.h>
 #include <bole/trunk_record.h>
-#include <bole/world_reference.h>
 
+#include <atomic>
+#include <cstdint>
 #include <exception>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
@@ -19,6 +19,17 @@
 
 namespace bole
 {
+struct InputDigest
+{
+  std::uint64_t bytes = 0;
+  std::string sha256; ///< 64 hexadecimal digits
+};
+
+/// Of a file: its bytes. Of a folder: the name and the bytes of every file in it, in the order of their names. Of a
+/// pattern such as `frames/%05d.png`: the same of its folder. Nothing where \p input is none of these, cannot be read,
+/// or \p is_cancelled becomes true. Cost: reading it once.
+std::optional<InputDigest> digestOf(const std::string &input, const std::atomic<bool> &is_cancelled);
+
 /// A time without a picture.
 struct PictureGap
 {
@@ -79,4 +90,20 @@ struct RunInput
 RunInput readInputOfRun(const std::string &path);
 /// toJson(), written atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
+
+/// What a run is worth, in words: what is known, what is doubtful, and which option would help.
+struct Verdict
+{
+  bool is_trusted = true;          ///< false: the camera never moved, only rotated, or saw nothing
+  std::vector<std::string> facts;  ///< a line each
+  std::vector<std::string> doubts; ///< a sentence each, with the option that would help; empty when all is well
+};
+
+Verdict judge(const RunSummary &summary);
+
+/// The last lines of `bole track`.
+std::string toText(const Verdict &verdict);
+
+/// Of bole, its commit ("unknown" outside a repository), ViSP, OpenCV and libav.
+std::map<std::string, std::string> versions();
 } // namespace bole

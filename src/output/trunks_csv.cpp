@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-#include <fstream>
 #include <iterator>
 
 namespace bole
@@ -26,21 +25,8 @@ const char *const kFateColumn = ",fate";
 
 /// Rows and columns of TrunkRecord::covariance in the order of the header, from column 12.
 constexpr std::size_t kFirstCovariance = 12, kColumns = 27;
-constexpr std::array<std::pair<int, int>, 15> kCovariance = {{{0, 0},
-                                                              {0, 1},
-                                                              {1, 1},
-                                                              {2, 2},
-                                                              {3, 3},
-                                                              {3, 4},
-                                                              {4, 4},
-                                                              {0, 2},
-                                                              {1, 2},
-                                                              {0, 3},
-                                                              {0, 4},
-                                                              {1, 3},
-                                                              {1, 4},
-                                                              {2, 3},
-                                                              {2, 4}}};
+constexpr std::array<int, 15> kRowOf = {0, 0, 1, 2, 3, 3, 4, 0, 1, 0, 0, 1, 1, 2, 2};
+constexpr std::array<int, 15> kColumnOf = {0, 1, 1, 2, 3, 4, 4, 2, 2, 3, 4, 3, 4, 3, 4};
 
 void addRow(std::string &text, const TrunkRecord &trunk)
 {
@@ -48,8 +34,8 @@ void addRow(std::string &text, const TrunkRecord &trunk)
                  trunk.id, toString(trunk.status), trunk.xy.x(), trunk.xy.y(), trunk.radius, trunk.lean.x(),
                  trunk.lean.y(), trunk.ground_z, trunk.probability, trunk.first_seen_s, trunk.last_seen_s,
                  trunk.observations);
-  for (const auto &[row, column] : kCovariance)
-    fmt::format_to(std::back_inserter(text), ",{:.6e}", trunk.covariance(row, column));
+  for (std::size_t i = 0; i < kRowOf.size(); ++i)
+    fmt::format_to(std::back_inserter(text), ",{:.6e}", trunk.covariance(kRowOf[i], kColumnOf[i]));
 }
 
 TrunkRecord readRow(const CsvReader &csv)
@@ -68,8 +54,8 @@ TrunkRecord readRow(const CsvReader &csv)
   trunk.first_seen_s = csv.number(9, "first_seen");
   trunk.last_seen_s = csv.number(10, "last_seen");
   trunk.observations = csv.count(11, "views");
-  for (std::size_t i = 0; i < kCovariance.size(); ++i) {
-    const auto [row, column] = kCovariance[i];
+  for (std::size_t i = 0; i < kRowOf.size(); ++i) {
+    const int row = kRowOf[i], column = kColumnOf[i];
     trunk.covariance(row, column) = trunk.covariance(column, row) = csv.number(kFirstCovariance + i, "covariance");
   }
   const Eigen::Matrix2d P = trunk.covarianceXy();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/verdict.h"
+#include "output/summary_json.h"
 
 #include "geometry/median.h"
 #include "output/figure.h"

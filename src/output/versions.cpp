@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "output/versions.h"
+#include "output/summary_json.h"
 
 #include "bole_commit.h"
 

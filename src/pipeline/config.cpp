@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include <bole/config.h>
 
-#include "input/suggestion.h"
+#include "input/user_text.h"
 #include "input/yaml_file.h"
 #include "pipeline/option_table.h"
 

@@ -2,7 +2,7 @@
 #include "pipeline/engine.h"
 
 #include "geometry/constants.h"
-#include "geometry/horizontal_view.h"
+#include "geometry/silhouette.h"
 #include "pipeline/scene_points.h"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 // Reports of past frames by the map at the end of the flight.
 #include "geometry/constants.h"
 #include "geometry/failure.h"
-#include "geometry/horizontal_view.h"
+#include "geometry/silhouette.h"
 #include "pipeline/engine.h"
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 #include "pipeline/motion_model.h"
 #include "pipeline/stage_options.h"
 #include <bole/report.h>
-#include <bole/world_reference.h>
+#include <bole/trunk_record.h>
 
 #include "motion/path_scale.h"
 #include "motion/point_motion.h"

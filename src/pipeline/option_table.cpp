@@ -1,27 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/option_table.h"
 
-#include <algorithm>
-#include <charconv>
-#include <cmath>
+#include "geometry/parse_number.h"
+
 #include <fmt/format.h>
 
 namespace bole
 {
 namespace
 {
-/// The whole of \p text as a number; no locale, no infinity.
 template <typename T> bool parse(const std::string &text, T &value)
 {
-  T read{};
-  const char *first = text.data(), *last = first + text.size();
-  if (first != last && *first == '+')
-    ++first;
-  const auto [end, error] = std::from_chars(first, last, read);
-  if (error != std::errc() || end != last || !std::isfinite(static_cast<double>(read)))
-    return false;
-  value = read;
-  return true;
+  const auto read = parseNumber<T>(text);
+  value = read.value_or(value);
+  return read.has_value();
 }
 
 std::string named(const OptionBound &bound)

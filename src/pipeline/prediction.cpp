@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/prediction.h"
 
-#include "geometry/horizontal_view.h"
+#include "geometry/silhouette.h"
 
 #include <algorithm>
 #include <cmath>

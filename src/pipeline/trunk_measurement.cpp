@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/trunk_measurement.h"
 
-#include "geometry/horizontal_view.h"
+#include "geometry/silhouette.h"
 
 #include <Eigen/LU>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/image_pyramid.h"
 
-#include "saliency/pyramid_loops.h"
+#include "saliency/saliency_loops.h"
 
 #include <algorithm>
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// An image at several sizes, with its gradient, for the search from coarse to fine.
+/// An image at several sizes, with its gradient, for the search from coarse to fine, and where its pixels come from.
 
 #include <bole/camera.h>
+#include <bole/pose.h>
 
+#include <Eigen/LU>
 #include <vector>
 #include <visp3/core/vpImage.h>
 
@@ -32,5 +34,20 @@ public:
 
 private:
   std::vector<PyramidLevel> m_levels;
+};
+
+/// Homogeneous pixel of the previous image: H u + rho e, H = K pRc K^-1, e = K pt.
+struct PlaneWarp
+{
+  Eigen::Matrix3f H;
+  Eigen::Vector3f e;
+
+  PlaneWarp(const PinholeCamera &camera, const Pose &pMc)
+  {
+    Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
+    K << camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1;
+    H = (K * pMc.R * K.inverse()).cast<float>();
+    e = (K * pMc.t).cast<float>();
+  }
 };
 } // namespace bole

@@ -2,8 +2,8 @@
 #include "saliency/inverse_depth_evidence.h"
 
 #include "geometry/median.h"
-#include "saliency/evidence_loops.h"
-#include "saliency/plane_warp.h"
+#include "saliency/image_pyramid.h"
+#include "saliency/saliency_loops.h"
 
 #include <algorithm>
 #include <cmath>

@@ -47,7 +47,6 @@ public:
   vpImage<float> logOddsNear() const;
   /// log odds before any evidence.
   float priorLogOdds() const { return m_prior_log_odds; }
-  const std::vector<float> &inverseDepths() const { return m_rho; }
 
 private:
   void compare(const PyramidLevel &older, const PyramidLevel &current, const Pose &oMc);

@@ -2,8 +2,8 @@
 #include "saliency/rotation_em.h"
 
 #include "geometry/so3.h"
-#include "saliency/plane_warp.h"
-#include "saliency/rotation_loops.h"
+#include "saliency/image_pyramid.h"
+#include "saliency/saliency_loops.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/saliency.h"
-#include "geometry/names.h"
 #include "geometry/so3.h"
-#include "saliency/label_loops.h"
+#include "saliency/saliency_loops.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,11 +78,6 @@ vpImage<float> windowMean(const vpImage<float> &image, int window)
 
 double meanDeviation(const Eigen::Matrix3d &covariance) { return std::sqrt(std::max(covariance.trace(), 0.0) / 3); }
 } // namespace
-
-const char *toString(SaliencyStatus status)
-{
-  return nameOf(status, {"first frame", "with gyro", "without gyro", "no texture", "stale", "not converged"});
-}
 
 SaliencyEstimator::SaliencyEstimator(const PinholeCamera &camera, const SaliencyOptions &options)
     : m_camera(camera),

@@ -44,7 +44,6 @@ enum class SaliencyStatus
   stale,        ///< the same image again: labels of the frame before, motion kept for the next frame
   not_converged ///< the images did not agree on a rotation: the prior's is returned
 };
-const char *toString(SaliencyStatus status);
 
 struct Saliency
 {

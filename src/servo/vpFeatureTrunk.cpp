@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <visp3/core/vpDisplay.h>
 #include <visp3/core/vpException.h>
-#include <visp3/core/vpMath.h>
 
 namespace
 {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tracking/borders.h"
 
 #include "tracking/border_energy.h"
 

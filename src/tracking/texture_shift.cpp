@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "tracking/texture_shift.h"
 
-#include "tracking/patch_loops.h"
+#include "tracking/tracking_loops.h"
 
 #include <Eigen/Dense>
 

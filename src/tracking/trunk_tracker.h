@@ -9,7 +9,7 @@
 /// Status, not exceptions: what happens to a trunk in a frame is an outcome. NaN never becomes `tracked`.
 
 #include "tracking/border_energy.h"
-#include "tracking/border_scan.h"
+#include "tracking/border_profile.h"
 
 #include <optional>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/drone_clock.h"
-#include "ardrone/video_stamps.h"
+#include "emulator/wire_format.h"
 
 #include <gtest/gtest.h>
 #include <random>

@@ -3,7 +3,7 @@
 #include "support/files.h"
 
 #include "ardrone/flight_folder.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include <bole/ardrone_source.h>
 
 #include <gtest/gtest.h>

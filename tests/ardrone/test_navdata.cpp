@@ -4,8 +4,8 @@
 
 #include "ardrone/address.h"
 #include "ardrone/at_command.h"
-#include "ardrone/navdata.h"
 #include "ardrone/navdata_odometry.h"
+#include "emulator/wire_format.h"
 #include "geometry/so3.h"
 
 #include <gmock/gmock.h>
@@ -61,8 +61,12 @@ TEST(NavdataOdometry, TurningTheDroneAboutEachAxisTurnsTheBodyTheRightWay)
 
 TEST(NavdataOdometry, AttitudeComesBackFromItsAngles)
 {
-  for (const Eigen::Vector3d &angles : {Eigen::Vector3d(0.1, -0.4, 2.9), Eigen::Vector3d(-1.2, 0.7, -3.0)})
-    EXPECT_LT((attitudeToDrone(attitudeFromDrone(angles.x(), angles.y(), angles.z())) - angles).norm(), 1e-12);
+  for (const Eigen::Vector3d &angles : {Eigen::Vector3d(0.1, -0.4, 2.9), Eigen::Vector3d(-1.2, 0.7, -3.0)}) {
+    const Eigen::Matrix3d wRb = attitudeFromDrone(angles.x(), angles.y(), angles.z());
+    const Eigen::Vector3d back(std::atan2(wRb(2, 1), wRb(2, 2)), std::asin(wRb(2, 0)),
+                               -std::atan2(wRb(1, 0), wRb(0, 0)));
+    EXPECT_LT((back - angles).norm(), 1e-12);
+  }
 }
 
 TEST(NavdataOdometry, GyroAndAttitudeAgreeAboutEachAxis)
@@ -199,7 +203,7 @@ TEST(Navdata, ReadsEveryOptionOfAPacketThatADroneSent)
   if (bytes.empty())
     GTEST_SKIP() << "the captured packet is not here";
   Navdata navdata;
-  ASSERT_EQ(parseNavdata(bytes.data(), bytes.size(), navdata), NavdataError::none);
+  ASSERT_TRUE(parseNavdata(bytes.data(), bytes.size(), navdata));
   EXPECT_EQ(navdata.sequence, 300711u);
   EXPECT_EQ(navdata.state, 0x4f8000d0u);
   EXPECT_TRUE(navdata.has(DroneState::command_watchdog));
@@ -223,7 +227,7 @@ TEST(Navdata, LeavesOutWhatNoDroneCanDo)
   const auto readBack = [](const Navdata &sent) {
     const auto bytes = encodeNavdata(sent);
     Navdata read;
-    EXPECT_EQ(parseNavdata(bytes.data(), bytes.size(), read), NavdataError::none);
+    EXPECT_TRUE(parseNavdata(bytes.data(), bytes.size(), read));
     return read;
   };
   Navdata sent = example();
@@ -244,7 +248,7 @@ TEST(Navdata, ReadsBackWhatItEncodes)
   const Navdata sent = example();
   const auto bytes = encodeNavdata(sent);
   Navdata read;
-  ASSERT_EQ(parseNavdata(bytes.data(), bytes.size(), read), NavdataError::none);
+  ASSERT_TRUE(parseNavdata(bytes.data(), bytes.size(), read));
   EXPECT_EQ(read.state, sent.state);
   EXPECT_EQ(read.sequence, sent.sequence);
   EXPECT_TRUE(read.vision_defined);
@@ -265,10 +269,10 @@ TEST(Navdata, RefusesAPacketWithAnyByteChanged)
     for (const int change : {1, 0x40}) {
       auto bytes = good;
       bytes[at] = static_cast<std::uint8_t>(bytes[at] + change);
-      EXPECT_NE(parseNavdata(bytes.data(), bytes.size(), navdata), NavdataError::none) << "byte " << at;
+      EXPECT_FALSE(parseNavdata(bytes.data(), bytes.size(), navdata)) << "byte " << at;
     }
   for (std::size_t size = 0; size < good.size(); ++size)
-    EXPECT_NE(parseNavdata(good.data(), size, navdata), NavdataError::none) << "cut at " << size;
+    EXPECT_FALSE(parseNavdata(good.data(), size, navdata)) << "cut at " << size;
 }
 
 TEST(AtCommand, WritesFloatsAsTheDeveloperGuideDoes)
@@ -276,7 +280,6 @@ TEST(AtCommand, WritesFloatsAsTheDeveloperGuideDoes)
   EXPECT_EQ(atFloat(-0.8f), "-1085485875");
   EXPECT_EQ(atFloat(0), "0");
   EXPECT_EQ(atFloat(0.75f), "1061158912");
-  EXPECT_FLOAT_EQ(atFloatValue("-1085485875"), -0.8f);
 }
 
 TEST(AtCommand, ReadsSeveralCommandsOfADatagram)

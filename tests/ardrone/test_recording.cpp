@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/bytes.h"
-#include "ardrone/recording.h"
+#include "ardrone/flight_folder.h"
+#include "emulator/recording_reader.h"
 #include "support/files.h"
 
 #include "flight.h"
@@ -132,7 +133,7 @@ TEST(Recording, ARecordedFlightIsServedAgain)
     {
       RecordingWriter writer(folder.path());
       const auto emulator = test::emulate(generation, 40);
-      DroneLink link(ArDroneAddress::parse(emulator->address()), {},
+      DroneLink link(ArDroneAddress::parse(emulator->address()),
                      [&](LinkChannel channel, std::int64_t arrival_ns, const std::uint8_t *data, std::size_t size) {
                        writer.write(channel, arrival_ns, data, size);
                      });

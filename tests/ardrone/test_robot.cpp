@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <limits>
 #include <visp3/core/vpException.h>
 #include <visp3/robot/vpRobotException.h>
@@ -40,6 +41,15 @@ struct Flying
     return reference && (std::stol(reference->arguments[0]) & 1 << 9) != 0;
   }
 };
+
+/// The inverse of atFloat().
+float atFloatValue(const std::string &text)
+{
+  const std::int32_t bits = std::stoi(text);
+  float value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
 
 vpRobotArDrone::Options patient()
 {

@@ -4,7 +4,7 @@
 /// src/doc/points.md.
 
 #include "geometry/median.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_motion.h"
 #include "motion/point_odometry.h"

@@ -4,9 +4,9 @@
 #include "ardrone/files.h"
 
 #include "ardrone/at_command.h"
-#include "ardrone/navdata.h"
+#include "ardrone/flight_folder.h"
+#include "ardrone/navdata_odometry.h"
 #include "ardrone/pave.h"
-#include "ardrone/recording.h"
 #include "ardrone/uvlc.h"
 #include "emulator/emulator_packets.h"
 #include "emulator/uvlc_encoder.h"

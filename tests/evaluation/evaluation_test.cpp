@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/files.h"
 
-#include "evaluation/assignment.h"
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
-#include "evaluation/visibility.h"
 #include "geometry/so3.h"
-#include "input/asl_source.h"
-#include "output/trajectory_writer.h"
+#include "input/recorded_source.h"
+#include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 
@@ -405,7 +403,7 @@ TEST_F(RunAgainst, TheClockOfALiveRunIsFoundByItsMotionWhenAsked)
   late.erase(late.begin(), late.begin() + 3);
   writeTrajectory(run + "/trajectory.tum", late);
   EXPECT_THROW(evaluate(run, kFlight), vpException);
-  const Evaluation evaluation = evaluate(run, kFlight, {true});
+  const Evaluation evaluation = evaluate(run, kFlight, true);
   ASSERT_TRUE(evaluation.time_shift_s);
   EXPECT_NEAR(*evaluation.time_shift_s, -100.037, 0.0011);
   EXPECT_EQ(evaluation.smoothed.absolute[0].poses, late.size());

@@ -2,7 +2,7 @@
 // Any bytes as an image: a status with a reason, or an image of the size that was asked for. Never an exception.
 #include "file_of.h"
 
-#include "input/image_file.h"
+#include "input/frame_builder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size)
 {

@@ -3,6 +3,7 @@
 // read must be read again from its own encoding, and the odometry must stay finite.
 #include "ardrone/drone_clock.h"
 #include "ardrone/navdata_odometry.h"
+#include "emulator/wire_format.h"
 
 #include <cstdlib>
 #include <numeric>
@@ -13,11 +14,10 @@ namespace
 void use(const std::vector<std::uint8_t> &bytes)
 {
   bole::Navdata navdata, again;
-  if (bole::parseNavdata(bytes.data(), bytes.size(), navdata) != bole::NavdataError::none)
+  if (!bole::parseNavdata(bytes.data(), bytes.size(), navdata))
     return;
   const auto encoded = bole::encodeNavdata(navdata);
-  if (bole::parseNavdata(encoded.data(), encoded.size(), again) != bole::NavdataError::none ||
-      again.time != navdata.time)
+  if (!bole::parseNavdata(encoded.data(), encoded.size(), again) || again.time != navdata.time)
     std::abort();
   static bole::NavdataOdometry odometry;
   static bole::ClockUnwrapper clock(bole::kNavdataTimePeriod_us);

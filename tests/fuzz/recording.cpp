@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Any bytes as a recording; and as commands, the other text that comes from outside.
-#include "ardrone/recording.h"
-#include "ardrone/at_command.h"
+#include "emulator/recording_reader.h"
+#include "emulator/wire_format.h"
 
 #include <cstdlib>
 #include <string>

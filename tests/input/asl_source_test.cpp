@@ -2,8 +2,8 @@
 #include "flight_folder.h"
 #include "support/messages.h"
 
-#include "input/asl_source.h"
-#include "input/image_file.h"
+#include "input/frame_builder.h"
+#include "input/recorded_source.h"
 
 #include <gmock/gmock.h>
 

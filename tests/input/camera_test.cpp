@@ -3,7 +3,7 @@
 #include "support/messages.h"
 
 #include "input/rectifier.h"
-#include "input/sensor_yaml.h"
+#include "input/yaml_file.h"
 #include <bole/open_source.h>
 
 #include <cmath>

@@ -2,8 +2,8 @@
 #include "support/messages.h"
 
 #include "input/camera_plausibility.h"
+#include "input/frame_builder.h"
 #include "input/frame_check.h"
-#include "input/frame_health.h"
 
 #include <gmock/gmock.h>
 
@@ -131,7 +131,7 @@ std::vector<double> gapsOf(const std::vector<double> &intervals_s, FrameStatus s
 {
   PinholeCamera camera;
   camera.fx = camera.fy = 50;
-  FrameHealth health(camera, Pose());
+  FrameJudge health(camera, Pose());
   std::vector<double> gaps;
   double time_s = 7;
   for (std::size_t i = 0; i <= intervals_s.size(); ++i) {
@@ -154,7 +154,7 @@ std::vector<double> gapsOf(const std::vector<double> &intervals_s, FrameStatus s
 std::vector<double> steady(std::size_t count, double interval_s) { return std::vector<double>(count, interval_s); }
 } // namespace
 
-TEST(FrameHealth, TellsOfATimeWithoutAPicture)
+TEST(FrameJudge, TellsOfATimeWithoutAPicture)
 {
   std::vector<double> intervals = steady(40, 0.1);
   intervals[20] = 2.1;
@@ -163,21 +163,21 @@ TEST(FrameHealth, TellsOfATimeWithoutAPicture)
   EXPECT_NEAR(gaps[0], 2.1, 1e-9);
 }
 
-TEST(FrameHealth, APauseAfterEachBurstIsAGap)
+TEST(FrameJudge, APauseAfterEachBurstIsAGap)
 {
   std::vector<double> intervals = steady(60, 0.1);
   intervals[20] = intervals[30] = intervals[40] = intervals[50] = 1;
   EXPECT_EQ(gapsOf(intervals).size(), 4u);
 }
 
-TEST(FrameHealth, AGapThatTheSourceFillsWithMissingFramesIsNoneOnceMore)
+TEST(FrameJudge, AGapThatTheSourceFillsWithMissingFramesIsNoneOnceMore)
 {
   std::vector<double> intervals = steady(40, 0.1);
   intervals[20] = 2.1;
   EXPECT_TRUE(gapsOf(intervals, FrameStatus::missing).empty());
 }
 
-TEST(FrameHealth, ACameraOfAnyRateThatVariesHasNoGap)
+TEST(FrameJudge, ACameraOfAnyRateThatVariesHasNoGap)
 {
   std::mt19937 random(1);
   for (const double usual_s : {0.01, 0.033, 0.1, 0.4, 1.0, 5.0}) {
@@ -188,7 +188,7 @@ TEST(FrameHealth, ACameraOfAnyRateThatVariesHasNoGap)
   }
 }
 
-TEST(FrameHealth, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
+TEST(FrameJudge, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
 {
   std::vector<double> intervals = steady(20, 0.1);
   const std::vector<double> slow = steady(100, 0.4);
@@ -196,7 +196,7 @@ TEST(FrameHealth, ACameraThatGoesOnAtAnotherRateHasNoGapAtFourFrames)
   EXPECT_TRUE(gapsOf(intervals).empty());
 }
 
-TEST(FrameHealth, ACameraThatGoesOnVerySlowlyIsToldOnlyUntilThatIsUsual)
+TEST(FrameJudge, ACameraThatGoesOnVerySlowlyIsToldOnlyUntilThatIsUsual)
 {
   std::vector<double> intervals = steady(20, 0.1);
   const std::vector<double> slow = steady(100, 1);

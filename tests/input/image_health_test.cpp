@@ -2,8 +2,8 @@
 // Whether an image can be believed, before a trunk is looked for in it.
 #include "support/drawn_trunks.h"
 
+#include "input/frame_builder.h"
 #include "input/gyro_agreement.h"
-#include "input/image_file.h"
 #include "input/image_health.h"
 
 #include <algorithm>

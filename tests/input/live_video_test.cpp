@@ -4,7 +4,7 @@
 #include "support/messages.h"
 
 #include "input/live_video.h"
-#include "input/retry_pause.h"
+#include "input/steady_clock.h"
 #include "output/video_writer.h"
 
 #include <arpa/inet.h>

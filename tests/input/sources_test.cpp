@@ -3,9 +3,8 @@
 #include "support/messages.h"
 
 #include "geometry/so3.h"
-#include "input/sequence_source.h"
+#include "input/recorded_source.h"
 #include "input/trajectory.h"
-#include "input/video_source.h"
 #include <bole/open_source.h>
 
 #include <fstream>

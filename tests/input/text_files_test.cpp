@@ -2,11 +2,11 @@
 #include "flight_folder.h"
 #include "support/messages.h"
 
-#include "input/asl_source.h"
 #include "input/csv_reader.h"
+#include "input/recorded_source.h"
 #include "input/regular_file.h"
-#include "input/secrets.h"
 #include "input/trajectory.h"
+#include "input/user_text.h"
 #include "input/yaml_file.h"
 #include <bole/open_source.h>
 

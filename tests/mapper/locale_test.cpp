@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A host program whose decimals have a comma reads and writes the same bytes.
 #include "exchange/exchange.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "input/trajectory.h"
 #include "mbt/cao_reader.h"
 #include "mbt/trunk_settings.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 #include "support/files.h"
 #include "support/german_locale.h"

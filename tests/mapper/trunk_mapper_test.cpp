@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The mapper as a ViSP user calls it, on the demonstration flight.
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "map/trunk_map.h"
 #include "mbt/cao_reader.h"
 #include <bole/options.h>

@@ -2,7 +2,7 @@
 #include "rendered_walls.h"
 
 #include "geometry/so3.h"
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"

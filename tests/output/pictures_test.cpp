@@ -2,7 +2,7 @@
 // What people look at: the overlay, the videos, the map.
 #include "support/files.h"
 
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include "output/map_svg.h"
 #include "output/video_writer.h"
 #include <bole/open_source.h>
@@ -22,12 +22,15 @@ namespace fs = std::filesystem;
 
 const PinholeCamera kCamera;
 
-OverlayTrunk trunkAhead(TrunkStatus status = TrunkStatus::confirmed)
+TrunkInView trunkAhead(TrunkStatus status = TrunkStatus::confirmed)
 {
   const Trunk trunk{{3, 0}, std::log(0.3)};
-  OverlayTrunk ahead;
+  TrunkInView ahead;
   ahead.id = 4;
   ahead.status = status;
+  ahead.is_tracked = true;
+  ahead.tan_low = -0.3;
+  ahead.tan_high = 0.6;
   ahead.relative = relativeTrunk(Pose(forwardCamera().R, {0, 0, 1.2}), Pose(), trunk);
   return ahead;
 }
@@ -71,10 +74,10 @@ TEST(Overlay, DrawsTheBordersWhereTheCameraSeesThem)
 
 TEST(Overlay, TellsCandidatesFromConfirmedAndPredictedFromObserved)
 {
-  const auto count = [](TrunkStatus status, bool is_observed) {
+  const auto count = [](TrunkStatus status, bool is_tracked) {
     Overlay overlay;
     overlay.trunks = {trunkAhead(status)};
-    overlay.trunks[0].is_observed = is_observed;
+    overlay.trunks[0].is_tracked = is_tracked;
     return coloured(drawnWith(overlay), 4);
   };
   const int confirmed = count(TrunkStatus::confirmed, true), candidate = count(TrunkStatus::candidate, true);

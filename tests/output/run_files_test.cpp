@@ -4,8 +4,8 @@
 
 #include "geometry/so3.h"
 #include "input/atomic_file.h"
+#include "input/trajectory.h"
 #include "output/flight_trace.h"
-#include "output/trajectory_writer.h"
 #include "output/trunks_csv.h"
 
 #include <gmock/gmock.h>

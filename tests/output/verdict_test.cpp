@@ -2,7 +2,7 @@
 // What a run says of itself.
 #include "support/files.h"
 
-#include "output/verdict.h"
+#include "output/summary_json.h"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>

@@ -2,7 +2,7 @@
 // What the product is worth, as its users run it: maps and trajectories of flights whose truth is known.
 #include "run_bole.h"
 
-#include "output/trajectory_writer.h"
+#include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 #include <bole/open_source.h>

@@ -2,7 +2,7 @@
 // `bole follow` as its users run it: the demonstration flight in a model of its wood.
 #include "run_bole.h"
 
-#include "input/asl_source.h"
+#include "input/recorded_source.h"
 #include "mbt/cao_reader.h"
 #include <bole/open_source.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A run that is killed leaves either the old files or complete new ones.
-#include "input/video_source.h"
+#include "input/recorded_source.h"
 #include "run_bole.h"
 
 #include <gmock/gmock.h>

@@ -3,7 +3,7 @@
 /// \file
 /// A drone made of sockets: serves video, navdata and the command port as an AR.Drone does, faults included.
 
-#include <bole/ardrone_wire.h>
+#include "emulator/wire_format.h"
 #include <bole/frame.h>
 
 #include <cstdint>

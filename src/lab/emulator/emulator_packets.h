@@ -5,7 +5,6 @@
 
 #include "emulator/emulator.h"
 #include "support/h264.h"
-#include <bole/ardrone_wire.h>
 
 #include <bole/visp.h>
 #include <optional>

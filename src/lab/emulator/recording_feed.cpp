@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "emulator/emulator.h"
-#include <bole/ardrone_wire.h>
+#include "emulator/recording_reader.h"
 
 #include <algorithm>
 #include <utility>
