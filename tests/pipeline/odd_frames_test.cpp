@@ -61,17 +61,19 @@ std::vector<double> flown(bool offers_odd_frames)
     all.insert(all.end(), pose.t.data(), pose.t.data() + 3);
   };
   for (int k = 0; k < kFrames; ++k) {
-    if (offers_odd_frames && (k == 0 || k == kMiddle || k == kFrames - 1))
+    if (offers_odd_frames && (k == 0 || k == kMiddle || k == kFrames - 1)) {
       for (const Frame &odd : oddFrames(k))
         EXPECT_THROW(pipeline.process(odd), vpException) << k;
+    }
     const FrameReport report = pipeline.process(swaying(k));
     EXPECT_EQ(report.index, static_cast<std::size_t>(k));
     EXPECT_EQ(report.frame_status, FrameStatus::ok);
     add(report.wMb);
   }
-  if (offers_odd_frames)
+  if (offers_odd_frames) {
     for (const Frame &odd : oddFrames(kFrames))
       EXPECT_THROW(pipeline.process(odd), vpException);
+  }
   pipeline.finish();
   for (const StampedPose &pose : pipeline.smoothedTrajectory())
     add(pose.wMb);
