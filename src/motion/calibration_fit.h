@@ -49,33 +49,37 @@ inline double failingOf(const std::vector<double> &squares)
 template <int P> struct RowOf
 {
   using Unknowns = Eigen::Matrix<double, P, 1>;
-  template <int N>
-  RowOf(const Eigen::Matrix<double, N, P> &J, const Eigen::Matrix<double, N, 1> &r,
+  /// \p J: by the first Q unknowns; the others have no part in it.
+  template <int N, int Q>
+  RowOf(const Eigen::Matrix<double, N, Q> &J, const Eigen::Matrix<double, N, 1> &r,
         const Eigen::Matrix<double, N, N> &W, double overlap_)
-      : JWJ(J.transpose() * W * J), JWr(J.transpose() * W * r), rWr(r.dot(W * r)), size(N), overlap(overlap_)
+      : rWr(r.dot(W * r)), size(N), overlap(overlap_)
   {
+    JWJ.template topLeftCorner<Q, Q>() = J.transpose() * W * J;
+    JWr.template head<Q>() = J.transpose() * W * r;
   }
   /// Of what is left of it at \p x, as of three numbers.
   double squares(const Unknowns &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
 
-  Eigen::Matrix<double, P, P> JWJ;
-  Unknowns JWr;
+  Eigen::Matrix<double, P, P> JWJ = Eigen::Matrix<double, P, P>::Zero();
+  Unknowns JWr = Unknowns::Zero();
   double rWr = 0;
   int size = 3;
   double overlap = 1; ///< measurements that share what they measured
 };
 using Row = RowOf<3>;
 
-/// Robust solution; \p prior2: variance of each unknown.
+/// Robust solution; \p prior2: variance of each unknown about 0, \p at: what the unknowns count from in the rows.
 template <int P>
-FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter)
+FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter,
+                  const typename RowOf<P>::Unknowns &at = RowOf<P>::Unknowns::Zero())
 {
   FittedOf<P> fit;
   constexpr int kIterations = 6;
   std::vector<double> squares(rows.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Eigen::Matrix<double, P, P> H = prior2.cwiseInverse().asDiagonal();
-    typename RowOf<P>::Unknowns g = RowOf<P>::Unknowns::Zero();
+    typename RowOf<P>::Unknowns g = at.cwiseQuotient(prior2);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const RowOf<P> &row = rows[i];
       const double w = (iteration == 0 ? 1 : weightFor(squares[i])) / row.overlap;

@@ -75,6 +75,7 @@ void expectAsStated(const SensorCalibration &calibration)
   EXPECT_EQ(calibration.gyro_bias, Vector3d(0, 0, 0));
   EXPECT_EQ(calibration.bRo, Matrix3d(Matrix3d::Identity()));
   EXPECT_EQ(calibration.odometry_scale, 1);
+  EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
 }
 
 void turnRates(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
@@ -143,8 +144,36 @@ TEST(SensorCalibration, ATurnedBodyOfTheOdometryIsFound)
     const SensorCalibration calibration =
         fly(noisy(), [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
     EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.02) << turned.transpose();
+    EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0)) << turned.transpose();
     EXPECT_GT(calibration.odometry_rotation_sigma, 0) << turned.transpose();
   }
+}
+
+TEST(SensorCalibration, AnAccelerometerThatIsOffIsFoundAndTheOdometryStaysAsStated)
+{
+  for (const Vector3d &bias : {Vector3d(1, 0.5, 0), Vector3d(0, -1.2, 0), Vector3d(0, 0, 1), Vector3d(-2, 0, 0)}) {
+    MadeFlight flight = noisy();
+    flight.force_bias = bias;
+    const SensorCalibration calibration = fly(flight);
+    const CalibratedConstant *found = constant(calibration, "accelerometer_bias");
+    ASSERT_TRUE(found && found->used) << bias.transpose();
+    EXPECT_LT((calibration.force_bias - bias).norm(), 3 * std::sqrt(3.0) * found->sigma) << bias.transpose();
+    EXPECT_LT(found->sigma, 0.25) << bias.transpose();
+    EXPECT_EQ(calibration.bRo, Matrix3d(Matrix3d::Identity())) << bias.transpose();
+    EXPECT_TRUE(calibration.verdicts.empty()) << calibration.verdicts.front().text;
+  }
+}
+
+TEST(SensorCalibration, ATurnedOdometryAndAnAccelerometerThatIsOffAreToldApart)
+{
+  const Vector3d turned(0, 0.17, 0), bias(0, 1.2, 0);
+  MadeFlight flight = noisy();
+  flight.force_bias = bias;
+  const SensorCalibration calibration =
+      fly(flight, [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
+  EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.03);
+  EXPECT_LT((calibration.force_bias - bias).norm(), 0.4);
+  EXPECT_TRUE(calibration.verdicts.empty()) << calibration.verdicts.front().text;
 }
 
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
