@@ -67,7 +67,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
-    if (motion::parallaxOf(rays, start, sigma, motion::kKernel).score < 0)
+    if (motion::parallaxOf(rays, start, sigma).score < 0)
       start.direction = -start.direction;
     fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
   }
@@ -79,7 +79,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
   for (const JointFit &fit : fits) {
     const double angle = std::acos(std::clamp(std::abs(fit.motion.direction.dot(best->motion.direction)), 0.0, 1.0));
     const double excess = fit.cost * fit.sigma * fit.sigma / (best->sigma * best->sigma) - best->cost;
-    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
+    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma);
     ambiguous = ambiguous || (angle > 0.2 && excess < 4 && std::abs(parallax.score) > 3);
   }
   return *best;
@@ -109,7 +109,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma, options);
   bool ambiguous = false;
   JointFit fit = bestFit(rays, starts, prior, start_sigma, min_sigma, options, ambiguous);
-  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
+  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma);
   if (parallax.score < -3) {
     fit.motion.direction = -fit.motion.direction;
     parallax.score = -parallax.score;
@@ -135,8 +135,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   // parallax.
   const double shared = kSharedError * fit.sigma / std::max(flow, fit.sigma);
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
-  residualsOfMatches(rays.columns, motion::Epipolar(fit.motion).terms(fit.sigma, motion::kKernel),
-                     estimate.weights.data());
+  residualsOfMatches(rays.columns, motion::termsOf(fit.motion, fit.sigma), estimate.weights.data());
   for (double &weight : estimate.weights)
     weight = motion::weightOf(weight / fit.sigma, motion::kKernel);
   return estimate;
