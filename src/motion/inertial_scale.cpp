@@ -19,8 +19,6 @@ namespace
 constexpr int kAttitude = 0, kVelocity = 3, kMoved = 6, kGyro = 9, kForce = 12, kScale = 15;
 const Vector3d kGravityVector(0, 0, -kGravity); // [m/s^2]
 constexpr double kWindow_s = 0.25;              // least time between two comparisons
-constexpr double kOdometryWalk = 0.038;         // horizontal [m/sqrt(s)]
-constexpr double kHeightSigma = 0.03;           // of the difference of two heights by the odometry [m]
 constexpr double kGate = 30;                    // squared innovation over its variance: not of this model
 
 /// Two rows that span what is across \p unit.
@@ -166,7 +164,7 @@ void InertialScale::propagate(const Vector3d &rate, const Vector3d &force, doubl
   const double longer = std::max(1.0, accelerometer::kRate * dt);
   white(kAttitude, m_gyro.noise_density, longer);
   white(kVelocity, accelerometer::kNoise, longer);
-  white(kGyro, m_gyro.bias_walk, 1);
+  white(kGyro, kBiasWalk, 1);
   white(kForce, accelerometer::kBiasWalk, 1);
 
   const Vector3d acceleration = m_wRb * specific + kGravityVector;
@@ -216,8 +214,8 @@ void InertialScale::compareOdometry(const Pose &wMb, double duration)
   H.middleCols<3>(kMoved) = factor.asDiagonal();
   H.middleCols<3>(kAttitude) = m_wRb * skew(in_body);
   H.block<2, 1>(0, kScale) = scale * m_moved.head<2>();
-  const double walk2 = std::pow(kOdometryWalk, 2) * duration;
-  const Vector3d noise(walk2, walk2, std::pow(kHeightSigma, 2));
+  const double walk2 = std::pow(odometry::kWalk, 2) * duration;
+  const Vector3d noise(walk2, walk2, std::pow(odometry::kHeightSigma, 2));
   update(H, m_wRb * in_body - factor.cwiseProduct(m_moved), Matrix3d(noise.asDiagonal()));
 }
 

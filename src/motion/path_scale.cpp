@@ -142,7 +142,7 @@ public:
     white(kVelocity, force);
     white(kPlace, dt / std::sqrt(3.0) * force);
     white(kPlace, Vector3d(m_walk, m_walk, 0));
-    white(kGyro, Vector3d::Constant(m_gyro.bias_walk));
+    white(kGyro, Vector3d::Constant(kBiasWalk));
     white(kForce, Vector3d::Constant(accelerometer::kBiasWalk));
 
     m_place += dt * m_velocity + m_factor.cwiseProduct(0.5 * dt * dt * gravity + m_wRb * moved);

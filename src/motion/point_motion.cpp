@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_motion.h"
 
+#include "geometry/constants.h"
+#include "motion/accelerometer.h"
 #include "motion/row_shear.h"
 
 #include <algorithm>
@@ -83,10 +85,10 @@ RelativePosePrior PointMotion::expect(RelativeMotion &step, int frames_back, boo
     const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
     step.odometry = (wMa.inverse() * wMb).t;
     prior.translation = step.odometry;
-    const double walk2 = m_options.odometry_walk * m_options.odometry_walk * 1e-9 * double(b.stamp_ns - a.stamp_ns);
-    const double height2 = m_options.odometry_height_sigma * m_options.odometry_height_sigma;
+    const double walk2 = std::pow(odometry::kWalk, 2) * secondsOf(b.stamp_ns - a.stamp_ns);
+    const double height2 = std::pow(odometry::kHeightSigma, 2);
     const Eigen::Matrix3d world = Eigen::Vector3d(walk2, walk2, height2).asDiagonal();
-    const double relative = m_options.odometry_relative_sigma * step.odometry->norm();
+    const double relative = odometry::kRelativeSigma * step.odometry->norm();
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
   }
@@ -166,7 +168,7 @@ void PointMotion::learn(const std::vector<RelativeMotion> &motions)
   if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns)
     return;
   m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
-                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(), m_options.gyro);
+                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose());
   m_bias_until_ns = step.b_ns;
 }
 } // namespace bole

@@ -39,13 +39,6 @@ struct PointMotionOptions
   std::vector<int> frames_back{1, 3}; ///< each 1 to PointTracker::kHistory - 1
   int every = 1; ///< good frames from one whose motions are told to the next, 1 to 20: those of frames between are no
                  ///< news, as the same errors of the same points are in them
-  /// The pose filter's errors. Measured on the rendered flights (120 frames of 0.1 s, three seeds):
-  /// in the horizontal plane they walk, 11 mm a frame; the height has white noise, 27 mm between
-  /// any two frames; and the same holds of the attitude (roll, pitch 0.006 rad between any two
-  /// frames, white, yaw 0.0065 rad and walking).
-  double odometry_walk = 0.036;          ///< horizontal [m/sqrt(s)], > 0
-  double odometry_height_sigma = 0.027;  ///< of the difference of two heights [m], > 0
-  double odometry_relative_sigma = 0.03; ///< error in proportion to the path (scale, heading), > 0
 };
 
 /// Motion of the camera from frame a (\p frames_back before) to the current frame b.

@@ -37,11 +37,12 @@ constexpr double kPointsSigma = 7e-4; ///< of a rotation by points beside their 
 constexpr std::size_t kLeastMotions = 15;
 
 /// The bias of a gyro that is \p late_s, by the rotations of the points.
-Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late_s, double overlap, double scatter)
+Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
+               double scatter)
 {
   std::vector<Row> rows;
   for (const Turn &turn : turns) {
-    const auto turned = path.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
+    const auto turned = turnBetween(samples, turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
     if (turned) // the rates less the bias: what is left of it turns the other way
       rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
                         logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
@@ -149,7 +150,7 @@ private:
   void addDirections(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
   void addGravity(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
   template <int P>
-  void addTurns(const std::vector<Frame> &frames, const GyroPath &path, double late_s,
+  void addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
                 std::vector<RowOf<P>> &rows) const;
 
   void addConstant(const char *name, double value, double sigma, bool used, std::string text)
@@ -173,31 +174,33 @@ void Estimation::calibrateGyro()
   Vector3d bias = Vector3d::Zero();
   Minimum late;
   Fitted fit;
-  std::vector<Turn> turns;                  // that every offset can be tried on
-  for (int round = 0; round < 2; ++round) { // the second one with the bias taken off exactly
-    const GyroPath path(m_samples, bias);
+  std::vector<GyroSample> samples = m_samples; // less the bias
+  std::vector<Turn> turns;                     // that every offset can be tried on
+  for (int round = 0; round < 2; ++round) {    // the second one with the bias taken off exactly
     turns.clear();
     for (const Turn &turn : m_turns)
-      if (path.between(turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
+      if (turnBetween(samples, turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
         turns.push_back(turn);
     if (turns.size() < kLeastMotions)
       return;
     double best = std::numeric_limits<double>::max(), scatter = 1;
     for (int k = -kLateSteps; k <= kLateSteps; ++k) { // the scatter of the best offset is that of the noise
-      const Fitted tried = fitBias(path, turns, kLateStep_s * k, m_overlap, 1);
+      const Fitted tried = fitBias(samples, turns, kLateStep_s * k, m_overlap, 1);
       if (tried.cost < best) {
         best = tried.cost;
         scatter = 0;
-        fit = fitBias(path, turns, kLateStep_s * k, m_overlap, scatter);
+        fit = fitBias(samples, turns, kLateStep_s * k, m_overlap, scatter);
         scatter = std::sqrt(fit.covariance.trace() / tried.covariance.trace());
         scatter *= scatter;
       }
     }
-    late = minimiseLate([&](double late_s) { return fitBias(path, turns, late_s, m_overlap, scatter).cost; });
-    fit = fitBias(path, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
+    late = minimiseLate([&](double late_s) { return fitBias(samples, turns, late_s, m_overlap, scatter).cost; });
+    fit = fitBias(samples, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
     bias += fit.value;
+    for (GyroSample &sample : samples)
+      sample.rate -= fit.value;
   }
-  m_result.verdicts = judgeCamera(GyroPath(m_samples, bias), turns, m_bMc.R, m_overlap);
+  m_result.verdicts = judgeCamera(samples, turns, m_bMc.R, m_overlap);
   for (SensorVerdict &verdict : m_result.verdicts)
     verdict.since_s = secondsOf(m_frames.front().stamp_ns);
   m_is_gyro_explained = fit.failing < kMostFailing;
@@ -265,7 +268,7 @@ void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Attitu
 
 /// Rotations over half a second: bRo carries those of the odometry to those of the gyro.
 template <int P>
-void Estimation::addTurns(const std::vector<Frame> &frames, const GyroPath &path, double late_s,
+void Estimation::addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
                           std::vector<RowOf<P>> &rows) const
 {
   constexpr std::int64_t kApart_ns = 500'000'000;
@@ -278,7 +281,7 @@ void Estimation::addTurns(const std::vector<Frame> &frames, const GyroPath &path
       return;
     if (!frames[a].wMb_odometry || !frames[b].wMb_odometry)
       continue;
-    const auto turned = path.between(frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
+    const auto turned = turnBetween(samples, frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
     if (!turned)
       continue;
     const Vector3d by_gyro = logSo3(*turned);
@@ -307,7 +310,7 @@ std::optional<Estimation::Attitude> Estimation::fitAttitude(double mount_sigma, 
     if (rows.size() < kLeastMotions)
       return std::nullopt;
     addGravity(frames, rows);
-    addTurns(frames, GyroPath(samplesOf(frames), Vector3d::Zero()), 0, rows);
+    addTurns(frames, samplesOf(frames), 0, rows);
     attitude.fit = solve(rows, prior2, scatter, attitude.value());
     attitude.bRo = expSo3(attitude.fit.value.head<3>()) * attitude.bRo;
     attitude.force_bias += attitude.fit.value.tail<3>();
@@ -363,16 +366,16 @@ void Estimation::calibrateOdometryClock()
   SensorCalibration tried = m_result;
   tried.odometry_late_s = 0;
   const std::vector<Frame> frames = corrected(m_frames, tried);
-  const GyroPath path(samplesOf(frames), Vector3d::Zero());
+  const std::vector<GyroSample> samples = samplesOf(frames);
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)
-    if (path.between(frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
+    if (turnBetween(samples, frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
       usable.push_back(frame);
   if (usable.size() < 2 * kLeastMotions)
     return;
   const auto fitAt = [&](double late_s, double scatter) {
     std::vector<Row> rows;
-    addTurns(usable, path, late_s, rows);
+    addTurns(usable, samples, late_s, rows);
     return solve(rows, kWideMount * kWideMount, scatter); // whatever its body stands like
   };
   double best = std::numeric_limits<double>::max(), scatter = 1;

@@ -210,26 +210,15 @@ void SensorMonitor::rejectOutvoted(const Frame &frame)
 
 void SensorMonitor::collect(const Frame &frame)
 {
-  for (const GyroSample &sample : frame.gyro)
-    m_samples.push_back(sample);
+  m_samples.insert(m_samples.end(), frame.gyro.begin(), frame.gyro.end());
   const std::int64_t oldest = frame.stamp_ns - nanoseconds(kMemory_s);
-  while (!m_samples.empty() && m_samples.front().stamp_ns < oldest)
-    m_samples.pop_front();
+  m_samples.erase(m_samples.begin(),
+                  std::find_if(m_samples.begin(), m_samples.end(),
+                               [oldest](const GyroSample &sample) { return sample.stamp_ns >= oldest; }));
   while (!m_comparisons.empty() && m_comparisons.front().a_ns < oldest)
     m_comparisons.pop_front();
   while (!m_steps.empty() && m_steps.front().stamp_ns < oldest)
     m_steps.pop_front();
-}
-
-std::optional<Matrix3d> SensorMonitor::gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const
-{
-  constexpr std::int64_t kSlack_ns = 60'000'000; // the ends may lie between two samples
-  if (m_samples.empty() || m_samples.front().stamp_ns > from_ns + kSlack_ns ||
-      m_samples.back().stamp_ns < to_ns - kSlack_ns)
-    return std::nullopt;
-  const std::vector<GyroSample> samples(m_samples.begin(), m_samples.end());
-  const GyroRotation turned = integrateGyro(samples, from_ns, to_ns);
-  return turned.complete ? std::optional<Matrix3d>(turned.R) : std::nullopt;
 }
 
 /// Mean of the gyro's samples around a time.
@@ -329,7 +318,7 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
   const Matrix3d one = Matrix3d::Identity();
   const double bias2 = std::pow(kBiasSigma * dt, 2) + std::pow(8e-4, 2) * dt;
   const double turn2 = std::pow(odometry::kTurnSigma, 2);
-  now.gyro = gyroBetween(now.a_ns, now.b_ns);
+  now.gyro = turnBetween(m_samples, now.a_ns, now.b_ns);
   const auto a = std::find_if(m_steps.begin(), m_steps.end(), [&](const Step &s) { return s.stamp_ns == now.a_ns; });
   if (frame.wMb_odometry && a != m_steps.end()) {
     now.odometry = Matrix3d(a->wMb.R.transpose() * frame.wMb_odometry->R);
@@ -416,7 +405,7 @@ std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) c
   Matrix3d information = 1e-6 * Matrix3d::Identity();
   Vector3d sum = Vector3d::Zero();
   for (const Comparison &c : m_comparisons) {
-    const auto turned = gyroBetween(c.a_ns + offset, c.b_ns + offset);
+    const auto turned = turnBetween(m_samples, c.a_ns + offset, c.b_ns + offset);
     if (!turned || c.gyro_points <= 0.5 * kLimitPoints)
       continue;
     const double dt = secondsOf(c.b_ns - c.a_ns);

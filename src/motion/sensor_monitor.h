@@ -86,11 +86,17 @@ private:
     Eigen::Vector3d rate_a = Eigen::Vector3d::Zero(),
                     rate_b = Eigen::Vector3d::Zero(); ///< at both ends, as seen from b [rad/s]
   };
+  struct Velocity
+  {
+    Eigen::Vector3d mean; ///< in the world [m/s]
+    std::int64_t until_ns;
+    double duration; ///< that it was measured over [s]
+  };
   struct Step ///< of the odometry from frame to frame
   {
     std::int64_t stamp_ns = 0;
     Pose wMb;
-    std::optional<Eigen::Vector3d> velocity;     ///< to it, in the world [m/s]; none of the first and of a jump
+    std::optional<Velocity> believed;            ///< the last one up to here that is no jump
     std::optional<Eigen::Vector2d> acceleration; ///< to it, horizontal [m/s^2]
     double scatter = 0; ///< squared change of the acceleration over what a filter that walks and a flight explain
     double parallax_px = 0;
@@ -133,7 +139,6 @@ private:
   void diagnoseGyro();
   std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
   Eigen::Vector3d rateAt(std::int64_t stamp_ns) const;
-  std::optional<Eigen::Matrix3d> gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const;
   enum class Lasts
   {
     no,          ///< a moment
@@ -147,7 +152,7 @@ private:
   static constexpr double kSilence_s = 0.5; ///< without a sample from a sensor that had some
 
   Pose m_bMc;
-  std::deque<GyroSample> m_samples; ///< of the last seconds
+  std::vector<GyroSample> m_samples; ///< of the last seconds
   std::deque<Comparison> m_comparisons;
   std::deque<Step> m_steps;
   std::optional<std::int64_t> m_last_ns;               ///< stamp of the frame processed last

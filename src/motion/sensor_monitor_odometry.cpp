@@ -17,9 +17,10 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr double kJump = 0.3;        // of the odometry between two frames beyond what its velocity explains [m]
-constexpr double kNoiseFactor = 2.5; // scatter of the odometry over what odometry::kWalk says
-constexpr double kAskew = 0.1;       // of a constant rotation between odometry and camera [rad]
+constexpr double kJump = 0.3;            // of the odometry between two frames beyond what its velocity explains [m]
+constexpr double kMostAcceleration = 10; // [m/s^2]
+constexpr double kNoiseFactor = 2.5;     // scatter of the odometry over what odometry::kWalk says
+constexpr double kAskew = 0.1;           // of a constant rotation between odometry and camera [rad]
 } // namespace
 
 /// Checks the steps of the odometry from frame to frame.
@@ -47,27 +48,29 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
   if (!m_steps.empty()) {
     const Step &before = m_steps.back();
     const double dt = std::max(1e-3, secondsOf(step.stamp_ns - before.stamp_ns));
-    step.velocity = (step.wMb.t - before.wMb.t) / dt;
+    const Vector3d moved = step.wMb.t - before.wMb.t;
     step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
     is_wrong |= step.is_held || before.is_held; // the step after a pause makes up for it
-    if (before.velocity) {
-      const Eigen::Vector2d change = ((*step.velocity - *before.velocity) * dt).head<2>();
-      step.acceleration = change / (dt * dt);
-      if (before.acceleration) {
+    step.believed = before.believed;
+    if (before.believed) { // neither side of a jump tells a velocity: what follows is judged by that before it
+      const Velocity &expected = *before.believed;
+      const Eigen::Vector2d change = (moved - dt * expected.mean).head<2>();
+      const double unknown = std::max(1.0, dt / expected.duration), // of a velocity over a moment
+          age = secondsOf(step.stamp_ns - expected.until_ns);
+      step.is_jump = change.norm() > kJump * unknown + kMostAcceleration * dt * age;
+      if (!step.is_jump)
+        step.acceleration = change / (dt * dt);
+      if (before.acceleration && step.acceleration) {
         constexpr double kJerk = 20; // that a small drone reaches for long [m/s^3]
-        const double expected = 6 * std::pow(odometry::kWalk, 2) * dt + std::pow(kJerk * dt * dt * dt, 2);
-        step.scatter = 0.5 * (change - dt * dt * *before.acceleration).squaredNorm() / expected;
+        const double walked = 6 * std::pow(odometry::kWalk, 2) * dt + std::pow(kJerk * dt * dt * dt, 2);
+        step.scatter = 0.5 * (change - dt * dt * *before.acceleration).squaredNorm() / walked;
       }
-      const double extent = change.norm();
-      if (extent > kJump + 10 * dt * dt) {
-        is_wrong = true;
-        step.velocity.reset(); // neither side of a jump tells it: the next step is not judged, the one after it is
-        step.acceleration.reset();
-        step.scatter = 0;
-        step.is_jump = true;
-        raiseJump(extent, time_s);
-      }
+      is_wrong |= step.is_jump;
+      if (step.is_jump)
+        raiseJump(change.norm(), time_s);
     }
+    if (!step.is_jump && !step.is_held)
+      step.believed = Velocity{moved / dt, step.stamp_ns, dt};
   }
   m_steps.push_back(step);
   checkStandingStill(time_s);
@@ -179,7 +182,7 @@ void SensorMonitor::checkGravity()
   Trajectory poses;
   for (const Step &step : m_steps)
     poses.push_back({step.stamp_ns, step.wMb});
-  const auto gravity = compareGravity(poses, {m_samples.begin(), m_samples.end()});
+  const auto gravity = compareGravity(poses, m_samples);
   if (!gravity)
     return;
   const double off = gravity->off.norm(), limit = kLimit + 2 * std::min(kMostSigma, gravity->sigma);

@@ -40,8 +40,7 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_use_points(options.flow.use_points),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
-      m_path_scale(options.points.gyro,
-                   options.flow.use_points ? PathScale::kWalkAmongTrees : options.points.odometry_walk),
+      m_path_scale(options.points.gyro, options.flow.use_points ? PathScale::kWalkAmongTrees : odometry::kWalk),
       m_inertial(bMc, options.points.gyro),
       m_monitor(bMc)
 {

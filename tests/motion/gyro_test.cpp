@@ -79,7 +79,7 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
     const Eigen::Matrix3d S = prior.covariance(),
                           gain = S * (S + sigma * sigma * Eigen::Matrix3d::Identity()).inverse();
     const Eigen::Matrix3d fused = prior.R * expSo3(gain * logSo3(prior.R.transpose() * seen));
-    bias = refineBias(bias, prior, fused, S - gain * S, options);
+    bias = refineBias(bias, prior, fused, S - gain * S);
   }
   const Eigen::Vector3d error = bias.mean - truth;
   EXPECT_LT(error.norm(), 0.002);

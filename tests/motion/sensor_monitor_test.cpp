@@ -171,6 +171,18 @@ TEST(SensorMonitor, OneOddStampCostsTheOdometryNothingFromTheSecondFrameOn)
   }
 }
 
+TEST(SensorMonitor, APoseThatIsOffAndComesBackIsTwoJumpsOfWhichNoneIsBelieved)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 60; ++i) {
+    Frame frame = flight.frame(i);
+    frame.wMb_odometry->t.y() += i >= 40 && i < 42 ? 1 : 0;
+    monitor.process(frame, flight.seen(i));
+    EXPECT_EQ(monitor.trustsNow(Sensor::odometry), i != 40 && i != 42) << i;
+  }
+}
+
 TEST(SensorMonitor, EachFaultIsNamedWithItsSensor)
 {
   for (const Fault &fault : faults()) {
