@@ -42,7 +42,7 @@ TEST(LucasKanade, FindsWhatOpenCvFinds)
     if (roundness(a.front(), from[i]) < 1.2 * kLeastRoundness)
       continue; // OpenCV follows what slides along a line
     cv::Point2f ours = from[i];
-    const bool is_found = followWindow(a, b, from[i], ours, {});
+    const bool is_found = followWindow(a, b, from[i], ours, 3);
     one += is_found != (found[i] != 0);
     both += is_found && found[i];
     same += is_found && found[i] && cv::norm(ours - theirs[i]) < 1e-3;
@@ -73,7 +73,7 @@ TEST(LucasKanade, HasNoAnswerWhereThereIsNoTextureOrNoImage)
   for (const cv::Point2f from :
        {cv::Point2f(100, 80), cv::Point2f(-50, 80), cv::Point2f(1e9f, 3), cv::Point2f(NAN, 3)}) {
     cv::Point2f to = from;
-    EXPECT_FALSE(followWindow(a, a, from, to, {}));
+    EXPECT_FALSE(followWindow(a, a, from, to, 3));
   }
 }
 

@@ -41,6 +41,22 @@ TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
   EXPECT_GT(aMb.t.norm(), 0.2);
 }
 
+TEST(PointTracker, FollowsCornersThroughExposuresThatHunt)
+{
+  constexpr std::size_t kFrames = 6;
+  const auto followed = [](double darkest) {
+    PointTracker tracker(kCamera);
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      vpImage<unsigned char> image = drawWalls(kCamera, poseAt(static_cast<int>(k)));
+      for (unsigned i = 0; i < image.getSize(); ++i)
+        image.bitmap[i] = static_cast<unsigned char>(std::lround((k % 2 == 0 ? 1 : darkest) * image.bitmap[i]));
+      tracker.track(image);
+    }
+    return tracker.matches(kFrames - 1).size();
+  };
+  EXPECT_GT(followed(0.5), 0.9 * static_cast<double>(followed(1)));
+}
+
 TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
 {
   PointTracker tracker(kCamera);
@@ -175,7 +191,7 @@ TEST(PointMotion, FindsTheMotionOfEveryFrame)
   }
 }
 
-TEST(PointMotion, FallsBackToTheSensorsWithinAFrameAndRecovers)
+TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
 {
   Pose bMc;
   bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -189,7 +205,6 @@ TEST(PointMotion, FallsBackToTheSensorsWithinAFrameAndRecovers)
   EXPECT_EQ(blind[0].estimate.status, RelativePoseStatus::too_few_points);
   const Pose aMb = poseAt(2).inverse() * poseAt(3);
   EXPECT_LT(logSo3(blind[0].estimate.aRb.transpose() * aMb.R).norm(), 1e-3);
-  EXPECT_LT(directionMinus(aMb.t.normalized(), blind[0].estimate.direction).norm(), 1e-6);
   motion.process(frameAt(4, drawWalls(kCamera, poseAt(4)), bMc));
   const auto seeing = motion.process(frameAt(5, drawWalls(kCamera, poseAt(5)), bMc));
   EXPECT_EQ(seeing[0].estimate.status, RelativePoseStatus::ok);
