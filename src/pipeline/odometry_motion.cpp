@@ -70,6 +70,8 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
   m_path_scale.add(trusted);
+  if (m_inertial.hasBegunAnew())
+    m_path_scale.forget(InertialScale::kMisfit_s);
   m_last_ns = frame.stamp_ns;
   return seen;
 }

@@ -104,6 +104,28 @@ TEST(InertialScale, AnAccelerometerThatRepeatsOneValueIsNotBelieved)
   EXPECT_FALSE(fly(6, made).scale(0.03));
 }
 
+TEST(InertialScale, ABiasThatChangesInFlightTellsNoWrongScale)
+{
+  for (const Eigen::Vector3d &bias : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1.5, 0)}) {
+    MadeFlight made;
+    made.odometry_noise = 0.012;
+    made.force_noise = 0.1;
+    InertialScale inertial(forwardCamera());
+    int begun_anew = 0;
+    for (std::size_t i = 0; i < 120; ++i) {
+      made.force_bias = i < 50 ? Eigen::Vector3d(0, 0, 0) : bias;
+      inertial.process(made.frame(i), made.seen(i));
+      begun_anew += inertial.hasBegunAnew();
+      EXPECT_TRUE(i >= 50 || begun_anew == 0) << i;
+    }
+    EXPECT_GT(begun_anew, 0);
+    const auto scale = inertial.scale(0.03);
+    ASSERT_TRUE(scale);
+    EXPECT_LT(std::abs(scale->mean), 3 * scale->sigma) << bias.transpose();
+    EXPECT_FALSE(scale->contradicts_prior);
+  }
+}
+
 TEST(InertialScale, AnOdometryAThirdTooLongContradictsWhatWasExpected)
 {
   MadeFlight made;

@@ -141,6 +141,27 @@ TEST(PathScale, APathAThirdTooLongContradictsWhatWasExpected)
   EXPECT_NEAR(scale->mean, std::log(1.33), 0.005);
 }
 
+TEST(PathScale, WhatABiasThatChangesSaidIsTakenBack)
+{
+  MadeFlight flight = noisy();
+  PathScale forgetful, credulous;
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    if (i == 60)
+      flight.force_bias += Eigen::Vector3d(1, -1, 0);
+    const Frame frame = flight.frame(i);
+    forgetful.add(frame);
+    credulous.add(frame);
+    if (i == 75)
+      forgetful.forget(2);
+  }
+  const std::vector<Pose> path = MadePath().poses(flight);
+  const auto at = [&path](std::size_t i) { return path[i]; };
+  const auto scale = forgetful.measure(at, kWide), wrong = credulous.measure(at, kWide);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->mean, 0, 0.02);
+  EXPECT_TRUE(!wrong || std::abs(wrong->mean) > 0.02);
+}
+
 TEST(PathScale, BeginsAnewAfterSamplesThatAreMissing)
 {
   const auto scale = measure({}, {1.05}, kWide, 50, 60);
