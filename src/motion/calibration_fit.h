@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace bole::calibration
@@ -111,6 +112,18 @@ struct Minimum
   double late_s = 0, sigma_s = 0, gain = 0; ///< gain: of the cost against no offset
   bool is_inside = false;
 };
+
+/// The scatter of \p fitAt(late_s, scatter) at the best offset of all: that of the noise.
+template <typename FitAt> double leastScatter(const FitAt &fitAt)
+{
+  double best_s = 0, least = std::numeric_limits<double>::max();
+  for (int k = -kLateSteps; k <= kLateSteps; ++k)
+    if (const double cost = fitAt(kLateStep_s * k, 1).cost; cost < least) {
+      least = cost;
+      best_s = kLateStep_s * k;
+    }
+  return fitAt(best_s, 0).scatter;
+}
 
 template <typename Cost> Minimum minimiseLate(const Cost &cost)
 {

@@ -80,6 +80,19 @@ SensorVerdict verdictOf(const Relation &relation, const Eigen::VectorXd &x, doub
 }
 } // namespace
 
+Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
+               double scatter)
+{
+  std::vector<Row> rows;
+  for (const Turn &turn : turns) {
+    const auto turned = turnBetween(samples, turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
+    if (turned) // the rates less the bias: what is left of it turns the other way
+      rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
+                        logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
+  }
+  return solve(rows, kWideBias * kWideBias, scatter);
+}
+
 std::vector<SensorVerdict> judgeCamera(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns,
                                        const Matrix3d &bRc, double overlap)
 {

@@ -6,6 +6,7 @@
 
 #include "geometry/constants.h"
 #include "input/frame_builder.h"
+#include "motion/calibration_fit.h"
 #include "motion/gyro.h"
 
 namespace bole::calibration
@@ -18,6 +19,11 @@ struct Turn
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< without that of the gyro's noise
   double duration() const { return secondsOf(b_ns - a_ns); }
 };
+
+/// The bias of a gyro that is \p late_s, by the rotations of the points.
+/// \param scatter of the noise; 0: that of what is left
+Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
+               double scatter);
 
 /// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of \p turns; empty
 /// where they do as it is. Nothing is corrected: the numbers are the user's. SensorVerdict::since_s is left at 0.

@@ -109,14 +109,13 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
 {
   RotationFit fit;
   fit.aRb = prior.aRb;
-  fit.weights.assign(rays.size(), 0);
-  std::vector<double> residuals(2 * rays.size());
+  std::vector<double> residuals(2 * rays.size()), weights(rays.size());
   for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
     const TransferTerms terms = {fit.aRb.data(), kKernel};
     transferResiduals(rays.columns, terms, residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, fit.weights.data());
+    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, weights.data());
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     H /= variance * options.inflation;

@@ -72,7 +72,6 @@ struct RotationFit
   Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< with the prior [1/rad^2]
   double sigma = 0;                                      ///< of one coordinate of one image [normalised]
-  std::vector<double> weights;
 };
 RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
                         const RelativePoseOptions &options);

@@ -41,7 +41,6 @@ void takeRotation(RelativePoseEstimate &estimate, const RotationFit &fit)
 {
   estimate.aRb = fit.aRb;
   estimate.covariance.topLeftCorner<3, 3>() = fit.information.ldlt().solve(Eigen::Matrix3d::Identity());
-  estimate.weights = fit.weights;
 }
 
 /// The covariance of the joint fit. A flow of pure noise also seems to know its direction: the
@@ -97,7 +96,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   RelativePoseEstimate estimate;
   const MotionPrior prior(given);
   takePrior(estimate, given, prior);
-  estimate.weights.assign(matches.size(), 0);
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return estimate;
   const double focal = std::sqrt(camera.fx * camera.fy);
@@ -117,7 +115,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.sigma_px = fit.sigma * focal;
   const double flow = motion::medianFlow(rays, fit.motion.aRb);
   estimate.parallax_px = flow * focal;
-  estimate.parallax_ratio = parallax.ratio;
   if (estimate.sigma_px > kMostSigma_px) {
     estimate.status = RelativePoseStatus::inconsistent;
     return estimate;
@@ -135,9 +132,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   // parallax.
   const double shared = kSharedError * fit.sigma / std::max(flow, fit.sigma);
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
-  residualsOfMatches(rays.columns, motion::termsOf(fit.motion, fit.sigma), estimate.weights.data());
-  for (double &weight : estimate.weights)
-    weight = motion::weightOf(weight / fit.sigma, motion::kKernel);
   return estimate;
 }
 } // namespace bole

@@ -36,20 +36,6 @@ constexpr double kWidePart = 0.1;     ///< of the odometries: those that are not
 constexpr double kPointsSigma = 7e-4; ///< of a rotation by points beside their own covariance [rad]
 constexpr std::size_t kLeastMotions = 15;
 
-/// The bias of a gyro that is \p late_s, by the rotations of the points.
-Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
-               double scatter)
-{
-  std::vector<Row> rows;
-  for (const Turn &turn : turns) {
-    const auto turned = turnBetween(samples, turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
-    if (turned) // the rates less the bias: what is left of it turns the other way
-      rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
-                        logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
-  }
-  return solve(rows, kWideBias * kWideBias, scatter);
-}
-
 /// The frames with the constants taken out.
 std::vector<Frame> corrected(const std::vector<Frame> &frames, const SensorCalibration &calibration)
 {
@@ -88,9 +74,8 @@ std::vector<GyroSample> samplesOf(const std::vector<Frame> &frames)
 class Estimation
 {
 public:
-  Estimation(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions, const Pose &bMc,
-             const GyroOptions &gyro)
-      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_gyro(gyro), m_samples(samplesOf(frames))
+  Estimation(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions, const Pose &bMc)
+      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_samples(samplesOf(frames))
   {
     for (const RelativeMotion &motion : motions) {
       if (!motion.points.hasRotation())
@@ -99,7 +84,7 @@ public:
       turn.a_ns = motion.a_ns;
       turn.b_ns = motion.b_ns;
       turn.aRb = bMc.R * motion.points.aRb * bMc.R.transpose();
-      const double white = std::pow(kPointsSigma, 2) + std::pow(gyro.noise_density, 2) * turn.duration();
+      const double white = std::pow(kPointsSigma, 2) + std::pow(m_gyro.noise_density, 2) * turn.duration();
       turn.information =
           (bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * bMc.R.transpose() + white * Matrix3d::Identity())
               .inverse();
@@ -161,7 +146,7 @@ private:
   const std::vector<Frame> &m_frames;
   const std::vector<RelativeMotion> &m_motions;
   Pose m_bMc;
-  GyroOptions m_gyro;
+  const GyroOptions m_gyro;
   std::vector<GyroSample> m_samples;
   std::vector<Turn> m_turns;
   double m_overlap = 1; ///< turns that share an interval
@@ -183,19 +168,12 @@ void Estimation::calibrateGyro()
         turns.push_back(turn);
     if (turns.size() < kLeastMotions)
       return;
-    double best = std::numeric_limits<double>::max(), scatter = 1;
-    for (int k = -kLateSteps; k <= kLateSteps; ++k) { // the scatter of the best offset is that of the noise
-      const Fitted tried = fitBias(samples, turns, kLateStep_s * k, m_overlap, 1);
-      if (tried.cost < best) {
-        best = tried.cost;
-        scatter = 0;
-        fit = fitBias(samples, turns, kLateStep_s * k, m_overlap, scatter);
-        scatter = std::sqrt(fit.covariance.trace() / tried.covariance.trace());
-        scatter *= scatter;
-      }
-    }
-    late = minimiseLate([&](double late_s) { return fitBias(samples, turns, late_s, m_overlap, scatter).cost; });
-    fit = fitBias(samples, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
+    const auto fitAt = [&](double late_s, double scatter) {
+      return fitBias(samples, turns, late_s, m_overlap, scatter);
+    };
+    const double scatter = leastScatter(fitAt);
+    late = minimiseLate([&](double late_s) { return fitAt(late_s, scatter).cost; });
+    fit = fitAt(late.is_inside ? late.late_s : 0, scatter);
     bias += fit.value;
     for (GyroSample &sample : samples)
       sample.rate -= fit.value;
@@ -378,14 +356,7 @@ void Estimation::calibrateOdometryClock()
     addTurns(usable, samples, late_s, rows);
     return solve(rows, kWideMount * kWideMount, scatter); // whatever its body stands like
   };
-  double best = std::numeric_limits<double>::max(), scatter = 1;
-  for (int k = -kLateSteps; k <= kLateSteps; ++k) {
-    const Fitted plain = fitAt(kLateStep_s * k, 1);
-    if (plain.cost < best) {
-      best = plain.cost;
-      scatter = fitAt(kLateStep_s * k, 0).covariance.trace() / plain.covariance.trace();
-    }
-  }
+  const double scatter = leastScatter(fitAt);
   const auto cost = [&](double late_s) { return fitAt(late_s, scatter).cost; };
   const Minimum late = minimiseLate(cost);
   if (!late.is_inside || fitAt(late.late_s, scatter).failing >= kMostFailing)
@@ -434,9 +405,13 @@ void Estimation::judge()
 void Estimation::calibrateScale()
 {
   InertialScale inertial(m_bMc, m_gyro, kMostScale);
-  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) { inertial.process(frame, seen); });
+  bool is_constant = true; // the accelerometer's bias: what is left of so short a time tells no scale
+  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) {
+    inertial.process(frame, seen);
+    is_constant = is_constant && !inertial.hasBegunAnew();
+  });
   const std::optional<LogScale> measured = inertial.scale(kMostScale);
-  if (!measured || std::abs(measured->mean) > kMostScale)
+  if (!measured || !is_constant || std::abs(measured->mean) > kMostScale)
     return;
   const auto density = [&](double prior_sigma) {
     const double variance = std::pow(measured->sigma, 2) + prior_sigma * prior_sigma;
@@ -453,76 +428,56 @@ void Estimation::calibrateScale()
 } // namespace
 } // namespace calibration
 
-SensorCalibrator::SensorCalibrator(const Pose &bMc, const GyroOptions &gyro) : m_bMc(bMc), m_gyro(gyro) {}
-
-void SensorCalibrator::add(const Frame &frame, const std::optional<RelativeMotion> &motion)
+SensorCalibration calibrate(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions,
+                            const Pose &bMc)
 {
-  Frame kept;
-  kept.stamp_ns = frame.stamp_ns;
-  kept.index = m_frames.size();
-  kept.wMb_odometry = frame.wMb_odometry;
-  kept.gyro = frame.gyro;
-  m_frames.push_back(std::move(kept));
-  if (motion)
-    m_motions.push_back(*motion);
-}
-
-double SensorCalibrator::duration_s() const
-{
-  return m_frames.empty() ? 0 : secondsOf(m_frames.back().stamp_ns - m_frames.front().stamp_ns);
-}
-
-SensorCalibration SensorCalibrator::estimate() const
-{
-  if (m_frames.size() < calibration::kLeastMotions)
+  if (frames.size() < calibration::kLeastMotions)
     return {};
-  return calibration::Estimation(m_frames, m_motions, m_bMc, m_gyro).run();
+  return calibration::Estimation(frames, motions, bMc).run();
 }
 
 SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_odometry)
 {
   if (!(use_gyro && source.hasGyro()) && !(use_odometry && source.hasOdometry()))
     return {};
-  SensorCalibrator calibrator(source.bMc());
   const PinholeCamera camera = source.camera();
   PointTracker tracker(camera);
-  struct Tracked
-  {
-    std::int64_t stamp_ns;
-    std::size_t index;
-  };
-  std::vector<Tracked> tracked;
-  Frame frame;
-  for (std::size_t index = 0; calibrator.duration_s() < calibration::kLooksThrough_s && source.next(frame); ++index) {
+  std::vector<Frame> frames; // without images
+  std::vector<RelativeMotion> motions;
+  std::vector<std::size_t> tracked;
+  const auto sinceFrame = [&frames](std::size_t a) { return secondsOf(frames.back().stamp_ns - frames[a].stamp_ns); };
+  for (Frame frame; (frames.empty() || sinceFrame(0) < calibration::kLooksThrough_s) && source.next(frame);) {
+    Frame kept;
+    kept.stamp_ns = frame.stamp_ns;
+    kept.index = frames.size();
+    if (use_odometry)
+      kept.wMb_odometry = frame.wMb_odometry;
+    if (use_gyro)
+      kept.gyro = frame.gyro;
+    frames.push_back(std::move(kept));
     // an image that contradicts the gyro is the one that is asked
     const bool is_seen = (frame.status == FrameStatus::ok || frame.status == FrameStatus::doubtful) &&
                          frame.image.getWidth() == static_cast<unsigned>(camera.width) &&
                          frame.image.getHeight() == static_cast<unsigned>(camera.height);
-    std::optional<RelativeMotion> motion;
-    if (is_seen) {
-      tracker.track(frame.image);
-      tracked.push_back({frame.stamp_ns, index});
-      int back = 1;
-      while (back < std::min<int>(PointTracker::kHistory, static_cast<int>(tracked.size())) - 1 &&
-             secondsOf(frame.stamp_ns - (tracked.rbegin() + back)->stamp_ns) < calibration::kBaseline_s)
-        ++back;
-      if (back < static_cast<int>(tracked.size())) {
-        const Tracked &a = *(tracked.rbegin() + back);
-        motion.emplace();
-        motion->frames_back = back;
-        motion->a_ns = a.stamp_ns;
-        motion->b_ns = frame.stamp_ns;
-        motion->a_index = a.index;
-        motion->b_index = index;
-        motion->points = motion->estimate = estimateRelativePose(tracker.matches(back), camera);
-      }
-    }
-    if (!use_gyro)
-      frame.gyro.clear();
-    if (!use_odometry)
-      frame.wMb_odometry.reset();
-    calibrator.add(frame, motion);
+    if (!is_seen)
+      continue;
+    tracker.track(frame.image);
+    tracked.push_back(frames.size() - 1);
+    const int most = std::min<int>(PointTracker::kHistory, static_cast<int>(tracked.size())) - 1;
+    if (most < 1)
+      continue;
+    int back = 1;
+    while (back < most && sinceFrame(tracked.rbegin()[back]) < calibration::kBaseline_s)
+      ++back;
+    RelativeMotion motion;
+    motion.frames_back = back;
+    motion.a_index = tracked.rbegin()[back];
+    motion.b_index = tracked.back();
+    motion.a_ns = frames[motion.a_index].stamp_ns;
+    motion.b_ns = frame.stamp_ns;
+    motion.points = motion.estimate = estimateRelativePose(tracker.matches(back), camera);
+    motions.push_back(motion);
   }
-  return calibrator.estimate();
+  return calibrate(frames, motions, source.bMc());
 }
 } // namespace bole

@@ -3,6 +3,8 @@
 
 #include "geometry/constants.h"
 #include "motion/accelerometer.h"
+#include "motion/calibration_fit.h"
+#include "motion/camera_gyro.h"
 
 #include <Eigen/Dense>
 
@@ -221,20 +223,6 @@ void SensorMonitor::collect(const Frame &frame)
     m_steps.pop_front();
 }
 
-/// Mean of the gyro's samples around a time.
-Vector3d SensorMonitor::rateAt(std::int64_t stamp_ns) const
-{
-  constexpr std::int64_t kAround_ns = 20'000'000;
-  Vector3d sum = Vector3d::Zero();
-  int count = 0;
-  for (const GyroSample &sample : m_samples)
-    if (std::abs(sample.stamp_ns - stamp_ns) <= kAround_ns) {
-      sum += sample.rate;
-      ++count;
-    }
-  return count > 0 ? Vector3d(sum / count) : sum;
-}
-
 /// An image taken tau later than its stamp says turns the points' rotation by rate * tau against the gyro's, at both
 /// ends of an interval. Errors tau of each image for itself make the differences larger along the rates alone, by
 /// sigma^2 (rate_a rate_a^T + rate_b rate_b^T), and of opposite signs in two intervals that share an image. What a
@@ -335,6 +323,11 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
     now.error_covariance = now.points_covariance + bias2 * one;
     now.error = logSo3(orthonormalized(now.gyro->transpose() * *now.points));
     now.gyro_points = now.error.dot(now.error_covariance.ldlt().solve(now.error));
+    constexpr std::int64_t kAround_ns = 20'000'000; // that a rate is the mean of
+    const auto rateAt = [this](std::int64_t stamp_ns) {
+      const GyroRotation turned = integrateGyro(m_samples, stamp_ns - kAround_ns, stamp_ns + kAround_ns);
+      return Vector3d(logSo3(turned.R) / turned.duration);
+    };
     now.rate_a = now.gyro->transpose() * rateAt(now.a_ns);
     now.rate_b = rateAt(now.b_ns);
   }
@@ -396,63 +389,34 @@ void SensorMonitor::checkRotations()
           fmt::format("odometry: its rotation contradicts the points since {:.1f} s", since_s));
 }
 
-/// Mean squared difference with the points that is left when the gyro is read \p offset_s later and a constant \p bias
-/// is taken off.
-std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) const
-{
-  const std::int64_t offset = nanoseconds(offset_s);
-  std::vector<std::pair<Vector3d, const Comparison *>> errors;
-  Matrix3d information = 1e-6 * Matrix3d::Identity();
-  Vector3d sum = Vector3d::Zero();
-  for (const Comparison &c : m_comparisons) {
-    const auto turned = turnBetween(m_samples, c.a_ns + offset, c.b_ns + offset);
-    if (!turned || c.gyro_points <= 0.5 * kLimitPoints)
-      continue;
-    const double dt = secondsOf(c.b_ns - c.a_ns);
-    const Vector3d error = logSo3(orthonormalized(turned->transpose() * *c.points)) / dt;
-    const Matrix3d weight = (c.points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).inverse();
-    information += weight;
-    sum += weight * error;
-    errors.push_back({error, &c});
-  }
-  if (errors.size() < 3)
-    return std::nullopt;
-  *bias = -information.ldlt().solve(sum);
-  double total = 0;
-  for (const auto &[error, c] : errors) {
-    const double dt = secondsOf(c->b_ns - c->a_ns);
-    const Vector3d left = error + *bias;
-    total += left.dot((c->points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).ldlt().solve(left));
-  }
-  return total / (3 * double(errors.size()));
-}
-
 /// Diagnoses a gyro that contradicts the others: a constant bias, a clock offset, or something else.
 void SensorMonitor::diagnoseGyro()
 {
-  SensorVerdict &verdict = m_verdicts.back();
-  if (verdict.sensor != toString(Sensor::gyro))
-    return;
   constexpr double kExplained = 6; // mean squared difference that is left when the cause is found
-  Vector3d bias;
-  const auto constant = misfitAt(0, &bias);
-  if (constant && *constant < kExplained && bias.norm() > 3 * kBiasSigma) {
+  constexpr std::size_t kLeast = 3;
+  std::vector<calibration::Turn> turns, at_any_time;
+  for (const Comparison &c : m_comparisons) {
+    if (c.gyro_points <= 0.5 * kLimitPoints)
+      continue;
+    const double white = std::pow(1e-3 * secondsOf(c.b_ns - c.a_ns), 2); // of the gyro
+    turns.push_back({c.a_ns, c.b_ns, *c.points, (c.points_covariance + white * Matrix3d::Identity()).inverse()});
+    const std::int64_t most_ns = nanoseconds(calibration::kMostLate_s);
+    if (turnBetween(m_samples, c.a_ns - most_ns, c.b_ns + most_ns))
+      at_any_time.push_back(turns.back());
+  }
+  SensorVerdict &verdict = m_verdicts.back();
+  const calibration::Fitted constant = calibration::fitBias(m_samples, turns, 0, 1, 0);
+  if (turns.size() >= kLeast && constant.scatter < kExplained && constant.value.norm() > 3 * kBiasSigma) {
     verdict.kind = "bias";
-    verdict.text = fmt::format("gyro: bias {:.2f} rad/s", bias.norm());
+    verdict.text = fmt::format("gyro: bias {:.2f} rad/s", constant.value.norm());
     return;
   }
-  double best = kExplained, best_offset = 0;
-  for (int k = -15; k <= 15; ++k) {
-    Vector3d ignored;
-    const auto misfit = misfitAt(0.01 * k, &ignored);
-    if (k != 0 && misfit && *misfit < best) {
-      best = *misfit;
-      best_offset = 0.01 * k;
-    }
-  }
-  if (best_offset != 0 && (!constant || best < 0.3 * *constant)) {
+  const auto fitAt = [&](double late_s) { return calibration::fitBias(m_samples, at_any_time, late_s, 1, 1); };
+  const calibration::Minimum late = calibration::minimiseLate([&](double late_s) { return fitAt(late_s).cost; });
+  if (at_any_time.size() >= kLeast && late.is_inside && fitAt(late.late_s).failing == 0 &&
+      fitAt(late.late_s).cost < 0.3 * fitAt(0).cost) {
     verdict.kind = "time";
-    verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(best_offset));
+    verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(late.late_s));
   }
   else if (verdict.since_s < secondsOf(m_comparisons.front().b_ns)) {
     verdict.text = "gyro: axes, sign or units wrong";

@@ -6,9 +6,10 @@
 /// Idea: gyro, odometry and points each measure the rotation between two frames. Every pair of them is compared by the
 /// squared difference over its variance; the sensor that stands in both failing pairs is the one that lies. Further
 /// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, begins far from the ground,
-/// leans against the accelerometer or flies askew to the points' direction; a gyro that repeats its value or ends. A
-/// pair fails when at least `of_window` of the last `window` comparisons exceed a limit, so that one false match raises
-/// no alarm. Stamps of the images that are off by an error of their own show otherwise: see checkStamps().
+/// leans against gravity or flies askew to the points' direction; an accelerometer whose gravity is not the odometry's;
+/// a gyro that repeats its value or ends. A pair fails when four of the last six comparisons exceed a limit, so that
+/// one false match raises no alarm. Stamps of the images that are off by an error of their own show otherwise: see
+/// checkStamps().
 ///
 /// Where the points contradict the gyro, the odometry, too coarse to fail against either, still says which of the two
 /// is more likely: its two squared differences are summed over the window.
@@ -16,11 +17,12 @@
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
 /// taken, and nothing wrong enters the map before the alarm. A turn that gyro and odometry tell so differently that no
 /// point would be found where the wrong one puts it is decided before the points are looked for, by how fast the body
-/// turned until then. A sensor that was silent or repeated itself is trusted again once all of a window agrees with the
-/// points.
+/// turned until then. A step of the odometry is judged by the last velocity that was believed: where a pose is off and
+/// comes back, neither of its two jumps is a step. A sensor that was silent or repeated itself is trusted again once
+/// all of a window agrees with the points.
 ///
 /// False alarms: three rotations of normal errors exceed the limit of 25 once in 60,000 comparisons; four of six do so
-/// once in 10^17. What decides in practice are errors that are not normal: see the limits of the options.
+/// once in 10^17. What decides in practice are errors that are not normal: see the limits.
 ///
 /// Laws (each a test): sensors that agree raise nothing; each fault is named with its sensor and the time it began; the
 /// two sensors that agree are still trusted.
@@ -104,11 +106,6 @@ private:
     bool is_held = false; ///< the pose before once more, while the points moved
   };
 
-  struct Askew ///< the odometry against the points, in the median
-  {
-    Eigen::Vector3d rotation, direction; ///< as of a Comparison
-    double sigma = 0;
-  };
   struct Turns ///< from the frame processed last to another one [rad]
   {
     std::optional<Eigen::Vector3d> gyro, odometry;
@@ -132,13 +129,10 @@ private:
   void checkRecovery(Sensor sensor);
   void recover(Sensor sensor, double time_s);
   void checkStamps();
-  std::optional<Askew> askew() const;
   void checkDirection();
   void checkGravity();
   bool isTurnedBy(const Eigen::Vector3d &up) const;
   void diagnoseGyro();
-  std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
-  Eigen::Vector3d rateAt(std::int64_t stamp_ns) const;
   enum class Lasts
   {
     no,          ///< a moment

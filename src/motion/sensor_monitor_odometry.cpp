@@ -21,6 +21,7 @@ constexpr double kJump = 0.3;            // of the odometry between two frames b
 constexpr double kMostAcceleration = 10; // [m/s^2]
 constexpr double kNoiseFactor = 2.5;     // scatter of the odometry over what odometry::kWalk says
 constexpr double kAskew = 0.1;           // of a constant rotation between odometry and camera [rad]
+constexpr double kTogether = 3;          // comparisons that overlap
 } // namespace
 
 /// Checks the steps of the odometry from frame to frame.
@@ -69,7 +70,7 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
       if (step.is_jump)
         raiseJump(change.norm(), time_s);
     }
-    if (!step.is_jump && !step.is_held)
+    if (!step.is_jump && !step.is_held && !before.is_held)
       step.believed = Velocity{moved / dt, step.stamp_ns, dt};
   }
   m_steps.push_back(step);
@@ -135,49 +136,40 @@ void SensorMonitor::checkScatter()
           "odometry: its positions scatter from frame to frame");
 }
 
-/// A constant rotation between the direction of flight by the odometry and by the points.
-std::optional<SensorMonitor::Askew> SensorMonitor::askew() const
+/// Checks for a constant rotation between the direction of flight by the odometry and by the points.
+void SensorMonitor::checkDirection()
 {
   constexpr std::size_t kLeast = 24; // comparisons
-  constexpr double kTogether = 3;    // that overlap
-  std::vector<double> columns[6];
+  std::vector<double> x, y, z;
   double information = 0;
   for (const Comparison &c : m_comparisons) {
     if (c.askew_variance <= 0)
       continue;
-    for (int k = 0; k < 3; ++k) {
-      columns[k].push_back(c.askew[k]);
-      columns[k + 3].push_back(c.direction[k]);
-    }
+    x.push_back(c.askew.x());
+    y.push_back(c.askew.y());
+    z.push_back(c.askew.z());
     information += 1 / c.askew_variance;
   }
-  if (columns[0].size() < kLeast)
-    return std::nullopt;
-  const auto median = [&columns](int k) { return medianOf(columns[k]); };
-  return Askew{{median(0), median(1), median(2)},
-               Vector3d(median(3), median(4), median(5)).normalized(),
-               std::sqrt(1.6 * kTogether / information)}; // 1.6: of a median
-}
-
-void SensorMonitor::checkDirection()
-{
-  const std::optional<Askew> seen = askew();
-  if (seen && seen->rotation.norm() > std::max(kAskew, 5 * seen->sigma))
+  if (x.size() < kLeast)
+    return;
+  const Vector3d askew(medianOf(x), medianOf(y), medianOf(z));
+  const double sigma = std::sqrt(1.6 * kTogether / information); // 1.6: of a median
+  if (askew.norm() > std::max(kAskew, 5 * sigma))
     raise(Sensor::odometry, "direction", secondsOf(m_comparisons.front().a_ns),
-          fmt::format("odometry: stands {:.0f} degrees askew to the camera", seen->rotation.norm() / kDegree));
+          fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
 }
 
 /// Gravity by the accelerometer against that by the odometry's roll and pitch. The accelerometer is wrong where the
 /// length of the force is, and where a bias explains the difference and the points do not show the odometry turned.
 void SensorMonitor::checkGravity()
 {
-  constexpr double kLeast_s = 2.8;           // of the memory
-  constexpr double kLimit = 0.06 * kGravity; // [m/s^2]: what roll, pitch and a bias that is usual amount to
-  constexpr double kMostSigma = 1;           // beyond it the limit does not grow [m/s^2]
+  constexpr double kLeast_s = 1.8, kDecided_s = 3.8; // of the memory, and where it needs the points
+  constexpr double kLimit = 0.06 * kGravity;         // [m/s^2]: what roll, pitch and a bias that is usual amount to
+  constexpr double kMostSigma = 1;                   // beyond it the limit does not grow [m/s^2]
   constexpr double kMostBias = 3 * accelerometer::kFaultSigma;
   const auto isOdd = [](const Step &step) { return step.is_held || step.is_jump; };
-  if (m_steps.empty() || secondsOf(m_steps.back().stamp_ns - m_steps.front().stamp_ns) < kLeast_s ||
-      !trusts(Sensor::gyro) || std::any_of(m_steps.begin(), m_steps.end(), isOdd))
+  const double remembered_s = m_steps.empty() ? 0 : secondsOf(m_steps.back().stamp_ns - m_steps.front().stamp_ns);
+  if (remembered_s < kLeast_s || !trusts(Sensor::gyro) || std::any_of(m_steps.begin(), m_steps.end(), isOdd))
     return; // force and velocity would be of different times; what beside it is wrong is no witness
   Trajectory poses;
   for (const Step &step : m_steps)
@@ -192,8 +184,10 @@ void SensorMonitor::checkGravity()
   if (off < limit)
     return;
   const Vector3d up = kGravity * Vector3d::UnitZ() + gravity->off;
-  const bool is_length_wrong = std::abs(up.norm() - kGravity) > limit;
-  if (is_length_wrong || (off < kMostBias && !isTurnedBy(up)))
+  const bool is_length_wrong = std::abs(up.norm() - kGravity) > limit, is_bias = off < kMostBias;
+  if (is_bias && remembered_s < kDecided_s)
+    return;
+  if (is_length_wrong || (is_bias && !isTurnedBy(up)))
     raise(Sensor::accelerometer, "bias", since_s,
           fmt::format("accelerometer: off by {:.1f} m/s^2 since {:.1f} s", off, since_s), Lasts::until_agree);
   else
@@ -205,12 +199,15 @@ void SensorMonitor::checkGravity()
 /// Whether the points show the odometry turned as it is where \p up is upwards in its world.
 bool SensorMonitor::isTurnedBy(const Vector3d &up) const
 {
-  constexpr double kBetter = 9; // squared, over the variance
-  const std::optional<Askew> seen = askew();
-  if (!seen)
-    return false;
-  const Vector3d turn = m_steps.back().wMb.R.transpose() * up.normalized().cross(Vector3d::UnitZ());
-  const Vector3d expected = seen->direction * seen->direction.dot(turn) - turn;
-  return seen->rotation.squaredNorm() - (seen->rotation - expected).squaredNorm() > kBetter * std::pow(seen->sigma, 2);
+  constexpr double kBetter = 9 * kTogether, kMostEach = 6; // twice the log of the likelihood; of one comparison
+  const Vector3d turn = m_steps.back().wMb.R.transpose() * Vector3d::UnitZ().cross(up.normalized());
+  double gain = 0;
+  for (const Comparison &c : m_comparisons) {
+    if (c.askew_variance <= 0)
+      continue;
+    const Vector3d left = c.askew - (turn - c.direction * c.direction.dot(turn));
+    gain += std::clamp((c.askew.squaredNorm() - left.squaredNorm()) / c.askew_variance, -kMostEach, kMostEach);
+  }
+  return gain > kBetter;
 }
 } // namespace bole

@@ -28,7 +28,8 @@ SensorCalibration fly(
     MadeFlight flight, const std::function<void(Frame &)> &damage = [](Frame &) {}, double gyro_late_s = 0,
     double odometry_late_s = 0, const std::function<Matrix3d(const Matrix3d &)> &look = nullptr)
 {
-  SensorCalibrator calibrator(forwardCamera());
+  std::vector<Frame> frames;
+  std::vector<RelativeMotion> motions;
   const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
   std::mt19937 random(3);
   std::normal_distribution<double> turn(0, 0.003);
@@ -51,9 +52,10 @@ SensorCalibration fly(
     for (RelativeMotion &motion : seen)
       if (look)
         motion.points.aRb = look(motion.points.aRb) * expSo3({turn(random) / 5, turn(random) / 5, turn(random) / 5});
-    calibrator.add(frame, seen.empty() ? std::nullopt : std::optional<RelativeMotion>(seen.front()));
+    motions.insert(motions.end(), seen.begin(), seen.end());
+    frames.push_back(std::move(frame));
   }
-  return calibrator.estimate();
+  return calibrate(frames, motions, forwardCamera());
 }
 
 const CalibratedConstant *constant(const SensorCalibration &calibration, const std::string &name)
