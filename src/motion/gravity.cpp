@@ -16,6 +16,9 @@ std::optional<GravityInnovation> compareGravity(const Trajectory &poses, const s
   constexpr int kLeast = 40;                         // samples
   if (poses.size() < 3 || samples.empty() || poses.back().stamp_ns - poses.front().stamp_ns < 2 * kVelocity_ns)
     return std::nullopt;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    if (poses[i].stamp_ns - poses[i - 1].stamp_ns > kVelocity_ns)
+      return std::nullopt; // nobody knows how it turned in between
   const auto isBefore = [](const StampedPose &pose, std::int64_t stamp_ns) { return pose.stamp_ns < stamp_ns; };
   const auto at = [&](std::int64_t stamp_ns) {
     return *std::lower_bound(poses.begin(), poses.end() - 1, stamp_ns - 1'000'000, isBefore);

@@ -23,7 +23,7 @@ struct GravityInnovation
   Eigen::Matrix3d by_rotation = Eigen::Matrix3d::Zero(), by_bias = Eigen::Matrix3d::Zero();
 };
 
-/// Of \p poses, the first and the last more than 1.3 s apart, and \p samples, both in the order of time. Nothing where
-/// samples are missing between the poses, have no force, or repeat one.
+/// Of \p poses, the first and the last more than 1.2 s apart, and \p samples, both in the order of time. Nothing where
+/// poses or samples are missing in between, or samples have no force or repeat one.
 std::optional<GravityInnovation> compareGravity(const Trajectory &poses, const std::vector<GyroSample> &samples);
 } // namespace bole

@@ -302,6 +302,7 @@ std::optional<Estimation::Attitude> Estimation::fitAttitude(double mount_sigma, 
 void Estimation::calibrateAttitude()
 {
   constexpr double kTurned = 1.5 * kBetter; // that a turned odometry must explain more
+  constexpr double kMost = 3;               // standard deviations
   const std::optional<Attitude> open = fitAttitude(kWideMount, accelerometer::kFaultSigma, 0);
   if (!open || open->fit.failing >= kMostFailing)
     return;
@@ -313,7 +314,8 @@ void Estimation::calibrateAttitude()
           fitAttitude(turned ? kWideMount : kMount, biased ? accelerometer::kFaultSigma : accelerometer::kBiasSigma,
                       open->fit.scatter);
       tried->cost += (turned ? kTurned : 0) + (biased ? kBetter : 0);
-      if (best && tried->cost >= best->cost)
+      const bool is_likely = tried->force_bias.norm() < kMost * accelerometer::kFaultSigma;
+      if (best && (tried->cost >= best->cost || !is_likely)) // more is another fault
         continue;
       best = tried;
       is_turned = turned;

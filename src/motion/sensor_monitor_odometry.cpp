@@ -181,7 +181,7 @@ void SensorMonitor::checkGravity()
   const double since_s = secondsOf(m_steps.front().stamp_ns);
   if (off < 0.5 * limit && of(Sensor::accelerometer).may_recover)
     recover(Sensor::accelerometer, since_s);
-  if (off < limit)
+  if (!(off > limit))
     return;
   const Vector3d up = kGravity * Vector3d::UnitZ() + gravity->off;
   const bool is_length_wrong = std::abs(up.norm() - kGravity) > limit, is_bias = off < kMostBias;

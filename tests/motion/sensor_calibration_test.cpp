@@ -178,6 +178,17 @@ TEST(SensorCalibration, ATurnedOdometryAndAnAccelerometerThatIsOffAreToldApart)
   EXPECT_TRUE(calibration.verdicts.empty()) << calibration.verdicts.front().text;
 }
 
+TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFault)
+{
+  const Matrix3d A = forwardCamera().R.transpose();
+  const SensorCalibration calibration = fly(noisy(), [&](Frame &f) {
+    *f.wMb_odometry = {A * f.wMb_odometry->R * A.transpose(), A * f.wMb_odometry->t};
+  });
+  EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
+  ASSERT_FALSE(calibration.verdicts.empty());
+  EXPECT_EQ(calibration.verdicts[0].sensor, "odometry") << calibration.verdicts[0].text;
+}
+
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
 {
   const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(5); };

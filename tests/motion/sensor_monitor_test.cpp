@@ -151,6 +151,24 @@ TEST(SensorMonitor, AnAccelerometerThatIsOffCostsTheOdometryNothing)
   EXPECT_NE(after.verdicts()[0].text.find(" until "), std::string::npos) << after.verdicts()[0].text;
 }
 
+TEST(SensorMonitor, TwoSecondsWithoutAPictureRaiseNothing)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  std::vector<GyroSample> waiting;
+  for (std::size_t i = 0; i < 120; ++i) {
+    Frame frame = flight.frame(i);
+    waiting.insert(waiting.end(), frame.gyro.begin(), frame.gyro.end());
+    if (i >= 50 && i < 70)
+      continue;
+    frame.gyro.swap(waiting);
+    waiting.clear();
+    monitor.process(frame, i < 50 || i >= 73 ? flight.seen(i) : std::vector<RelativeMotion>());
+    EXPECT_TRUE(monitor.trusts(Sensor::odometry) && monitor.trusts(Sensor::accelerometer)) << i;
+  }
+  EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
+}
+
 TEST(SensorMonitor, AnAccelerometerThatFeelsNoGravityIsNotTheOdometrysFault)
 {
   const SensorMonitor monitor = fly([](Frame &f) {
