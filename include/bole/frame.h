@@ -39,7 +39,7 @@ struct GyroSample
 /// A sensor that contradicts the others.
 struct SensorVerdict
 {
-  std::string sensor; ///< "gyro", "odometry" or "images"
+  std::string sensor; ///< "gyro", "accelerometer", "odometry" or "images"
   std::string kind;   ///< rotation, bias, time, stuck, ended, jump, noise, direction, tilt, height, scale, focal, mount
   double since_s = 0; ///< stamp at which the contradiction began [s]
   std::string text;   ///< for the user: "odometry: frozen since 5.0 s"

@@ -41,8 +41,9 @@ MountedCamera readCamera(const std::string &path, int width = 0, int height = 0)
 /// A constant of a sensor, as it was measured.
 struct CalibratedConstant
 {
-  std::string name;  ///< for programs: gyro_late_s, gyro_bias, odometry_late_s, odometry_rotation, odometry_scale
-  double value = 0;  ///< [s], [rad/s], [s], [rad] or [1]; of a vector its length
+  std::string name;  ///< for programs: gyro_late_s, gyro_bias, accelerometer_bias, odometry_late_s, odometry_rotation,
+                     ///< odometry_scale
+  double value = 0;  ///< [s], [rad/s], [m/s^2], [s], [rad] or [1]; of a vector its length
   double sigma = 0;  ///< standard deviation
   bool used = false; ///< false: as stated by the sensor to what can be measured, and read so
   std::string text;  ///< for the user: "gyro: clock 31 +- 2 ms late"
@@ -52,14 +53,15 @@ struct CalibratedConstant
 /// o: the body as the odometry has it.
 struct SensorCalibration
 {
-  double gyro_late_s = 0;                              ///< stamps of the gyro less the true times
-  double odometry_late_s = 0;                          ///< stamps of the odometry less the true times
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(); ///< [rad/s]
-  Eigen::Matrix3d bRo = Eigen::Matrix3d::Identity();   ///< rotation of the odometry's body in the body
-  double odometry_scale = 1;                           ///< horizontal lengths of the odometry over the true ones
-  double odometry_rotation_sigma = 0;                  ///< what is left open of bRo [rad]
-  double odometry_scale_sigma = 0;                     ///< what is left open of odometry_scale [1]
-  std::vector<CalibratedConstant> constants;           ///< all that were measured
+  double gyro_late_s = 0;                               ///< stamps of the gyro less the true times
+  double odometry_late_s = 0;                           ///< stamps of the odometry less the true times
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();  ///< [rad/s]
+  Eigen::Vector3d force_bias = Eigen::Vector3d::Zero(); ///< of the accelerometer [m/s^2]
+  Eigen::Matrix3d bRo = Eigen::Matrix3d::Identity();    ///< rotation of the odometry's body in the body
+  double odometry_scale = 1;                            ///< horizontal lengths of the odometry over the true ones
+  double odometry_rotation_sigma = 0;                   ///< what is left open of bRo [rad]
+  double odometry_scale_sigma = 0;                      ///< what is left open of odometry_scale [1]
+  std::vector<CalibratedConstant> constants;            ///< all that were measured
   std::vector<SensorVerdict>
       verdicts; ///< sensors that contradict the others from the start on, for which no constant helps
 };

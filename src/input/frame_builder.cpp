@@ -16,6 +16,8 @@ Recording corrected(Recording recording, const SensorCalibration &calibration)
   for (GyroSample &sample : recording.gyro) {
     sample.stamp_ns -= gyro_late_ns;
     sample.rate -= calibration.gyro_bias;
+    if (sample.force)
+      *sample.force -= calibration.force_bias;
   }
   const bool is_scaled = calibration.odometry_scale != 1, is_turned = !calibration.bRo.isIdentity(0);
   const Eigen::Vector2d first =

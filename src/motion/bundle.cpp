@@ -71,7 +71,7 @@ public:
     double sum = 0;
     for (const BundlePoint &point : points) {
       for (const BundleObservation &seen : point.seen)
-        sum += costOf(residualOf(frames, point, seen, focal).norm() / m_options.sigma, m_options.kernel);
+        sum += costOf(residualOf(frames, point, seen, focal).norm() / m_options.sigma, kKernel);
       const double off = point.inverse_depth - point.prior;
       sum += 0.5 * point.prior_information * off * off;
     }
@@ -164,7 +164,7 @@ private:
       const Eigen::Vector2d e = reprojection(m_frames[static_cast<std::size_t>(point.anchor)].wMc,
                                              m_frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
                                              point.inverse_depth, seen.xy, &J_a, &J_b, &J_q, focal, &J_f);
-      seen.weight = weightOf(e.norm() / m_options.sigma, m_options.kernel);
+      seen.weight = weightOf(e.norm() / m_options.sigma, kKernel);
       const double w = seen.weight / (m_options.sigma * m_options.sigma);
       H_q += w * J_q.squaredNorm();
       g_q += w * J_q.dot(e);

@@ -42,7 +42,6 @@ struct BundlePoint
 struct BundleOptions
 {
   int iterations = 5;
-  double kernel = 3;
   double sigma = 1e-3;                  ///< of an observation, one coordinate [normalised]
   double min_sigma = 2e-4;              ///< floor when sigma is measured anew
   std::optional<double> first_baseline; ///< distance of the frames 0 and 1 that fixes the scale

@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace bole::calibration
@@ -22,6 +24,7 @@ inline constexpr double kMostFailing = 0.15; ///< of the measurements: more, and
 inline constexpr double kSoft = 9;           ///< squared error over its variance from which a measurement loses its say
 inline constexpr double kFails = 30;         ///< ... at which it contradicts what was fitted
 
+inline std::int64_t nsOf(double s) { return static_cast<std::int64_t>(std::llround(s * 1e9)); }
 inline double soft(double squares) { return kSoft * std::log1p(squares / kSoft); }
 inline double weightFor(double squares) { return 1 / (1 + squares / kSoft); }
 
@@ -49,33 +52,37 @@ inline double failingOf(const std::vector<double> &squares)
 template <int P> struct RowOf
 {
   using Unknowns = Eigen::Matrix<double, P, 1>;
-  template <int N>
-  RowOf(const Eigen::Matrix<double, N, P> &J, const Eigen::Matrix<double, N, 1> &r,
+  /// \p J: by the first Q unknowns; the others have no part in it.
+  template <int N, int Q>
+  RowOf(const Eigen::Matrix<double, N, Q> &J, const Eigen::Matrix<double, N, 1> &r,
         const Eigen::Matrix<double, N, N> &W, double overlap_)
-      : JWJ(J.transpose() * W * J), JWr(J.transpose() * W * r), rWr(r.dot(W * r)), size(N), overlap(overlap_)
+      : rWr(r.dot(W * r)), size(N), overlap(overlap_)
   {
+    JWJ.template topLeftCorner<Q, Q>() = J.transpose() * W * J;
+    JWr.template head<Q>() = J.transpose() * W * r;
   }
   /// Of what is left of it at \p x, as of three numbers.
   double squares(const Unknowns &x) const { return std::max(0.0, rWr + x.dot(2 * JWr + JWJ * x)) * 3 / size; }
 
-  Eigen::Matrix<double, P, P> JWJ;
-  Unknowns JWr;
+  Eigen::Matrix<double, P, P> JWJ = Eigen::Matrix<double, P, P>::Zero();
+  Unknowns JWr = Unknowns::Zero();
   double rWr = 0;
   int size = 3;
   double overlap = 1; ///< measurements that share what they measured
 };
 using Row = RowOf<3>;
 
-/// Robust solution; \p prior2: variance of each unknown.
+/// Robust solution; \p prior2: variance of each unknown about 0, \p at: what the unknowns count from in the rows.
 template <int P>
-FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter)
+FittedOf<P> solve(const std::vector<RowOf<P>> &rows, const typename RowOf<P>::Unknowns &prior2, double scatter,
+                  const typename RowOf<P>::Unknowns &at = RowOf<P>::Unknowns::Zero())
 {
   FittedOf<P> fit;
   constexpr int kIterations = 6;
   std::vector<double> squares(rows.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Eigen::Matrix<double, P, P> H = prior2.cwiseInverse().asDiagonal();
-    typename RowOf<P>::Unknowns g = RowOf<P>::Unknowns::Zero();
+    typename RowOf<P>::Unknowns g = at.cwiseQuotient(prior2);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const RowOf<P> &row = rows[i];
       const double w = (iteration == 0 ? 1 : weightFor(squares[i])) / row.overlap;
@@ -105,6 +112,18 @@ struct Minimum
   double late_s = 0, sigma_s = 0, gain = 0; ///< gain: of the cost against no offset
   bool is_inside = false;
 };
+
+/// The scatter of \p fitAt(late_s, scatter) at the best offset of all: that of the noise.
+template <typename FitAt> double leastScatter(const FitAt &fitAt)
+{
+  double best_s = 0, least = std::numeric_limits<double>::max();
+  for (int k = -kLateSteps; k <= kLateSteps; ++k)
+    if (const double cost = fitAt(kLateStep_s * k, 1).cost; cost < least) {
+      least = cost;
+      best_s = kLateStep_s * k;
+    }
+  return fitAt(best_s, 0).scatter;
+}
 
 template <typename Cost> Minimum minimiseLate(const Cost &cost)
 {

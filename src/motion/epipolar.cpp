@@ -46,14 +46,15 @@ void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
   columns.by.push_back(in_b.y());
 }
 
-EpipolarTerms Epipolar::terms(double sigma, double kernel) const
+EpipolarTerms termsOf(const Motion &motion, double sigma)
 {
+  constexpr double kEpipole = 0.04; // [rad]: 4 px of a small camera
   EpipolarTerms terms;
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.E) = m_E;
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.R) = m_R;
-  Matrix32d::Map(terms.B) = m_B;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.E) = skew(motion.direction) * motion.aRb;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.R) = motion.aRb;
+  Matrix32d::Map(terms.B) = directionBasis(motion.direction);
   terms.sigma = sigma;
-  terms.kernel = kernel;
+  terms.kernel = kKernel;
   terms.epipole = kEpipole;
   return terms;
 }
@@ -108,14 +109,13 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
 {
   RotationFit fit;
   fit.aRb = prior.aRb;
-  fit.weights.assign(rays.size(), 0);
-  std::vector<double> residuals(2 * rays.size());
+  std::vector<double> residuals(2 * rays.size()), weights(rays.size());
   for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
     const TransferTerms terms = {fit.aRb.data(), kKernel};
     transferResiduals(rays.columns, terms, residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, fit.weights.data());
+    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, weights.data());
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     H /= variance * options.inflation;
@@ -154,16 +154,16 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
 double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
               const RelativePoseOptions &options)
 {
-  const double cost = costOfMatches(rays.columns, Epipolar(motion).terms(sigma, kKernel));
+  const double cost = costOfMatches(rays.columns, termsOf(motion, sigma));
   return cost / options.inflation + priorCost(motion, prior);
 }
 
 namespace
 {
 /// Information and gradient of the matches at \p motion, inflation not applied.
-void linearize(const Rays &rays, const Motion &motion, double sigma, double kernel, Matrix5d &H, Vector5d &g)
+void linearize(const Rays &rays, const Motion &motion, double sigma, Matrix5d &H, Vector5d &g)
 {
-  const EpipolarSums sums = sumsOfMatches(rays.columns, Epipolar(motion).terms(sigma, kernel));
+  const EpipolarSums sums = sumsOfMatches(rays.columns, termsOf(motion, sigma));
   const double *entry = sums.H;
   for (int i = 0; i < 5; ++i)
     for (int j = i; j < 5; ++j)
@@ -178,7 +178,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
   fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     Vector5d g;
-    linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
+    linearize(rays, fit.motion, fit.sigma, fit.information, g);
     Matrix5d H = fit.information / options.inflation;
     g /= options.inflation;
     if (prior.has_rotation) {
@@ -222,7 +222,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
     descend(rays, fit, prior, options);
-    residualsOfMatches(rays.columns, Epipolar(fit.motion).terms(fit.sigma, kKernel), residuals.data());
+    residualsOfMatches(rays.columns, termsOf(fit.motion, fit.sigma), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
     if (std::abs(fit.sigma - before) < 0.02 * before)
@@ -230,13 +230,13 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   }
   fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
   Vector5d g;
-  linearize(rays, fit.motion, fit.sigma, kKernel, fit.information, g);
+  linearize(rays, fit.motion, fit.sigma, fit.information, g);
   return fit;
 }
 
-Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel)
+Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma)
 {
-  const FlowSums flow = flowSumsOfMatches(rays.columns, Epipolar(motion).terms(sigma, kernel), motion.direction.data());
+  const FlowSums flow = flowSumsOfMatches(rays.columns, termsOf(motion, sigma), motion.direction.data());
   Parallax parallax;
   if (flow.sum <= 0)
     return parallax;

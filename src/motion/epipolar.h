@@ -39,51 +39,8 @@ struct Motion
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
 };
 
-/// Sampson's residual with what all matches share computed once.
-class Epipolar
-{
-public:
-  explicit Epipolar(const Motion &motion)
-      : m_R(motion.aRb), m_E(skew(motion.direction) * motion.aRb), m_B(directionBasis(motion.direction))
-  {
-  }
-
-  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b) const
-  {
-    const Eigen::Vector3d line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
-    return x_a.dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm() + 1e-24);
-  }
-  /// \p J by (phi, tau).
-  double residual(const Eigen::Vector3d &x_a, const Eigen::Vector3d &x_b, Vector5d &J) const
-  {
-    const Eigen::Vector3d p = m_R * x_b, line_a = m_E * x_b, line_b = m_E.transpose() * x_a;
-    const Eigen::Vector3d flat_a(line_a.x(), line_a.y(), 0), flat_b(line_b.x(), line_b.y(), 0);
-    const double S = flat_a.squaredNorm() + flat_b.squaredNorm() + 1e-24;
-    const double inverse_root = 1 / std::sqrt(S), algebraic = x_a.dot(line_a);
-    const double share = algebraic / S;
-    const Eigen::Vector3d by_direction = p.cross(x_a - share * flat_a) - share * (m_R * flat_b).cross(x_a);
-    const Eigen::Vector3d across = line_b - share * (m_E.transpose() * flat_a);
-    J.head<3>() = inverse_root * (x_b.cross(across) + share * line_b.cross(flat_b));
-    J.tail<2>() = inverse_root * (m_B.transpose() * by_direction);
-    return algebraic * inverse_root;
-  }
-
-  /// Share of a match's say: near the epipole its line is drawn by noise.
-  double trust(const Eigen::Vector3d &x_a) const
-  {
-    const double sine2 = (m_E.transpose() * x_a).squaredNorm() / x_a.squaredNorm();
-    return sine2 / (sine2 + kEpipole * kEpipole);
-  }
-
-  /// For the sums over all matches.
-  EpipolarTerms terms(double sigma, double kernel) const;
-
-private:
-  static constexpr double kEpipole = 0.04; // [rad]: 4 px of a small camera
-
-  Eigen::Matrix3d m_R, m_E;
-  Matrix32d m_B;
-};
+/// For the sums over all matches.
+EpipolarTerms termsOf(const Motion &motion, double sigma);
 
 /// Priors as information matrices; zero where there is none.
 struct MotionPrior
@@ -115,7 +72,6 @@ struct RotationFit
   Eigen::Matrix3d aRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< with the prior [1/rad^2]
   double sigma = 0;                                      ///< of one coordinate of one image [normalised]
-  std::vector<double> weights;
 };
 RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
                         const RelativePoseOptions &options);
@@ -141,7 +97,7 @@ struct Parallax
   double ratio = 0; ///< mean square along / across
   double score = 0; ///< sigmas by which the flow agrees on the sign of the direction
 };
-Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma, double kernel);
+Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma);
 /// Median length of that flow.
 double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb);
 

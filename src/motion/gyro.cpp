@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <cmath>
 
 namespace bole
 {
@@ -35,7 +36,8 @@ struct Gaps
   double variance = 0; ///< of the angle, by a rate that walks between the samples [rad^2]
 };
 
-Gaps gapsOf(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::int64_t to_ns)
+/// \p next: number of the first sample after \p from_ns.
+Gaps gapsOf(const std::vector<GyroSample> &samples, std::size_t next, std::int64_t from_ns, std::int64_t to_ns)
 {
   Gaps gaps;
   const auto add = [&gaps](std::int64_t gap_ns, bool is_between) {
@@ -44,14 +46,10 @@ Gaps gapsOf(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::i
     gaps.variance += kRateWalk * kRateWalk * gap_s * gap_s * gap_s / (is_between ? 12 : 3);
   };
   std::int64_t previous = from_ns;
-  bool is_between = false;
-  for (const GyroSample &sample : samples) {
-    if (sample.stamp_ns > from_ns) {
-      const std::int64_t stamp = std::min(sample.stamp_ns, to_ns);
-      add(stamp - previous, is_between);
-      previous = stamp;
-    }
-    is_between = true;
+  for (; next < samples.size() && previous < to_ns; ++next) {
+    const std::int64_t stamp = std::min(samples[next].stamp_ns, to_ns);
+    add(stamp - previous, next > 0);
+    previous = stamp;
   }
   add(to_ns - previous, false);
   return gaps;
@@ -70,10 +68,8 @@ GyroRotation GyroRotation::then(const GyroRotation &next) const
   both.white = next.R.transpose() * white * next.R + next.white;
   both.duration = duration + next.duration;
   // One bias for both: its standard deviation grows with the time, not with its root.
-  const double scale = duration + next.duration;
-  both.bias = duration > next.duration
-                  ? Eigen::Matrix3d(bias * (scale * scale / std::max(1e-18, duration * duration)))
-                  : Eigen::Matrix3d(next.bias * (scale * scale / std::max(1e-18, next.duration * next.duration)));
+  const GyroRotation &longer = duration > next.duration ? *this : next;
+  both.bias = longer.bias * std::pow(both.duration / std::max(1e-9, longer.duration), 2);
   both.complete = complete && next.complete;
   return both;
 }
@@ -84,16 +80,17 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   GyroRotation result;
   result.duration = 1e-9 * double(to_ns - from_ns);
   const double dt_all = result.duration;
-  const Gaps gaps = gapsOf(samples, from_ns, to_ns);
+  auto next = static_cast<std::size_t>(
+      std::upper_bound(samples.begin(), samples.end(), from_ns,
+                       [](std::int64_t stamp_ns, const GyroSample &sample) { return stamp_ns < sample.stamp_ns; }) -
+      samples.begin());
+  const Gaps gaps = gapsOf(samples, next, from_ns, to_ns);
   result.complete = !samples.empty() && gaps.longest_s <= kMostGap_s;
   const double open = samples.empty() ? kRateSigma * kRateSigma * dt_all * dt_all : gaps.variance;
   result.white = (options.noise_density * options.noise_density * dt_all + open) * Eigen::Matrix3d::Identity();
   result.bias = bias.covariance * dt_all * dt_all;
   if (samples.empty())
     return result;
-  std::size_t next = 0;
-  while (next < samples.size() && samples[next].stamp_ns <= from_ns)
-    ++next;
   std::int64_t stamp = from_ns;
   while (stamp < to_ns) {
     const std::int64_t end = next < samples.size() ? std::min(samples[next].stamp_ns, to_ns) : to_ns;
@@ -108,7 +105,7 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
 }
 
 GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,
-                    const Eigen::Matrix3d &covariance, const GyroOptions &options)
+                    const Eigen::Matrix3d &covariance)
 {
   // phi = -duration * (error of the bias) + white noise: the gain carries what was learnt of phi to
   // the bias.
@@ -120,7 +117,7 @@ GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen
   refined.mean = bias.mean + gain * phi;
   refined.covariance = bias.covariance - gain * (prior_covariance - covariance) * gain.transpose();
   refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
-  refined.covariance += options.bias_walk * options.bias_walk * prior.duration * Eigen::Matrix3d::Identity();
+  refined.covariance += kBiasWalk * kBiasWalk * prior.duration * Eigen::Matrix3d::Identity();
   return refined;
 }
 } // namespace bole

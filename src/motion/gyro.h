@@ -17,10 +17,12 @@
 #include <bole/frame.h>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace bole
 {
+constexpr double kBiasWalk = 1e-4; ///< of the gyro [rad/s/sqrt(s)]
 constexpr double kMostGap_s = 0.1; ///< a longer gap between samples is not bridged as known
 
 struct GyroOptions
@@ -30,8 +32,6 @@ struct GyroOptions
   double noise_density = 8e-4;
   /// Standard deviation of the unknown bias at the start [rad/s], >= 0.
   double bias_sigma = 0.008;
-  /// Random walk of the bias [rad/s/sqrt(s)], >= 0.
-  double bias_walk = 1e-4;
 };
 
 /// Bias of the gyro [rad/s] in the body frame.
@@ -59,13 +59,21 @@ struct GyroRotation
 
 /// Integrates \p samples (oldest first; those outside of the interval only help its ends) from \p
 /// from_ns to \p to_ns, rates less the bias, linear between samples, held at the ends. Without any
-/// sample: identity, not complete, with the covariance of a gap. Cost: 0.1 us a sample.
+/// sample: identity, not complete, with the covariance of a gap. Cost: 0.1 us a sample in between.
 GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t from_ns, std::int64_t to_ns,
                            const GyroBias &bias = {}, const GyroOptions &options = {});
+
+/// The rotation from \p from_ns to \p to_ns where samples cover it.
+inline std::optional<Eigen::Matrix3d> turnBetween(const std::vector<GyroSample> &samples, std::int64_t from_ns,
+                                                  std::int64_t to_ns)
+{
+  const GyroRotation turned = integrateGyro(samples, from_ns, to_ns);
+  return turned.complete ? std::optional<Eigen::Matrix3d>(turned.R) : std::nullopt;
+}
 
 /// Bias after the rotation \p prior was refined to \p R with the covariance \p covariance [rad^2],
 /// the prior having been used in the refinement (a conditional Gaussian: exact to first order).
 /// Feed intervals that do not overlap.
 GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,
-                    const Eigen::Matrix3d &covariance, const GyroOptions &options = {});
+                    const Eigen::Matrix3d &covariance);
 } // namespace bole

@@ -17,7 +17,8 @@
 /// Frames: b the body, w the world of the odometry up to a rotation about z.
 ///
 /// Laws (each a test): a flight with exact sensors gives the scale of its odometry; a flight at constant velocity
-/// leaves it unknown, and the standard deviation says so; an accelerometer that repeats one value is not believed; over
+/// leaves it unknown, and the standard deviation says so; an accelerometer that repeats one value is not believed; one
+/// whose bias changes in flight tells no wrong scale; over
 /// two seconds without odometry the displacement is within three standard deviations.
 ///
 /// Cost: 0.1 ms a frame with 20 samples. Not thread-safe.
@@ -47,6 +48,10 @@ public:
   /// Takes in the next frame and what the points say of it. A frame without samples of the accelerometer begins anew.
   void process(const Frame &frame, const std::vector<RelativeMotion> &motions);
 
+  static constexpr double kMisfit_s = 2; ///< in which innovations that are too large show
+  /// Whether they did with the frame processed last: the accelerometer has another bias than before, or is broken.
+  bool hasBegunAnew() const { return m_has_begun_anew; }
+
   /// The scale, an odometry of scale 1 within \p prior_sigma (of the log) being expected: a measurement far outside of
   /// that stands alone. Nothing while no accelerometer was compared, or where points did not tell the direction of half
   /// of the way: by the accelerometer alone a steady curve, whose acceleration a bias may be, has no scale, and the
@@ -69,6 +74,7 @@ private:
   bool collect(const Frame &frame);
   void restart(const Frame &frame);
   void begin(const Frame &frame);
+  void beginAnew();
   void start(const Frame &frame);
   bool predict(std::int64_t to_ns);
   void propagate(const Eigen::Vector3d &rate, const Eigen::Vector3d &force, double dt);
@@ -85,8 +91,10 @@ private:
   bool m_force_varies = false;
   std::optional<Anchor> m_anchor;
   bool m_started = false; ///< the velocity is known
-  int m_compared = 0;     ///< windows
-  int m_directions = 0;   ///< windows in which points told where it went
+  double m_misfit = 1;    ///< mean of the last squared innovations over their variances
+  bool m_has_begun_anew = false;
+  int m_compared = 0;   ///< windows
+  int m_directions = 0; ///< windows in which points told where it went
 
   Eigen::Matrix3d m_wRb = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d m_turned = Eigen::Matrix3d::Identity(); ///< since the anchor, by the gyro less its bias

@@ -110,16 +110,17 @@ double roundness(const cv::Mat &image, const cv::Point2f &at)
 }
 
 bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
-                  const FollowOptions &options)
+                  int levels)
 {
-  const int top = std::min({options.levels, static_cast<int>(first.size()) - 1, static_cast<int>(second.size()) - 1});
+  constexpr int kIterations = 10; // a level, at most
+  const int top = std::min({levels, static_cast<int>(first.size()) - 1, static_cast<int>(second.size()) - 1});
   bool is_found = false;
   to *= std::ldexp(1.f, -top);
   for (int level = top; level >= 0; --level) {
     const std::size_t l = static_cast<std::size_t>(level);
     cv::Point2f corner = to - kHalf;
-    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - kHalf, corner,
-                        options.iterations, level == 0 ? kLeastRoundness : 0);
+    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - kHalf, corner, kIterations,
+                        level == 0 ? kLeastRoundness : 0);
     to = corner + kHalf;
     if (level > 0)
       to *= 2.f;

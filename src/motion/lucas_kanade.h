@@ -16,12 +16,6 @@ namespace bole
 using GreyPyramid = std::vector<cv::Mat>;
 void buildPyramid(const cv::Mat &image, int levels, GreyPyramid &pyramid);
 
-struct FollowOptions
-{
-  int levels = 3;      ///< above the image
-  int iterations = 10; ///< a level, at most
-};
-
 /// Least over greatest eigenvalue of the gradient moments of the window round \p at: 1 where the picture changes alike
 /// in all directions, 0 along a line, on which a window can slide. A position errs along the weak direction by 1 /
 /// sqrt(roundness) of its error across it.
@@ -30,8 +24,8 @@ double roundness(const cv::Mat &image, const cv::Point2f &at);
 /// law above, and below 0.1 every second one is beyond a pixel where ropes and beams are in view.
 constexpr double kLeastRoundness = 0.1;
 
-/// Finds the window round \p from of \p first in \p second, from \p to on; false where it has no texture or leaves the
-/// image.
+/// Finds the window round \p from of \p first in \p second, from \p to on, on so many \p levels above the image; false
+/// where it has no texture or leaves the image. A point is taken to be as bright in both.
 bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
-                  const FollowOptions &options);
+                  int levels);
 } // namespace bole

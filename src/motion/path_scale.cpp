@@ -37,6 +37,15 @@ void PathScale::add(const Frame &frame)
     m_steps.pop_front();
 }
 
+void PathScale::forget(double last_s)
+{
+  for (auto step = m_steps.rbegin(); step != m_steps.rend() && last_s > 0; ++step) {
+    step->is_known = false;
+    step->is_bias_open = true;
+    last_s -= step->duration;
+  }
+}
+
 /// The samples' means held in between.
 PathScale::Step PathScale::stepTo(const Frame &frame)
 {
@@ -112,6 +121,11 @@ public:
     m_covariance.diagonal().segment<3>(kAttitude).setConstant(kTilt * kTilt);
     m_covariance.diagonal().segment<3>(kVelocity).setConstant(speed_sigma * speed_sigma);
     m_covariance.diagonal().segment<3>(kPlace) = placeVariance();
+    if (!step.is_bias_open)
+      return;
+    m_covariance.middleRows<3>(kForce).setZero();
+    m_covariance.middleCols<3>(kForce).setZero();
+    m_covariance.diagonal().segment<3>(kForce).setConstant(std::pow(accelerometer::kFaultSigma, 2));
   }
 
   void predict(const Step &step)
@@ -142,7 +156,7 @@ public:
     white(kVelocity, force);
     white(kPlace, dt / std::sqrt(3.0) * force);
     white(kPlace, Vector3d(m_walk, m_walk, 0));
-    white(kGyro, Vector3d::Constant(m_gyro.bias_walk));
+    white(kGyro, Vector3d::Constant(kBiasWalk));
     white(kForce, Vector3d::Constant(accelerometer::kBiasWalk));
 
     m_place += dt * m_velocity + m_factor.cwiseProduct(0.5 * dt * dt * gravity + m_wRb * moved);

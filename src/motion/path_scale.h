@@ -49,6 +49,9 @@ public:
   /// Takes in the next frame, the frames being counted from 0. One without samples of the accelerometer begins anew.
   void add(const Frame &frame);
 
+  /// Takes back what the accelerometer said in the \p last_s: from now on its bias may be another one.
+  void forget(double last_s);
+
   /// Logarithm of the length of \p path over the true length, a path of scale 1 within \p prior_sigma being expected:
   /// a measurement far outside of that stands alone. Nothing without an accelerometer.
   std::optional<LogScale> measure(const Path &path, double prior_sigma);
@@ -56,10 +59,11 @@ public:
 private:
   struct Step ///< from the frame before, by gyro and accelerometer, in the body there
   {
-    bool is_known = false; ///< samples covered it
-    std::size_t frame = 0; ///< its end
-    double duration = 0;   ///< [s]
-    double longer = 1;     ///< how much longer a sample stands for than one of 200 Hz
+    bool is_known = false;     ///< samples covered it
+    bool is_bias_open = false; ///< what was known of the bias before does not hold
+    std::size_t frame = 0;     ///< its end
+    double duration = 0;       ///< [s]
+    double longer = 1;         ///< how much longer a sample stands for than one of 200 Hz
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), moved = Eigen::Vector3d::Zero(); ///< without gravity
     std::optional<Eigen::Vector3d> up; ///< at its end, in the body there, by the pose filter

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_motion.h"
 
+#include "geometry/constants.h"
+#include "motion/accelerometer.h"
 #include "motion/row_shear.h"
 
 #include <algorithm>
@@ -19,8 +21,7 @@ void PointMotion::track(const Frame &frame)
 {
   const std::size_t number = m_frames++;
   m_fault.clear();
-  if (m_options.use_gyro)
-    m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
+  m_gyro.insert(m_gyro.end(), frame.gyro.begin(), frame.gyro.end());
   if (frame.status != FrameStatus::ok)
     return;
   Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
@@ -81,12 +82,11 @@ RelativePosePrior PointMotion::expect(RelativeMotion &step, int frames_back, boo
   }
   if (with_odometry && a.wMb && b.wMb) {
     const Pose wMa = *a.wMb * m_bMc, wMb = *b.wMb * m_bMc;
-    step.odometry = (wMa.inverse() * wMb).t;
-    prior.translation = step.odometry;
-    const double walk2 = m_options.odometry_walk * m_options.odometry_walk * 1e-9 * double(b.stamp_ns - a.stamp_ns);
-    const double height2 = m_options.odometry_height_sigma * m_options.odometry_height_sigma;
+    prior.translation = (wMa.inverse() * wMb).t;
+    const double walk2 = std::pow(odometry::kWalk, 2) * secondsOf(b.stamp_ns - a.stamp_ns);
+    const double height2 = std::pow(odometry::kHeightSigma, 2);
     const Eigen::Matrix3d world = Eigen::Vector3d(walk2, walk2, height2).asDiagonal();
-    const double relative = m_options.odometry_relative_sigma * step.odometry->norm();
+    const double relative = odometry::kRelativeSigma * prior.translation->norm();
     prior.translation_covariance =
         wMa.R.transpose() * world * wMa.R + relative * relative * Eigen::Matrix3d::Identity();
   }
@@ -96,12 +96,11 @@ RelativePosePrior PointMotion::expect(RelativeMotion &step, int frames_back, boo
 RelativeMotion PointMotion::relativeTo(int frames_back) const
 {
   RelativeMotion step;
-  const RelativePosePrior prior = expect(step, frames_back, m_options.use_odometry);
+  const RelativePosePrior prior = expect(step, frames_back, false);
   const std::vector<PointMatch> matches = m_tracker.matches(frames_back);
   step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
   if (frames_back == *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end()))
-    step.points = prior.aRb || prior.translation ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose)
-                                                 : step.estimate;
+    step.points = prior.aRb ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose) : step.estimate;
   return step;
 }
 
@@ -166,7 +165,7 @@ void PointMotion::learn(const std::vector<RelativeMotion> &motions)
   if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns)
     return;
   m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
-                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose(), m_options.gyro);
+                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose());
   m_bias_until_ns = step.b_ns;
 }
 } // namespace bole

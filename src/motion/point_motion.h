@@ -4,8 +4,8 @@
 /// The stage: from each frame to the relative rotation and direction of motion since earlier
 /// frames.
 ///
-/// Idea: PointTracker follows corners, integrateGyro() and the pose filter say what to expect,
-/// estimateRelativePose() joins the three. The rotation it finds gives the gyro's bias back, so
+/// Idea: PointTracker follows corners, integrateGyro() says what to expect, estimateRelativePose() joins the two: the
+/// pose filter is the smoother's, and must not count twice. The rotation it finds gives the gyro's bias back, so
 /// that after a few frames the gyro alone is several times better than at the start, also on frames
 /// without a single point.
 ///
@@ -34,18 +34,9 @@ struct PointMotionOptions
 {
   RelativePoseOptions relative_pose;
   GyroOptions gyro;
-  bool use_gyro = true;
-  bool use_odometry = true;
   std::vector<int> frames_back{1, 3}; ///< each 1 to PointTracker::kHistory - 1
   int every = 1; ///< good frames from one whose motions are told to the next, 1 to 20: those of frames between are no
                  ///< news, as the same errors of the same points are in them
-  /// The pose filter's errors. Measured on the rendered flights (120 frames of 0.1 s, three seeds):
-  /// in the horizontal plane they walk, 11 mm a frame; the height has white noise, 27 mm between
-  /// any two frames; and the same holds of the attitude (roll, pitch 0.006 rad between any two
-  /// frames, white, yaw 0.0065 rad and walking).
-  double odometry_walk = 0.036;          ///< horizontal [m/sqrt(s)], > 0
-  double odometry_height_sigma = 0.027;  ///< of the difference of two heights [m], > 0
-  double odometry_relative_sigma = 0.03; ///< error in proportion to the path (scale, heading), > 0
 };
 
 /// Motion of the camera from frame a (\p frames_back before) to the current frame b.
@@ -58,8 +49,7 @@ struct RelativeMotion
   /// By the points alone: neither gyro nor odometry is in it, so it can judge both. Only for the longest of the
   /// options' frames_back, else too_few_points.
   RelativePoseEstimate points;
-  std::optional<GyroRotation> gyro;        ///< of the body, the prior that was used
-  std::optional<Eigen::Vector3d> odometry; ///< aMb's translation by the pose filter, camera axes [m]
+  std::optional<GyroRotation> gyro; ///< of the body, the prior that was used
 };
 
 class PointMotion

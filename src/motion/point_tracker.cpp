@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
+#include "geometry/median.h"
 #include "motion/coarse_shift.h"
 #include "motion/image_view.h"
 #include "motion/lucas_kanade.h"
@@ -58,6 +59,25 @@ namespace
 cv::Point2f toCv(const Eigen::Vector2d &p) { return {float(p.x()), float(p.y())}; }
 Eigen::Vector2d toEigen(const cv::Point2f &p) { return {double(p.x), double(p.y)}; }
 
+/// Makes the image \p before as bright as \p now is, where the exposure changed. What comes into view changes the mean,
+/// and hardly the median of all ratios.
+void brighten(GreyPyramid &before, const GreyPyramid &now)
+{
+  constexpr double kLeast = 0.1; // of change: less is followed as it is
+  constexpr double kDark = 8;    // grey levels that are no light
+  const cv::Mat &a = before.back(), &b = now.back();
+  std::vector<double> ratios;
+  for (int y = 0; y < a.rows; ++y)
+    for (int x = 0; x < a.cols; ++x)
+      ratios.push_back((b.at<unsigned char>(y, x) + kDark) / (a.at<unsigned char>(y, x) + kDark));
+  const double ratio = medianOf(std::move(ratios));
+  if (std::abs(ratio - 1) < kLeast)
+    return;
+  cv::Mat brighter;
+  before.front().convertTo(brighter, CV_8U, ratio, (ratio - 1) * kDark);
+  buildPyramid(brighter, kLevels, before);
+}
+
 /// Which parts of the image already hold a point: squares of the minimum distance, looked up in a
 /// mask.
 class Occupancy
@@ -99,8 +119,10 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
                                   m_state->camera.width, m_state->camera.height));
   }
   buildPyramid(current, kLevels, m_state->next);
-  if (!m_state->pyramid.empty() && !m_state->tracks.empty())
+  if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
+    brighten(m_state->pyramid, m_state->next);
     m_state->follow(aRb);
+  }
   m_state->replenish(current);
   m_state->pyramid.swap(m_state->next);
   ++m_state->frames;
@@ -111,16 +133,14 @@ template <typename Start>
 std::pair<std::vector<std::optional<Eigen::Vector2d>>, std::size_t>
 PointTracker::State::search(const Start &start) const
 {
-  FollowOptions there, back;
-  there.levels = kLevels;
-  back.levels = 1; // started where it came from, one level settles whether it is the same corner
+  constexpr int kBack = 1; // started where it came from, one level settles whether it is the same corner
   std::vector<std::optional<Eigen::Vector2d>> places(tracks.size());
   std::size_t found = 0;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const cv::Point2f from = toCv(tracks[i].current());
     cv::Point2f to = start(tracks[i].current()), again = from;
-    if (!followWindow(pyramid, next, from, to, there) || !camera.contains(toEigen(to), kMargin_px) ||
-        !followWindow(next, pyramid, to, again, back) || cv::norm(again - from) > kMostBackward_px)
+    if (!followWindow(pyramid, next, from, to, kLevels) || !camera.contains(toEigen(to), kMargin_px) ||
+        !followWindow(next, pyramid, to, again, kBack) || cv::norm(again - from) > kMostBackward_px)
       continue;
     places[i] = toEigen(to);
     ++found;

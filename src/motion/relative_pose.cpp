@@ -41,7 +41,6 @@ void takeRotation(RelativePoseEstimate &estimate, const RotationFit &fit)
 {
   estimate.aRb = fit.aRb;
   estimate.covariance.topLeftCorner<3, 3>() = fit.information.ldlt().solve(Eigen::Matrix3d::Identity());
-  estimate.weights = fit.weights;
 }
 
 /// The covariance of the joint fit. A flow of pure noise also seems to know its direction: the
@@ -67,7 +66,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
-    if (motion::parallaxOf(rays, start, sigma, motion::kKernel).score < 0)
+    if (motion::parallaxOf(rays, start, sigma).score < 0)
       start.direction = -start.direction;
     fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
   }
@@ -79,7 +78,7 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
   for (const JointFit &fit : fits) {
     const double angle = std::acos(std::clamp(std::abs(fit.motion.direction.dot(best->motion.direction)), 0.0, 1.0));
     const double excess = fit.cost * fit.sigma * fit.sigma / (best->sigma * best->sigma) - best->cost;
-    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
+    const Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma);
     ambiguous = ambiguous || (angle > 0.2 && excess < 4 && std::abs(parallax.score) > 3);
   }
   return *best;
@@ -97,7 +96,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   RelativePoseEstimate estimate;
   const MotionPrior prior(given);
   takePrior(estimate, given, prior);
-  estimate.weights.assign(matches.size(), 0);
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return estimate;
   const double focal = std::sqrt(camera.fx * camera.fy);
@@ -109,7 +107,7 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma, options);
   bool ambiguous = false;
   JointFit fit = bestFit(rays, starts, prior, start_sigma, min_sigma, options, ambiguous);
-  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma, motion::kKernel);
+  Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma);
   if (parallax.score < -3) {
     fit.motion.direction = -fit.motion.direction;
     parallax.score = -parallax.score;
@@ -117,7 +115,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   estimate.sigma_px = fit.sigma * focal;
   const double flow = motion::medianFlow(rays, fit.motion.aRb);
   estimate.parallax_px = flow * focal;
-  estimate.parallax_ratio = parallax.ratio;
   if (estimate.sigma_px > kMostSigma_px) {
     estimate.status = RelativePoseStatus::inconsistent;
     return estimate;
@@ -135,10 +132,6 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   // parallax.
   const double shared = kSharedError * fit.sigma / std::max(flow, fit.sigma);
   estimate.covariance.bottomRightCorner<2, 2>() += shared * shared * Eigen::Matrix2d::Identity();
-  residualsOfMatches(rays.columns, motion::Epipolar(fit.motion).terms(fit.sigma, motion::kKernel),
-                     estimate.weights.data());
-  for (double &weight : estimate.weights)
-    weight = motion::weightOf(weight / fit.sigma, motion::kKernel);
   return estimate;
 }
 } // namespace bole

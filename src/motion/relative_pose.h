@@ -73,8 +73,6 @@ struct RelativePoseEstimate
   Matrix5d covariance = Matrix5d::Identity(); ///< (phi, tau) [rad^2]
   double sigma_px = 0;                        ///< noise of a match, one coordinate
   double parallax_px = 0;                     ///< median flow left when the rotation is taken out
-  double parallax_ratio = 0;                  ///< see RelativePoseOptions::min_parallax_ratio
-  std::vector<double> weights;                ///< of the matches, 0 .. 1
 
   bool hasRotation() const { return status == RelativePoseStatus::ok || status == RelativePoseStatus::no_parallax; }
   bool hasDirection() const { return status == RelativePoseStatus::ok; }

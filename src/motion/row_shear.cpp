@@ -32,7 +32,7 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
   double shear = 0;
   std::vector<double> residuals(rays.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    motion::EpipolarTerms terms = motion::Epipolar(motion).terms(1, motion::kKernel);
+    motion::EpipolarTerms terms = motion::termsOf(motion, 1);
     terms.shear = shear;
     residualsOfMatches(rays.columns, terms, residuals.data());
     const double sigma = terms.sigma = std::max(min_sigma, motion::bulkSigma(residuals));

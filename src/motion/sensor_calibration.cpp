@@ -4,6 +4,7 @@
 #include "geometry/constants.h"
 #include "motion/calibration_fit.h"
 #include "motion/camera_gyro.h"
+#include "motion/gravity.h"
 #include "motion/inertial_scale.h"
 #include "motion/sensor_monitor.h"
 
@@ -33,21 +34,7 @@ constexpr double kScale = 0.03;       ///< of the narrow part of the prior on th
 constexpr double kWideScale = 0.25;   ///< of the wide one
 constexpr double kWidePart = 0.1;     ///< of the odometries: those that are not as stated
 constexpr double kPointsSigma = 7e-4; ///< of a rotation by points beside their own covariance [rad]
-constexpr double kTurnSigma = 0.007;  ///< of the odometry's rotation between two poses [rad]
 constexpr std::size_t kLeastMotions = 15;
-
-/// The bias of a gyro that is \p late_s, by the rotations of the points.
-Fitted fitBias(const GyroPath &path, const std::vector<Turn> &turns, double late_s, double overlap, double scatter)
-{
-  std::vector<Row> rows;
-  for (const Turn &turn : turns) {
-    const auto turned = path.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
-    if (turned) // the rates less the bias: what is left of it turns the other way
-      rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
-                        logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
-  }
-  return solve(rows, kWideBias * kWideBias, scatter);
-}
 
 /// The frames with the constants taken out.
 std::vector<Frame> corrected(const std::vector<Frame> &frames, const SensorCalibration &calibration)
@@ -87,9 +74,8 @@ std::vector<GyroSample> samplesOf(const std::vector<Frame> &frames)
 class Estimation
 {
 public:
-  Estimation(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions, const Pose &bMc,
-             const GyroOptions &gyro)
-      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_gyro(gyro), m_samples(samplesOf(frames))
+  Estimation(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions, const Pose &bMc)
+      : m_frames(frames), m_motions(motions), m_bMc(bMc), m_samples(samplesOf(frames))
   {
     for (const RelativeMotion &motion : motions) {
       if (!motion.points.hasRotation())
@@ -98,7 +84,7 @@ public:
       turn.a_ns = motion.a_ns;
       turn.b_ns = motion.b_ns;
       turn.aRb = bMc.R * motion.points.aRb * bMc.R.transpose();
-      const double white = std::pow(kPointsSigma, 2) + std::pow(gyro.noise_density, 2) * turn.duration();
+      const double white = std::pow(kPointsSigma, 2) + std::pow(m_gyro.noise_density, 2) * turn.duration();
       turn.information =
           (bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * bMc.R.transpose() + white * Matrix3d::Identity())
               .inverse();
@@ -116,7 +102,7 @@ public:
       return m_result; // whatever else is measured rests on camera and gyro
     if (m_is_gyro_explained) {
       calibrateOdometryClock();
-      calibrateRotation();
+      calibrateAttitude();
       calibrateScale();
     }
     judge();
@@ -129,15 +115,28 @@ public:
   }
 
 private:
+  using AttitudeRow = RowOf<6>; ///< bRo, bias of the accelerometer
+  struct Attitude
+  {
+    Matrix3d bRo = Matrix3d::Identity();
+    Vector3d force_bias = Vector3d::Zero();
+    FittedOf<6> fit; ///< about these
+    double cost = 0; ///< with that of the priors
+    AttitudeRow::Unknowns value() const { return (AttitudeRow::Unknowns() << logSo3(bRo), force_bias).finished(); }
+  };
+
   void calibrateGyro();
-  void calibrateRotation();
+  std::optional<Attitude> fitAttitude(double mount_sigma, double bias_sigma, double scatter) const;
+  void calibrateAttitude();
   void calibrateOdometryClock();
   void calibrateScale();
   void judge();
   template <typename Take> void replay(const Take &take) const;
-  void addDirections(const std::vector<Frame> &frames, std::vector<Row> &rows) const;
-  void addGravity(const std::vector<Frame> &frames, std::vector<Row> &rows) const;
-  void addTurns(const std::vector<Frame> &frames, const GyroPath &path, double late_s, std::vector<Row> &rows) const;
+  void addDirections(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
+  void addGravity(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
+  template <int P>
+  void addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
+                std::vector<RowOf<P>> &rows) const;
 
   void addConstant(const char *name, double value, double sigma, bool used, std::string text)
   {
@@ -147,7 +146,7 @@ private:
   const std::vector<Frame> &m_frames;
   const std::vector<RelativeMotion> &m_motions;
   Pose m_bMc;
-  GyroOptions m_gyro;
+  const GyroOptions m_gyro;
   std::vector<GyroSample> m_samples;
   std::vector<Turn> m_turns;
   double m_overlap = 1; ///< turns that share an interval
@@ -160,31 +159,26 @@ void Estimation::calibrateGyro()
   Vector3d bias = Vector3d::Zero();
   Minimum late;
   Fitted fit;
-  std::vector<Turn> turns;                  // that every offset can be tried on
-  for (int round = 0; round < 2; ++round) { // the second one with the bias taken off exactly
-    const GyroPath path(m_samples, bias);
+  std::vector<GyroSample> samples = m_samples; // less the bias
+  std::vector<Turn> turns;                     // that every offset can be tried on
+  for (int round = 0; round < 2; ++round) {    // the second one with the bias taken off exactly
     turns.clear();
     for (const Turn &turn : m_turns)
-      if (path.between(turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
+      if (turnBetween(samples, turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
         turns.push_back(turn);
     if (turns.size() < kLeastMotions)
       return;
-    double best = std::numeric_limits<double>::max(), scatter = 1;
-    for (int k = -kLateSteps; k <= kLateSteps; ++k) { // the scatter of the best offset is that of the noise
-      const Fitted tried = fitBias(path, turns, kLateStep_s * k, m_overlap, 1);
-      if (tried.cost < best) {
-        best = tried.cost;
-        scatter = 0;
-        fit = fitBias(path, turns, kLateStep_s * k, m_overlap, scatter);
-        scatter = std::sqrt(fit.covariance.trace() / tried.covariance.trace());
-        scatter *= scatter;
-      }
-    }
-    late = minimiseLate([&](double late_s) { return fitBias(path, turns, late_s, m_overlap, scatter).cost; });
-    fit = fitBias(path, turns, late.is_inside ? late.late_s : 0, m_overlap, scatter);
+    const auto fitAt = [&](double late_s, double scatter) {
+      return fitBias(samples, turns, late_s, m_overlap, scatter);
+    };
+    const double scatter = leastScatter(fitAt);
+    late = minimiseLate([&](double late_s) { return fitAt(late_s, scatter).cost; });
+    fit = fitAt(late.is_inside ? late.late_s : 0, scatter);
     bias += fit.value;
+    for (GyroSample &sample : samples)
+      sample.rate -= fit.value;
   }
-  m_result.verdicts = judgeCamera(GyroPath(m_samples, bias), turns, m_bMc.R, m_overlap);
+  m_result.verdicts = judgeCamera(samples, turns, m_bMc.R, m_overlap);
   for (SensorVerdict &verdict : m_result.verdicts)
     verdict.since_s = secondsOf(m_frames.front().stamp_ns);
   m_is_gyro_explained = fit.failing < kMostFailing;
@@ -207,9 +201,8 @@ void Estimation::calibrateGyro()
 }
 
 /// Direction of flight: bRo takes that of the odometry to that of the points.
-void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row> &rows) const
+void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const
 {
-  const SensorMonitorOptions noise;
   for (const RelativeMotion &motion : m_motions) {
     const Frame &a = frames[motion.a_index], &b = frames[motion.b_index];
     if (!motion.points.hasDirection() || motion.points.parallax_px < 1 || !a.wMb_odometry || !b.wMb_odometry)
@@ -220,9 +213,7 @@ void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row
       continue;
     const Vector3d by_odometry = moved / length, by_points = m_bMc.R * motion.points.direction;
     const double variance =
-        0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() +
-        (std::pow(noise.odometry_walk, 2) * dt + std::pow(noise.odometry_height_sigma, 2)) / (length * length) +
-        std::pow(noise.odometry_relative, 2);
+        0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() + odometry::directionVariance(length, dt);
     Matrix23d across;
     across.row(0) = by_points.unitOrthogonal().transpose();
     across.row(1) = by_points.cross(Vector3d(across.row(0))).transpose();
@@ -231,56 +222,32 @@ void Estimation::addDirections(const std::vector<Frame> &frames, std::vector<Row
   }
 }
 
-/// Gravity: over all frames the mean force, turned by the odometry, is up.
-void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Row> &rows) const
+/// Gravity, in three parts of the time: the mean force, less the bias and turned by the odometry, is up.
+void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const
 {
-  constexpr double kSigma = 0.012;                   // of the tilt by the bias of an accelerometer, 0.1 m/s^2 [rad]
-  constexpr std::int64_t kVelocity_ns = 290'000'000; // that a velocity is taken over: three frames at 10 Hz
   constexpr std::size_t kParts = 3;
+  const std::vector<GyroSample> samples = samplesOf(frames);
   for (std::size_t part = 0; part < kParts; ++part) {
-    const std::size_t first = part * (frames.size() - 1) / kParts, last = (part + 1) * (frames.size() - 1) / kParts;
-    Vector3d sum = Vector3d::Zero();
-    Matrix3d by_rotation = Matrix3d::Zero();
-    int count = 0;
-    bool varies = false;
-    std::optional<Vector3d> before;
-    std::size_t steps = 1; // that a velocity is taken over
-    while (first + steps < last && frames[first + steps].stamp_ns - frames[first].stamp_ns < kVelocity_ns)
-      ++steps;
-    if (last < first + 2 * steps + 2)
-      return;
-    for (std::size_t i = first + 1; i <= last; ++i) {
+    Trajectory poses;
+    for (std::size_t i = part * (frames.size() - 1) / kParts; i <= (part + 1) * (frames.size() - 1) / kParts; ++i) {
       if (!frames[i].wMb_odometry)
         return;
-      for (const GyroSample &sample : frames[i].gyro) {
-        if (!sample.force)
-          return;
-        varies = varies || (before && *before != *sample.force);
-        before = sample.force;
-        sum += frames[i].wMb_odometry->R * *sample.force;
-        by_rotation += frames[i].wMb_odometry->R * skew(*sample.force);
-        ++count;
-      }
+      poses.push_back({frames[i].stamp_ns, *frames[i].wMb_odometry});
     }
-    if (count < 40 || !varies || !frames[first].wMb_odometry)
+    const auto gravity = compareGravity(poses, samples);
+    if (!gravity)
       return;
-    const auto velocity = [&](std::size_t i) {
-      return Vector3d((frames[i + steps].wMb_odometry->t - frames[i].wMb_odometry->t) /
-                      secondsOf(frames[i + steps].stamp_ns - frames[i].stamp_ns));
-    };
-    const double dt = secondsOf(frames[last].stamp_ns - frames[first].stamp_ns);
-    const double lag = secondsOf(frames[first + steps].stamp_ns - frames[first].stamp_ns);
-    const Vector3d acceleration = (velocity(last - steps) - velocity(first)) / std::max(0.1, dt - lag);
-    const Vector3d up = sum / count - acceleration;
-    const double sigma = std::hypot(kSigma, 0.1 / (kGravity * dt)); // 0.1 m/s: of a velocity
-    rows.emplace_back(Matrix23d(by_rotation.topRows<2>() / count / kGravity), Eigen::Vector2d(up.head<2>() / kGravity),
-                      Eigen::Matrix2d(Eigen::Matrix2d::Identity() / (sigma * sigma)), double(kParts));
+    Eigen::Matrix<double, 3, 6> J;
+    J << gravity->by_rotation, gravity->by_bias;
+    const double sigma = std::hypot(gravity->sigma, kGravity * accelerometer::kTiltSigma);
+    rows.emplace_back(J, gravity->off, Matrix3d(Matrix3d::Identity() / (sigma * sigma)), 1.0);
   }
 }
 
 /// Rotations over half a second: bRo carries those of the odometry to those of the gyro.
-void Estimation::addTurns(const std::vector<Frame> &frames, const GyroPath &path, double late_s,
-                          std::vector<Row> &rows) const
+template <int P>
+void Estimation::addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
+                          std::vector<RowOf<P>> &rows) const
 {
   constexpr std::int64_t kApart_ns = 500'000'000;
   constexpr double kShared = 2; // turns that have an end in common
@@ -292,50 +259,86 @@ void Estimation::addTurns(const std::vector<Frame> &frames, const GyroPath &path
       return;
     if (!frames[a].wMb_odometry || !frames[b].wMb_odometry)
       continue;
-    const auto turned = path.between(frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
+    const auto turned = turnBetween(samples, frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
     if (!turned)
       continue;
     const Vector3d by_gyro = logSo3(*turned);
     const Vector3d by_odometry =
         logSo3(orthonormalized(frames[a].wMb_odometry->R.transpose() * frames[b].wMb_odometry->R));
     const double dt = secondsOf(frames[b].stamp_ns - frames[a].stamp_ns);
-    const double variance = kTurnSigma * kTurnSigma + std::pow(m_gyro.bias_sigma * dt, 2);
+    const double variance = odometry::kTurnSigma * odometry::kTurnSigma + std::pow(m_gyro.bias_sigma * dt, 2);
     rows.emplace_back(Matrix3d(-skew(by_odometry)), Vector3d(by_odometry - by_gyro),
                       Matrix3d(Matrix3d::Identity() / variance), kShared);
   }
 }
 
-void Estimation::calibrateRotation()
+/// The attitude under priors of these widths; nothing where images do not bear witness.
+std::optional<Estimation::Attitude> Estimation::fitAttitude(double mount_sigma, double bias_sigma, double scatter) const
 {
-  Matrix3d bRo = Matrix3d::Identity();
-  Fitted fit;
+  AttitudeRow::Unknowns prior2;
+  prior2 << Vector3d::Constant(mount_sigma * mount_sigma), Vector3d::Constant(bias_sigma * bias_sigma);
+  Attitude attitude;
   for (int round = 0; round < 4; ++round) {
     SensorCalibration tried = m_result;
-    tried.bRo = bRo;
+    tried.bRo = attitude.bRo;
+    tried.force_bias = attitude.force_bias;
     const std::vector<Frame> frames = corrected(m_frames, tried);
-    std::vector<Row> rows;
+    std::vector<AttitudeRow> rows;
     addDirections(frames, rows);
-    if (rows.size() < kLeastMotions) // the images must bear witness
-      return;
+    if (rows.size() < kLeastMotions)
+      return std::nullopt;
     addGravity(frames, rows);
-    addTurns(frames, GyroPath(samplesOf(frames), Vector3d::Zero()), 0, rows);
-    fit = solve(rows, kWideMount * kWideMount);
-    bRo = expSo3(fit.value) * bRo;
+    addTurns(frames, samplesOf(frames), 0, rows);
+    attitude.fit = solve(rows, prior2, scatter, attitude.value());
+    attitude.bRo = expSo3(attitude.fit.value.head<3>()) * attitude.bRo;
+    attitude.force_bias += attitude.fit.value.tail<3>();
   }
-  if (fit.failing >= kMostFailing)
+  attitude.cost = attitude.fit.cost + attitude.value().cwiseAbs2().cwiseQuotient(prior2).sum();
+  return attitude;
+}
+
+/// Gravity contradicts an odometry that is turned and an accelerometer that is off alike. Directions of flight and
+/// turns show the first, where they can; where they cannot it is the accelerometer, which costs the map nothing.
+void Estimation::calibrateAttitude()
+{
+  constexpr double kTurned = 1.5 * kBetter; // that a turned odometry must explain more
+  constexpr double kMost = 3;               // standard deviations
+  const std::optional<Attitude> open = fitAttitude(kWideMount, accelerometer::kFaultSigma, 0);
+  if (!open || open->fit.failing >= kMostFailing)
     return;
-  const Vector3d rotation = logSo3(bRo);
-  const Matrix3d expected = fit.covariance + kMount * kMount * Matrix3d::Identity();
-  const bool is_turned = rotation.dot(expected.ldlt().solve(rotation)) > kBetter;
-  const double sigma = std::sqrt(fit.covariance.trace() / 3);
-  addConstant("odometry_rotation", rotation.norm(), sigma, is_turned,
+  std::optional<Attitude> best;
+  bool is_turned = false, is_biased = false;
+  for (const bool turned : {false, true})
+    for (const bool biased : {false, true}) {
+      std::optional<Attitude> tried =
+          fitAttitude(turned ? kWideMount : kMount, biased ? accelerometer::kFaultSigma : accelerometer::kBiasSigma,
+                      open->fit.scatter);
+      tried->cost += (turned ? kTurned : 0) + (biased ? kBetter : 0);
+      const bool is_likely = tried->force_bias.norm() < kMost * accelerometer::kFaultSigma;
+      if (best && (tried->cost >= best->cost || !is_likely)) // more is another fault
+        continue;
+      best = tried;
+      is_turned = turned;
+      is_biased = biased;
+    }
+  const auto sigmaOf = [](const auto &covariance) { return std::sqrt(covariance.trace() / 3); };
+  const Attitude &turn = is_turned ? *best : *open, &bias = is_biased ? *best : *open;
+  const Vector3d rotation = logSo3(turn.bRo);
+  const double turn_sigma = sigmaOf(turn.fit.covariance.topLeftCorner<3, 3>()),
+               bias_sigma = sigmaOf(bias.fit.covariance.bottomRightCorner<3, 3>());
+  addConstant("odometry_rotation", rotation.norm(), turn_sigma, is_turned,
               fmt::format("odometry: body turned by {:.1f} +- {:.1f} degrees (roll {:.1f}, pitch {:.1f}, yaw {:.1f})",
-                          rotation.norm() / kDegree, sigma / kDegree, rotation.x() / kDegree, rotation.y() / kDegree,
-                          rotation.z() / kDegree));
-  if (!is_turned)
-    return;
-  m_result.bRo = bRo;
-  m_result.odometry_rotation_sigma = sigma;
+                          rotation.norm() / kDegree, turn_sigma / kDegree, rotation.x() / kDegree,
+                          rotation.y() / kDegree, rotation.z() / kDegree));
+  if (bias_sigma < 0.5 * accelerometer::kFaultSigma) // else nothing measured it
+    addConstant("accelerometer_bias", bias.force_bias.norm(), bias_sigma, is_biased,
+                fmt::format("accelerometer: off by {:.2f} +- {:.2f} m/s^2", bias.force_bias.norm(), bias_sigma));
+  if (is_biased)
+    m_result.force_bias = best->force_bias;
+  if (is_turned) {
+    m_result.bRo = best->bRo;
+    m_result.odometry_rotation_sigma = turn_sigma;
+  }
 }
 
 void Estimation::calibrateOdometryClock()
@@ -343,26 +346,19 @@ void Estimation::calibrateOdometryClock()
   SensorCalibration tried = m_result;
   tried.odometry_late_s = 0;
   const std::vector<Frame> frames = corrected(m_frames, tried);
-  const GyroPath path(samplesOf(frames), Vector3d::Zero());
+  const std::vector<GyroSample> samples = samplesOf(frames);
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)
-    if (path.between(frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
+    if (turnBetween(samples, frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
       usable.push_back(frame);
   if (usable.size() < 2 * kLeastMotions)
     return;
   const auto fitAt = [&](double late_s, double scatter) {
     std::vector<Row> rows;
-    addTurns(usable, path, late_s, rows);
+    addTurns(usable, samples, late_s, rows);
     return solve(rows, kWideMount * kWideMount, scatter); // whatever its body stands like
   };
-  double best = std::numeric_limits<double>::max(), scatter = 1;
-  for (int k = -kLateSteps; k <= kLateSteps; ++k) {
-    const Fitted plain = fitAt(kLateStep_s * k, 1);
-    if (plain.cost < best) {
-      best = plain.cost;
-      scatter = fitAt(kLateStep_s * k, 0).covariance.trace() / plain.covariance.trace();
-    }
-  }
+  const double scatter = leastScatter(fitAt);
   const auto cost = [&](double late_s) { return fitAt(late_s, scatter).cost; };
   const Minimum late = minimiseLate(cost);
   if (!late.is_inside || fitAt(late.late_s, scatter).failing >= kMostFailing)
@@ -411,9 +407,13 @@ void Estimation::judge()
 void Estimation::calibrateScale()
 {
   InertialScale inertial(m_bMc, m_gyro, kMostScale);
-  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) { inertial.process(frame, seen); });
+  bool is_constant = true; // the accelerometer's bias: what is left of so short a time tells no scale
+  replay([&](const Frame &frame, const std::vector<RelativeMotion> &seen) {
+    inertial.process(frame, seen);
+    is_constant = is_constant && !inertial.hasBegunAnew();
+  });
   const std::optional<LogScale> measured = inertial.scale(kMostScale);
-  if (!measured || std::abs(measured->mean) > kMostScale)
+  if (!measured || !is_constant || std::abs(measured->mean) > kMostScale)
     return;
   const auto density = [&](double prior_sigma) {
     const double variance = std::pow(measured->sigma, 2) + prior_sigma * prior_sigma;
@@ -430,76 +430,56 @@ void Estimation::calibrateScale()
 } // namespace
 } // namespace calibration
 
-SensorCalibrator::SensorCalibrator(const Pose &bMc, const GyroOptions &gyro) : m_bMc(bMc), m_gyro(gyro) {}
-
-void SensorCalibrator::add(const Frame &frame, const std::optional<RelativeMotion> &motion)
+SensorCalibration calibrate(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions,
+                            const Pose &bMc)
 {
-  Frame kept;
-  kept.stamp_ns = frame.stamp_ns;
-  kept.index = m_frames.size();
-  kept.wMb_odometry = frame.wMb_odometry;
-  kept.gyro = frame.gyro;
-  m_frames.push_back(std::move(kept));
-  if (motion)
-    m_motions.push_back(*motion);
-}
-
-double SensorCalibrator::duration_s() const
-{
-  return m_frames.empty() ? 0 : secondsOf(m_frames.back().stamp_ns - m_frames.front().stamp_ns);
-}
-
-SensorCalibration SensorCalibrator::estimate() const
-{
-  if (m_frames.size() < calibration::kLeastMotions)
+  if (frames.size() < calibration::kLeastMotions)
     return {};
-  return calibration::Estimation(m_frames, m_motions, m_bMc, m_gyro).run();
+  return calibration::Estimation(frames, motions, bMc).run();
 }
 
 SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_odometry)
 {
   if (!(use_gyro && source.hasGyro()) && !(use_odometry && source.hasOdometry()))
     return {};
-  SensorCalibrator calibrator(source.bMc());
   const PinholeCamera camera = source.camera();
   PointTracker tracker(camera);
-  struct Tracked
-  {
-    std::int64_t stamp_ns;
-    std::size_t index;
-  };
-  std::vector<Tracked> tracked;
-  Frame frame;
-  for (std::size_t index = 0; calibrator.duration_s() < calibration::kLooksThrough_s && source.next(frame); ++index) {
+  std::vector<Frame> frames; // without images
+  std::vector<RelativeMotion> motions;
+  std::vector<std::size_t> tracked;
+  const auto sinceFrame = [&frames](std::size_t a) { return secondsOf(frames.back().stamp_ns - frames[a].stamp_ns); };
+  for (Frame frame; (frames.empty() || sinceFrame(0) < calibration::kLooksThrough_s) && source.next(frame);) {
+    Frame kept;
+    kept.stamp_ns = frame.stamp_ns;
+    kept.index = frames.size();
+    if (use_odometry)
+      kept.wMb_odometry = frame.wMb_odometry;
+    if (use_gyro)
+      kept.gyro = frame.gyro;
+    frames.push_back(std::move(kept));
     // an image that contradicts the gyro is the one that is asked
     const bool is_seen = (frame.status == FrameStatus::ok || frame.status == FrameStatus::doubtful) &&
                          frame.image.getWidth() == static_cast<unsigned>(camera.width) &&
                          frame.image.getHeight() == static_cast<unsigned>(camera.height);
-    std::optional<RelativeMotion> motion;
-    if (is_seen) {
-      tracker.track(frame.image);
-      tracked.push_back({frame.stamp_ns, index});
-      int back = 1;
-      while (back < std::min<int>(PointTracker::kHistory, static_cast<int>(tracked.size())) - 1 &&
-             secondsOf(frame.stamp_ns - (tracked.rbegin() + back)->stamp_ns) < calibration::kBaseline_s)
-        ++back;
-      if (back < static_cast<int>(tracked.size())) {
-        const Tracked &a = *(tracked.rbegin() + back);
-        motion.emplace();
-        motion->frames_back = back;
-        motion->a_ns = a.stamp_ns;
-        motion->b_ns = frame.stamp_ns;
-        motion->a_index = a.index;
-        motion->b_index = index;
-        motion->points = motion->estimate = estimateRelativePose(tracker.matches(back), camera);
-      }
-    }
-    if (!use_gyro)
-      frame.gyro.clear();
-    if (!use_odometry)
-      frame.wMb_odometry.reset();
-    calibrator.add(frame, motion);
+    if (!is_seen)
+      continue;
+    tracker.track(frame.image);
+    tracked.push_back(frames.size() - 1);
+    const int most = std::min<int>(PointTracker::kHistory, static_cast<int>(tracked.size())) - 1;
+    if (most < 1)
+      continue;
+    int back = 1;
+    while (back < most && sinceFrame(tracked.rbegin()[back]) < calibration::kBaseline_s)
+      ++back;
+    RelativeMotion motion;
+    motion.frames_back = back;
+    motion.a_index = tracked.rbegin()[back];
+    motion.b_index = tracked.back();
+    motion.a_ns = frames[motion.a_index].stamp_ns;
+    motion.b_ns = frame.stamp_ns;
+    motion.points = motion.estimate = estimateRelativePose(tracker.matches(back), camera);
+    motions.push_back(motion);
   }
-  return calibrator.estimate();
+  return calibrate(frames, motions, source.bMc());
 }
 } // namespace bole

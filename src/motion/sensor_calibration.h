@@ -6,9 +6,11 @@
 /// Idea: what points say of the rotation and of the direction of flight rests on the images alone, so each constant of
 /// a sensor is the one under which that sensor agrees with them:
 /// - gyro: offset of its clock and bias, by its rotations against those of the points;
-/// - odometry: rotation of its body against the camera's, by its direction of flight against that of the points, its
-///   gravity against the accelerometer's, and its rotations against the gyro's; offset of its clock, by its rotations
-///   against the gyro's; scale of its horizontal lengths, by the accelerometer (InertialScale).
+/// - odometry and accelerometer together: rotation of the odometry's body against the camera's and bias of the
+///   accelerometer, by the odometry's direction of flight against that of the points, its gravity against the
+///   accelerometer's, and its rotations against the gyro's;
+/// - odometry: offset of its clock, by its rotations against the gyro's; scale of its horizontal lengths, by the
+///   accelerometer (InertialScale).
 /// All are robust least squares. The prior of each has two parts: as the sensor is stated (narrow), or anything within
 /// kMost... (wide). A constant is taken over where the wide part explains the measurements better, so a sensor that is
 /// as stated is read as it stands, and the constants that are taken over carry the covariance of their measurement.
@@ -28,24 +30,10 @@
 
 namespace bole
 {
-class SensorCalibrator
-{
-public:
-  explicit SensorCalibrator(const Pose &bMc, const GyroOptions &gyro = {});
-
-  /// The next frame (its image is not looked at) and, where there is one, what points alone say of the motion to it:
-  /// RelativeMotion::points, a_index and b_index counting the frames that were added.
-  void add(const Frame &frame, const std::optional<RelativeMotion> &motion);
-  double duration_s() const;
-
-  SensorCalibration estimate() const;
-
-private:
-  Pose m_bMc;
-  GyroOptions m_gyro;
-  std::vector<Frame> m_frames; ///< without images
-  std::vector<RelativeMotion> m_motions;
-};
+/// The constants by \p frames (images are not looked at) and by what points alone say of \p motions between them:
+/// RelativeMotion::points, a_index and b_index counting the frames.
+SensorCalibration calibrate(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions,
+                            const Pose &bMc);
 
 /// Looks through the first seconds of \p source, which it consumes, and estimates. As stated where the source has
 /// neither gyro nor odometry that is to be used.

@@ -2,6 +2,9 @@
 #include "motion/sensor_monitor.h"
 
 #include "geometry/constants.h"
+#include "motion/accelerometer.h"
+#include "motion/calibration_fit.h"
+#include "motion/camera_gyro.h"
 
 #include <Eigen/Dense>
 
@@ -17,7 +20,14 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kMemory_s = 4;
-constexpr double kAgreed_s = 3; // after which a gyro that contradicted the points is trusted again
+constexpr double kAgreed_s = 3;           // after which a gyro that contradicted the points is trusted again
+constexpr int kWindow = 6, kOfWindow = 4; // comparisons that are remembered, and those that make an alarm
+constexpr double kLimitPoints = 25;   // of a squared difference with the points, 3 degrees of freedom; measured on 15
+                                      // flights: at most 10 without a fault, 20 to 2000 with one
+constexpr double kLimitOdometry = 30; // of one with the odometry; at most 17 without a fault
+constexpr double kLimitOdds = 3;      // of the log-likelihood ratio that the points err and not the gyro: 20 to 1
+constexpr double kBiasSigma = 0.008;  // that a gyro may have [rad/s]
+constexpr double kStuck_s = 0.5;      // with one value
 
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
@@ -27,33 +37,35 @@ double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &c
   return error.dot(covariance.ldlt().solve(error));
 }
 /// \p frame without its rejected sensors: itself, or a copy in \p scratch.
-const Frame &withSensors(const Frame &frame, bool gyro, bool odometry, Frame &scratch)
+const Frame &withSensors(const Frame &frame, bool gyro, bool odometry, bool force, Frame &scratch)
 {
-  if (gyro && odometry)
+  if (gyro && odometry && force)
     return frame;
   scratch = frame;
   if (!gyro)
     scratch.gyro.clear();
   if (!odometry)
     scratch.wMb_odometry.reset();
+  if (!force)
+    for (GyroSample &sample : scratch.gyro)
+      sample.force.reset();
   return scratch;
 }
 } // namespace
 
 const char *toString(Sensor sensor)
 {
-  constexpr const char *kNames[] = {"gyro", "odometry", "images"};
+  constexpr const char *kNames[] = {"gyro", "odometry", "images", "accelerometer"};
   return kNames[static_cast<int>(sensor)];
 }
 
-SensorMonitor::SensorMonitor(const Pose &bMc, const SensorMonitorOptions &options) : m_bMc(bMc), m_options(options) {}
-
 void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
-  std::fill(std::begin(m_wrong_now), std::end(m_wrong_now), false);
+  for (State &state : m_states)
+    state.is_wrong_now = false;
   const Turns turns = turnsTo(frame);
   if (const auto wrong = implausibleSensor(turns))
-    m_wrong_now[static_cast<int>(*wrong)] = true;
+    of(*wrong).is_wrong_now = true;
   collect(frame);
   checkGyroSamples(frame);
   checkSteps(frame, motions);
@@ -66,7 +78,7 @@ void SensorMonitor::process(const Frame &frame, const std::vector<RelativeMotion
   checkRecovery(Sensor::gyro);
   checkRecovery(Sensor::odometry);
   checkDirection();
-  checkTilt(frame);
+  checkGravity();
   if (turns.gyro && trustsNow(Sensor::gyro))
     m_turning = *turns.gyro / turns.dt;
   else if (turns.odometry && trustsNow(Sensor::odometry))
@@ -110,23 +122,33 @@ const Frame &SensorMonitor::withoutRejectedSensors(const Frame &frame, Frame &sc
 {
   const std::optional<Sensor> wrong = implausibleSensor(turnsTo(frame));
   return withSensors(frame, trusts(Sensor::gyro) && wrong != Sensor::gyro,
-                     trusts(Sensor::odometry) && wrong != Sensor::odometry, scratch);
+                     trusts(Sensor::odometry) && wrong != Sensor::odometry, trusts(Sensor::accelerometer), scratch);
 }
 
 const Frame &SensorMonitor::trusted(const Frame &frame, Frame &scratch) const
 {
-  return withSensors(frame, trustsNow(Sensor::gyro), trustsNow(Sensor::odometry), scratch);
+  return withSensors(frame, trustsNow(Sensor::gyro), trustsNow(Sensor::odometry), trusts(Sensor::accelerometer),
+                     scratch);
 }
 
 void SensorMonitor::raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts)
 {
-  const int s = static_cast<int>(sensor);
-  if (m_distrusted[s])
+  State &state = of(sensor);
+  if (state.is_distrusted)
     return;
-  m_distrusted[s] = lasts != Lasts::no;
+  state.is_distrusted = lasts != Lasts::no;
   if (lasts == Lasts::until_agree)
-    m_may_recover[s] = m_verdicts.size();
+    state.may_recover = m_verdicts.size();
   m_verdicts.push_back({toString(sensor), kind, since_s, text});
+}
+
+/// The verdict on \p sensor ends at \p time_s.
+void SensorMonitor::recover(Sensor sensor, double time_s)
+{
+  State &state = of(sensor);
+  state.is_distrusted = false;
+  m_verdicts[*state.may_recover].text += fmt::format(" until {:.1f} s", time_s);
+  state.may_recover.reset();
 }
 
 /// Whether the gyro agreed with the points for three seconds in which the body turned about each axis by more than both
@@ -139,7 +161,7 @@ bool SensorMonitor::hasGyroAgreedInTurns() const
   for (const Comparison &c : m_comparisons) {
     if (c.b_ns <= from_ns)
       continue;
-    if (!c.gyro || c.gyro_points > 0.5 * m_options.limit_points)
+    if (!c.gyro || c.gyro_points > 0.5 * kLimitPoints)
       return false;
     turned += logSo3(*c.points).cwiseAbs2().cwiseQuotient(c.error_covariance.diagonal());
   }
@@ -150,20 +172,20 @@ bool SensorMonitor::hasGyroAgreedInTurns() const
 /// it agrees with the points again.
 void SensorMonitor::checkRecovery(Sensor sensor)
 {
-  const int s = static_cast<int>(sensor);
-  const auto window = static_cast<std::size_t>(m_options.window);
-  if (!isDistrusted(sensor) || !m_may_recover[s] || m_comparisons.size() < window)
+  const std::optional<std::size_t> verdict = of(sensor).may_recover;
+  const auto window = static_cast<std::size_t>(kWindow);
+  if (!verdict || m_comparisons.size() < window)
     return;
-  const std::string &kind = m_verdicts[*m_may_recover[s]].kind;
+  const std::string &kind = m_verdicts[*verdict].kind;
   if (kind != "ended" && kind != "stuck" && !hasGyroAgreedInTurns())
     return;
   const bool is_gyro = sensor == Sensor::gyro;
   for (auto c = m_comparisons.end() - static_cast<std::ptrdiff_t>(window); c != m_comparisons.end(); ++c)
-    if (is_gyro ? !c->gyro || c->gyro_points > 0.5 * m_options.limit_points
-                : !c->odometry || c->odometry_points > 0.5 * m_options.limit_odometry)
+    if (is_gyro ? !c->gyro || c->gyro_points > 0.5 * kLimitPoints
+                : !c->odometry || c->odometry_points > 0.5 * kLimitOdometry)
       return;
   const std::int64_t back_ns = (m_comparisons.end() - static_cast<std::ptrdiff_t>(window))->a_ns;
-  if (is_gyro && (!m_gyro_changed_ns || secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * m_options.stuck_s))
+  if (is_gyro && (!m_gyro_changed_ns || secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * kStuck_s))
     return;
   if (!is_gyro && std::any_of(m_steps.begin(), m_steps.end(),
                               [back_ns](const Step &step) { return step.stamp_ns > back_ns && step.is_held; }))
@@ -171,61 +193,34 @@ void SensorMonitor::checkRecovery(Sensor sensor)
   const std::int64_t agreed_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
   while (is_gyro && m_comparisons.front().b_ns <= agreed_ns) // what was before is judged
     m_comparisons.pop_front();
-  m_distrusted[s] = false;
-  m_verdicts[*m_may_recover[s]].text += fmt::format(" until {:.1f} s", secondsOf(back_ns));
-  m_may_recover[s].reset();
+  recover(sensor, secondsOf(back_ns));
 }
 
 /// Rejects a sensor in this frame that two others contradict.
 void SensorMonitor::rejectOutvoted(const Frame &frame)
 {
-  const bool points_err = logOddsOfPoints() > m_options.limit_odds;
+  const bool points_err = logOddsOfPoints() > kLimitOdds;
   for (auto c = m_comparisons.rbegin(); c != m_comparisons.rend() && c->b_ns == frame.stamp_ns; ++c) {
-    if (!c->gyro || !c->odometry || !trusts(Sensor::odometry) || c->gyro_points <= m_options.limit_points)
+    if (!c->gyro || !c->odometry || !trusts(Sensor::odometry) || c->gyro_points <= kLimitPoints)
       continue;
-    if (points_err && c->gyro_odometry < 0.5 * m_options.limit_odometry)
-      m_wrong_now[static_cast<int>(Sensor::images)] = true;
-    else if (c->odometry_points < 0.5 * m_options.limit_odometry)
-      m_wrong_now[static_cast<int>(Sensor::gyro)] = true;
+    if (points_err && c->gyro_odometry < 0.5 * kLimitOdometry)
+      of(Sensor::images).is_wrong_now = true;
+    else if (c->odometry_points < 0.5 * kLimitOdometry)
+      of(Sensor::gyro).is_wrong_now = true;
   }
 }
 
 void SensorMonitor::collect(const Frame &frame)
 {
-  for (const GyroSample &sample : frame.gyro)
-    m_samples.push_back(sample);
+  m_samples.insert(m_samples.end(), frame.gyro.begin(), frame.gyro.end());
   const std::int64_t oldest = frame.stamp_ns - nanoseconds(kMemory_s);
-  while (!m_samples.empty() && m_samples.front().stamp_ns < oldest)
-    m_samples.pop_front();
+  m_samples.erase(m_samples.begin(),
+                  std::find_if(m_samples.begin(), m_samples.end(),
+                               [oldest](const GyroSample &sample) { return sample.stamp_ns >= oldest; }));
   while (!m_comparisons.empty() && m_comparisons.front().a_ns < oldest)
     m_comparisons.pop_front();
   while (!m_steps.empty() && m_steps.front().stamp_ns < oldest)
     m_steps.pop_front();
-}
-
-std::optional<Matrix3d> SensorMonitor::gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const
-{
-  constexpr std::int64_t kSlack_ns = 60'000'000; // the ends may lie between two samples
-  if (m_samples.empty() || m_samples.front().stamp_ns > from_ns + kSlack_ns ||
-      m_samples.back().stamp_ns < to_ns - kSlack_ns)
-    return std::nullopt;
-  const std::vector<GyroSample> samples(m_samples.begin(), m_samples.end());
-  const GyroRotation turned = integrateGyro(samples, from_ns, to_ns);
-  return turned.complete ? std::optional<Matrix3d>(turned.R) : std::nullopt;
-}
-
-/// Mean of the gyro's samples around a time.
-Vector3d SensorMonitor::rateAt(std::int64_t stamp_ns) const
-{
-  constexpr std::int64_t kAround_ns = 20'000'000;
-  Vector3d sum = Vector3d::Zero();
-  int count = 0;
-  for (const GyroSample &sample : m_samples)
-    if (std::abs(sample.stamp_ns - stamp_ns) <= kAround_ns) {
-      sum += sample.rate;
-      ++count;
-    }
-  return count > 0 ? Vector3d(sum / count) : sum;
 }
 
 /// An image taken tau later than its stamp says turns the points' rotation by rate * tau against the gyro's, at both
@@ -237,11 +232,12 @@ void SensorMonitor::checkStamps()
 {
   constexpr std::size_t kLeast = 10; // comparisons
   constexpr double kMostEach = 6;    // of one comparison: more would be a wrong match
+  constexpr double kLimit = 15;      // of the log-likelihood ratio; 42 clean flights stay below 2
   constexpr double kMostTurn = 0.5;  // that an image is late by [rad]: beyond it the rates are wrong
   constexpr double kSigmas_s[] = {0.004, 0.008, 0.016, 0.032};
   if (m_comparisons.size() < kLeast)
     return;
-  double best = m_options.limit_stamps, best_sigma_s = 0;
+  double best = kLimit, best_sigma_s = 0;
   for (const double sigma_s : kSigmas_s) {
     double ratio = 0, left = 0;
     int count = 0;
@@ -290,11 +286,11 @@ void SensorMonitor::checkGyroSamples(const Frame &frame)
   }
   if (!m_had_gyro)
     return;
-  if (secondsOf(frame.stamp_ns - m_last_gyro_ns) > m_options.silence_s)
+  if (secondsOf(frame.stamp_ns - m_last_gyro_ns) > kSilence_s)
     raise(Sensor::gyro, "ended", secondsOf(m_last_gyro_ns),
           fmt::format("gyro: nothing since {:.1f} s", secondsOf(m_last_gyro_ns)), Lasts::until_agree);
   const bool moves = std::any_of(m_steps.begin(), m_steps.end(), [](const Step &step) { return step.parallax_px > 1; });
-  if (moves && m_gyro_changed_ns && secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > m_options.stuck_s)
+  if (moves && m_gyro_changed_ns && secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > kStuck_s)
     raise(Sensor::gyro, "stuck", secondsOf(*m_gyro_changed_ns),
           fmt::format("gyro: repeats its value since {:.1f} s", secondsOf(*m_gyro_changed_ns)), Lasts::until_agree);
 }
@@ -308,26 +304,30 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
   now.points = Matrix3d(m_bMc.R * motion.points.aRb * m_bMc.R.transpose());
   now.points_covariance = m_bMc.R * motion.points.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose();
   const Matrix3d one = Matrix3d::Identity();
-  const double bias2 = std::pow(m_options.gyro_bias_sigma * dt, 2) + std::pow(8e-4, 2) * dt;
-  const double turn2 = std::pow(m_options.odometry_turn_sigma, 2);
-  now.gyro = gyroBetween(now.a_ns, now.b_ns);
+  const double bias2 = std::pow(kBiasSigma * dt, 2) + std::pow(8e-4, 2) * dt;
+  const double turn2 = std::pow(odometry::kTurnSigma, 2);
+  now.gyro = turnBetween(m_samples, now.a_ns, now.b_ns);
   const auto a = std::find_if(m_steps.begin(), m_steps.end(), [&](const Step &s) { return s.stamp_ns == now.a_ns; });
   if (frame.wMb_odometry && a != m_steps.end()) {
     now.odometry = Matrix3d(a->wMb.R.transpose() * frame.wMb_odometry->R);
     const Vector3d moved = a->wMb.R.transpose() * (frame.wMb_odometry->t - a->wMb.t);
     const double length = moved.norm();
     if (motion.points.hasDirection() && length > 0.05 && motion.points.parallax_px > 1) {
-      now.askew = (moved / length).cross(m_bMc.R * motion.points.direction);
-      now.askew_variance = 0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() +
-                           (std::pow(m_options.odometry_walk, 2) * dt + std::pow(m_options.odometry_height_sigma, 2)) /
-                               (length * length) +
-                           std::pow(m_options.odometry_relative, 2);
+      now.direction = moved / length;
+      now.askew = now.direction.cross(m_bMc.R * motion.points.direction);
+      now.askew_variance =
+          0.5 * motion.points.covariance.bottomRightCorner<2, 2>().trace() + odometry::directionVariance(length, dt);
     }
   }
   if (now.gyro) {
     now.error_covariance = now.points_covariance + bias2 * one;
     now.error = logSo3(orthonormalized(now.gyro->transpose() * *now.points));
     now.gyro_points = now.error.dot(now.error_covariance.ldlt().solve(now.error));
+    constexpr std::int64_t kAround_ns = 20'000'000; // that a rate is the mean of
+    const auto rateAt = [this](std::int64_t stamp_ns) {
+      const GyroRotation turned = integrateGyro(m_samples, stamp_ns - kAround_ns, stamp_ns + kAround_ns);
+      return Vector3d(logSo3(turned.R) / turned.duration);
+    };
     now.rate_a = now.gyro->transpose() * rateAt(now.a_ns);
     now.rate_b = rateAt(now.b_ns);
   }
@@ -340,7 +340,7 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
 
 std::deque<SensorMonitor::Comparison>::const_iterator SensorMonitor::windowBegin() const
 {
-  return m_comparisons.end() - std::min<std::ptrdiff_t>(m_options.window, std::ptrdiff_t(m_comparisons.size()));
+  return m_comparisons.end() - std::min<std::ptrdiff_t>(kWindow, std::ptrdiff_t(m_comparisons.size()));
 }
 
 /// Log-likelihood ratio that the points err and not the gyro, by all of the window where these two differ: 0 without an
@@ -351,7 +351,7 @@ double SensorMonitor::logOddsOfPoints() const
     return 0;
   double ratio = 0;
   for (auto c = windowBegin(); c != m_comparisons.end(); ++c)
-    if (c->gyro_points > m_options.limit_points)
+    if (c->gyro_points > kLimitPoints)
       ratio += 0.5 * (c->odometry_points - c->gyro_odometry);
   return ratio;
 }
@@ -359,93 +359,64 @@ double SensorMonitor::logOddsOfPoints() const
 /// Raises a verdict on the sensor that is in all failing pairs.
 void SensorMonitor::checkRotations()
 {
-  if (static_cast<int>(m_comparisons.size()) < m_options.of_window)
+  if (static_cast<int>(m_comparisons.size()) < kOfWindow)
     return;
   int gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
   double since_s = secondsOf(m_comparisons.back().a_ns);
   for (auto c = windowBegin(); c != m_comparisons.end(); ++c) {
-    gyro_points += c->gyro_points > m_options.limit_points;
-    gyro_odometry += c->gyro_odometry > m_options.limit_odometry;
-    odometry_points += c->odometry_points > m_options.limit_odometry;
-    if (c->gyro_points > m_options.limit_points || c->odometry_points > m_options.limit_odometry)
+    gyro_points += c->gyro_points > kLimitPoints;
+    gyro_odometry += c->gyro_odometry > kLimitOdometry;
+    odometry_points += c->odometry_points > kLimitOdometry;
+    if (c->gyro_points > kLimitPoints || c->odometry_points > kLimitOdometry)
       since_s = std::min(since_s, secondsOf(c->a_ns));
   }
-  const int enough = m_options.of_window;
-  const bool gyro_failed = gyro_points >= enough && !isDistrusted(Sensor::gyro);
-  const bool odometry_failed = odometry_points >= enough && !isDistrusted(Sensor::odometry);
+  const int enough = kOfWindow;
+  const bool gyro_failed = gyro_points >= enough && trusts(Sensor::gyro);
+  const bool odometry_failed = odometry_points >= enough && trusts(Sensor::odometry);
   if (gyro_failed && odometry_points * 2 >= gyro_points && odometry_points > 0 && gyro_odometry == 0)
     raise(Sensor::images, "rotation", since_s,
           fmt::format("images: contradict gyro and odometry since {:.1f} s (late, skewed or of another camera)",
                       since_s));
-  else if (gyro_failed && logOddsOfPoints() < m_options.limit_odds && !isDistrusted(Sensor::images)) {
+  else if (gyro_failed && logOddsOfPoints() < kLimitOdds && trusts(Sensor::images)) {
     raise(Sensor::gyro, "rotation", since_s,
           fmt::format("gyro: contradicts the points {}since {:.1f} s", gyro_odometry > 0 ? "and the odometry " : "",
                       since_s),
           Lasts::until_agree);
     diagnoseGyro();
   }
-  else if (odometry_failed && gyro_points == 0 && !isDistrusted(Sensor::images))
+  else if (odometry_failed && gyro_points == 0 && trusts(Sensor::images))
     raise(Sensor::odometry, "rotation", since_s,
           fmt::format("odometry: its rotation contradicts the points since {:.1f} s", since_s));
-}
-
-/// Mean squared difference with the points that is left when the gyro is read \p offset_s later and a constant \p bias
-/// is taken off.
-std::optional<double> SensorMonitor::misfitAt(double offset_s, Vector3d *bias) const
-{
-  const std::int64_t offset = nanoseconds(offset_s);
-  std::vector<std::pair<Vector3d, const Comparison *>> errors;
-  Matrix3d information = 1e-6 * Matrix3d::Identity();
-  Vector3d sum = Vector3d::Zero();
-  for (const Comparison &c : m_comparisons) {
-    const auto turned = gyroBetween(c.a_ns + offset, c.b_ns + offset);
-    if (!turned || c.gyro_points <= 0.5 * m_options.limit_points)
-      continue;
-    const double dt = secondsOf(c.b_ns - c.a_ns);
-    const Vector3d error = logSo3(orthonormalized(turned->transpose() * *c.points)) / dt;
-    const Matrix3d weight = (c.points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).inverse();
-    information += weight;
-    sum += weight * error;
-    errors.push_back({error, &c});
-  }
-  if (errors.size() < 3)
-    return std::nullopt;
-  *bias = -information.ldlt().solve(sum);
-  double total = 0;
-  for (const auto &[error, c] : errors) {
-    const double dt = secondsOf(c->b_ns - c->a_ns);
-    const Vector3d left = error + *bias;
-    total += left.dot((c->points_covariance / (dt * dt) + 1e-6 * Matrix3d::Identity()).ldlt().solve(left));
-  }
-  return total / (3 * double(errors.size()));
 }
 
 /// Diagnoses a gyro that contradicts the others: a constant bias, a clock offset, or something else.
 void SensorMonitor::diagnoseGyro()
 {
-  SensorVerdict &verdict = m_verdicts.back();
-  if (verdict.sensor != toString(Sensor::gyro))
-    return;
   constexpr double kExplained = 6; // mean squared difference that is left when the cause is found
-  Vector3d bias;
-  const auto constant = misfitAt(0, &bias);
-  if (constant && *constant < kExplained && bias.norm() > 3 * m_options.gyro_bias_sigma) {
+  constexpr std::size_t kLeast = 3;
+  std::vector<calibration::Turn> turns, at_any_time;
+  for (const Comparison &c : m_comparisons) {
+    if (c.gyro_points <= 0.5 * kLimitPoints)
+      continue;
+    const double white = std::pow(1e-3 * secondsOf(c.b_ns - c.a_ns), 2); // of the gyro
+    turns.push_back({c.a_ns, c.b_ns, *c.points, (c.points_covariance + white * Matrix3d::Identity()).inverse()});
+    const std::int64_t most_ns = nanoseconds(calibration::kMostLate_s);
+    if (turnBetween(m_samples, c.a_ns - most_ns, c.b_ns + most_ns))
+      at_any_time.push_back(turns.back());
+  }
+  SensorVerdict &verdict = m_verdicts.back();
+  const calibration::Fitted constant = calibration::fitBias(m_samples, turns, 0, 1, 0);
+  if (turns.size() >= kLeast && constant.scatter < kExplained && constant.value.norm() > 3 * kBiasSigma) {
     verdict.kind = "bias";
-    verdict.text = fmt::format("gyro: bias {:.2f} rad/s", bias.norm());
+    verdict.text = fmt::format("gyro: bias {:.2f} rad/s", constant.value.norm());
     return;
   }
-  double best = kExplained, best_offset = 0;
-  for (int k = -15; k <= 15; ++k) {
-    Vector3d ignored;
-    const auto misfit = misfitAt(0.01 * k, &ignored);
-    if (k != 0 && misfit && *misfit < best) {
-      best = *misfit;
-      best_offset = 0.01 * k;
-    }
-  }
-  if (best_offset != 0 && (!constant || best < 0.3 * *constant)) {
+  const auto fitAt = [&](double late_s) { return calibration::fitBias(m_samples, at_any_time, late_s, 1, 1); };
+  const calibration::Minimum late = calibration::minimiseLate([&](double late_s) { return fitAt(late_s).cost; });
+  if (at_any_time.size() >= kLeast && late.is_inside && fitAt(late.late_s).failing == 0 &&
+      fitAt(late.late_s).cost < 0.3 * fitAt(0).cost) {
     verdict.kind = "time";
-    verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(best_offset));
+    verdict.text = fmt::format("camera and gyro {:.0f} ms apart", 1e3 * std::abs(late.late_s));
   }
   else if (verdict.since_s < secondsOf(m_comparisons.front().b_ns)) {
     verdict.text = "gyro: axes, sign or units wrong";

@@ -6,9 +6,10 @@
 /// Idea: gyro, odometry and points each measure the rotation between two frames. Every pair of them is compared by the
 /// squared difference over its variance; the sensor that stands in both failing pairs is the one that lies. Further
 /// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, begins far from the ground,
-/// leans against the accelerometer or flies askew to the points' direction; a gyro that repeats its value or ends. A
-/// pair fails when at least `of_window` of the last `window` comparisons exceed a limit, so that one false match raises
-/// no alarm. Stamps of the images that are off by an error of their own show otherwise: see checkStamps().
+/// leans against gravity or flies askew to the points' direction; an accelerometer whose gravity is not the odometry's;
+/// a gyro that repeats its value or ends. A pair fails when four of the last six comparisons exceed a limit, so that
+/// one false match raises no alarm. Stamps of the images that are off by an error of their own show otherwise: see
+/// checkStamps().
 ///
 /// Where the points contradict the gyro, the odometry, too coarse to fail against either, still says which of the two
 /// is more likely: its two squared differences are summed over the window.
@@ -16,11 +17,12 @@
 /// A single comparison that fails leaves the sensor that stands alone out of its frame at once: what two others say is
 /// taken, and nothing wrong enters the map before the alarm. A turn that gyro and odometry tell so differently that no
 /// point would be found where the wrong one puts it is decided before the points are looked for, by how fast the body
-/// turned until then. A sensor that was silent or repeated itself is trusted again once all of a window agrees with the
-/// points.
+/// turned until then. A step of the odometry is judged by the last velocity that was believed: where a pose is off and
+/// comes back, neither of its two jumps is a step. A sensor that was silent or repeated itself is trusted again once
+/// all of a window agrees with the points.
 ///
 /// False alarms: three rotations of normal errors exceed the limit of 25 once in 60,000 comparisons; four of six do so
-/// once in 10^17. What decides in practice are errors that are not normal: see the limits of the options.
+/// once in 10^17. What decides in practice are errors that are not normal: see the limits.
 ///
 /// Laws (each a test): sensors that agree raise nothing; each fault is named with its sensor and the time it began; the
 /// two sensors that agree are still trusted.
@@ -40,37 +42,15 @@ enum class Sensor
 {
   gyro,
   odometry,
-  images
+  images,
+  accelerometer
 };
 const char *toString(Sensor sensor);
-
-struct SensorMonitorOptions
-{
-  int window = 6, of_window = 4;      ///< comparisons that are remembered, and those that make an alarm
-  double limit_points = 25;           ///< of a squared difference with the points, 3 degrees of freedom; measured on 15
-                                      ///< flights: at most 10 without a fault, 20 to 2000 with one
-  double limit_odometry = 30;         ///< of one with the odometry; at most 17 without a fault
-  double limit_odds = 3;              ///< of the log-likelihood ratio that the points err and not the gyro: 20 to 1
-  double gyro_bias_sigma = 0.008;     ///< that a gyro may have [rad/s]
-  double odometry_turn_sigma = 0.007; ///< of the odometry's rotation between two frames [rad]
-  double odometry_walk = 0.038;       ///< of its horizontal position [m/sqrt(s)]
-  double odometry_height_sigma = 0.03; ///< of the difference of two heights [m]
-  double odometry_relative = 0.03;     ///< of its translation, in proportion
-  double jump = 0.3;                   ///< of the odometry between two frames beyond what its velocity explains [m]
-  double noise_factor = 2.5;           ///< scatter of the odometry over what odometry_walk says
-  double height_low = -2, height_high = 10; ///< of the odometry over the ground where it begins [m]: it may count from
-                                            ///< the body at take-off, and above the crowns no trunk is seen
-  double tilt_limit = 0.06;                 ///< of the odometry's gravity against the accelerometer's, over 3 s [rad]
-  double direction_limit = 0.1;             ///< of a constant rotation between odometry and camera [rad]
-  double silence_s = 0.5;                   ///< without a sample from a sensor that had some
-  double stuck_s = 0.5;                     ///< with one value
-  double limit_stamps = 15; ///< of the log-likelihood ratio of stamps that scatter; 42 clean flights stay below 2
-};
 
 class SensorMonitor
 {
 public:
-  explicit SensorMonitor(const Pose &bMc, const SensorMonitorOptions &options = {});
+  explicit SensorMonitor(const Pose &bMc) : m_bMc(bMc) {}
 
   /// Takes in a frame as its source gave it, with what the points alone say (RelativeMotion::points).
   void process(const Frame &frame, const std::vector<RelativeMotion> &motions);
@@ -78,9 +58,9 @@ public:
   /// All that was found so far, in the order of time; a text may become more exact.
   const std::vector<SensorVerdict> &verdicts() const { return m_verdicts; }
   /// False while a lasting verdict stands against a sensor.
-  bool trusts(Sensor sensor) const { return !m_distrusted[static_cast<int>(sensor)]; }
+  bool trusts(Sensor sensor) const { return !of(sensor).is_distrusted; }
   /// Whether what a sensor says of the motion to the newest frame may be used.
-  bool trustsNow(Sensor sensor) const { return trusts(sensor) && !m_wrong_now[static_cast<int>(sensor)]; }
+  bool trustsNow(Sensor sensor) const { return trusts(sensor) && !of(sensor).is_wrong_now; }
   /// \p frame, which is yet to be processed, without the sensors whose verdict lasts or whose rotation is implausible:
   /// itself, or a copy in \p scratch.
   const Frame &withoutRejectedSensors(const Frame &frame, Frame &scratch) const;
@@ -88,24 +68,37 @@ public:
   const Frame &trusted(const Frame &frame, Frame &scratch) const;
 
 private:
+  struct State ///< of a sensor
+  {
+    bool is_distrusted = false;             ///< by a verdict that lasts
+    bool is_wrong_now = false;              ///< in the newest frame
+    std::optional<std::size_t> may_recover; ///< number of the verdict that an agreement ends
+  };
   struct Comparison ///< of the rotations over one interval
   {
     std::int64_t a_ns = 0, b_ns = 0;
     std::optional<Eigen::Matrix3d> gyro, odometry, points;
     Eigen::Matrix3d points_covariance = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d askew = Eigen::Vector3d::Zero(); ///< rotation from the odometry's direction to the points' [rad]
-    double askew_variance = 0;                       ///< 0: no direction
+    Eigen::Vector3d direction = Eigen::Vector3d::Zero();            ///< of flight, by the odometry, in the body
+    Eigen::Vector3d askew = Eigen::Vector3d::Zero();                ///< rotation from it to that by the points [rad]
+    double askew_variance = 0;                                      ///< 0: no direction
     double gyro_points = 0, gyro_odometry = 0, odometry_points = 0; ///< squared differences over their variances
     Eigen::Vector3d error = Eigen::Vector3d::Zero();                ///< rotation from the gyro's to the points' [rad]
     Eigen::Matrix3d error_covariance = Eigen::Matrix3d::Zero();
     Eigen::Vector3d rate_a = Eigen::Vector3d::Zero(),
                     rate_b = Eigen::Vector3d::Zero(); ///< at both ends, as seen from b [rad/s]
   };
+  struct Velocity
+  {
+    Eigen::Vector3d mean; ///< in the world [m/s]
+    std::int64_t until_ns;
+    double duration; ///< that it was measured over [s]
+  };
   struct Step ///< of the odometry from frame to frame
   {
     std::int64_t stamp_ns = 0;
     Pose wMb;
-    std::optional<Eigen::Vector3d> velocity;     ///< to it, in the world [m/s]; none of the first and of a jump
+    std::optional<Velocity> believed;            ///< the last one up to here that is no jump
     std::optional<Eigen::Vector2d> acceleration; ///< to it, horizontal [m/s^2]
     double scatter = 0; ///< squared change of the acceleration over what a filter that walks and a flight explain
     double parallax_px = 0;
@@ -134,13 +127,12 @@ private:
   double logOddsOfPoints() const;
   bool hasGyroAgreedInTurns() const;
   void checkRecovery(Sensor sensor);
+  void recover(Sensor sensor, double time_s);
   void checkStamps();
   void checkDirection();
-  void checkTilt(const Frame &frame);
+  void checkGravity();
+  bool isTurnedBy(const Eigen::Vector3d &up) const;
   void diagnoseGyro();
-  std::optional<double> misfitAt(double offset_s, Eigen::Vector3d *bias) const;
-  Eigen::Vector3d rateAt(std::int64_t stamp_ns) const;
-  std::optional<Eigen::Matrix3d> gyroBetween(std::int64_t from_ns, std::int64_t to_ns) const;
   enum class Lasts
   {
     no,          ///< a moment
@@ -148,11 +140,13 @@ private:
     yes
   };
   void raise(Sensor sensor, const char *kind, double since_s, const std::string &text, Lasts lasts = Lasts::yes);
-  bool isDistrusted(Sensor sensor) const { return m_distrusted[static_cast<int>(sensor)]; }
+  State &of(Sensor sensor) { return m_states[static_cast<int>(sensor)]; }
+  const State &of(Sensor sensor) const { return m_states[static_cast<int>(sensor)]; }
+
+  static constexpr double kSilence_s = 0.5; ///< without a sample from a sensor that had some
 
   Pose m_bMc;
-  SensorMonitorOptions m_options;
-  std::deque<GyroSample> m_samples; ///< of the last seconds
+  std::vector<GyroSample> m_samples; ///< of the last seconds
   std::deque<Comparison> m_comparisons;
   std::deque<Step> m_steps;
   std::optional<std::int64_t> m_last_ns;               ///< stamp of the frame processed last
@@ -161,8 +155,6 @@ private:
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;
   bool m_had_gyro = false, m_had_odometry = false;
   std::vector<SensorVerdict> m_verdicts;
-  bool m_distrusted[3] = {false, false, false};
-  bool m_wrong_now[3] = {false, false, false};                ///< in the newest frame
-  std::optional<std::size_t> m_may_recover[3] = {{}, {}, {}}; ///< number of the verdict that an agreement ends
+  State m_states[4];
 };
 } // namespace bole

@@ -4,6 +4,8 @@
 
 #include "geometry/constants.h"
 #include "geometry/median.h"
+#include "motion/accelerometer.h"
+#include "motion/gravity.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,13 +15,22 @@ namespace bole
 {
 using Eigen::Vector3d;
 
+namespace
+{
+constexpr double kJump = 0.3;            // of the odometry between two frames beyond what its velocity explains [m]
+constexpr double kMostAcceleration = 10; // [m/s^2]
+constexpr double kNoiseFactor = 2.5;     // scatter of the odometry over what odometry::kWalk says
+constexpr double kAskew = 0.1;           // of a constant rotation between odometry and camera [rad]
+constexpr double kTogether = 3;          // comparisons that overlap
+} // namespace
+
 /// Checks the steps of the odometry from frame to frame.
 void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions)
 {
   const double time_s = secondsOf(frame.stamp_ns);
-  bool &is_wrong = m_wrong_now[static_cast<int>(Sensor::odometry)];
+  bool &is_wrong = of(Sensor::odometry).is_wrong_now;
   if (!frame.wMb_odometry) {
-    if (m_had_odometry && secondsOf(frame.stamp_ns - m_last_odometry_ns) > m_options.silence_s)
+    if (m_had_odometry && secondsOf(frame.stamp_ns - m_last_odometry_ns) > kSilence_s)
       raise(Sensor::odometry, "ended", secondsOf(m_last_odometry_ns),
             fmt::format("odometry: nothing since {:.1f} s", secondsOf(m_last_odometry_ns)), Lasts::until_agree);
     m_steps.clear();
@@ -38,27 +49,29 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
   if (!m_steps.empty()) {
     const Step &before = m_steps.back();
     const double dt = std::max(1e-3, secondsOf(step.stamp_ns - before.stamp_ns));
-    step.velocity = (step.wMb.t - before.wMb.t) / dt;
+    const Vector3d moved = step.wMb.t - before.wMb.t;
     step.is_held = step.parallax_px > 1 && step.wMb.t == before.wMb.t && step.wMb.R == before.wMb.R;
     is_wrong |= step.is_held || before.is_held; // the step after a pause makes up for it
-    if (before.velocity) {
-      const Eigen::Vector2d change = ((*step.velocity - *before.velocity) * dt).head<2>();
-      step.acceleration = change / (dt * dt);
-      if (before.acceleration) {
+    step.believed = before.believed;
+    if (before.believed) { // neither side of a jump tells a velocity: what follows is judged by that before it
+      const Velocity &expected = *before.believed;
+      const Eigen::Vector2d change = (moved - dt * expected.mean).head<2>();
+      const double unknown = std::max(1.0, dt / expected.duration), // of a velocity over a moment
+          age = secondsOf(step.stamp_ns - expected.until_ns);
+      step.is_jump = change.norm() > kJump * unknown + kMostAcceleration * dt * age;
+      if (!step.is_jump)
+        step.acceleration = change / (dt * dt);
+      if (before.acceleration && step.acceleration) {
         constexpr double kJerk = 20; // that a small drone reaches for long [m/s^3]
-        const double expected = 6 * std::pow(m_options.odometry_walk, 2) * dt + std::pow(kJerk * dt * dt * dt, 2);
-        step.scatter = 0.5 * (change - dt * dt * *before.acceleration).squaredNorm() / expected;
+        const double walked = 6 * std::pow(odometry::kWalk, 2) * dt + std::pow(kJerk * dt * dt * dt, 2);
+        step.scatter = 0.5 * (change - dt * dt * *before.acceleration).squaredNorm() / walked;
       }
-      const double extent = change.norm();
-      if (extent > m_options.jump + 10 * dt * dt) {
-        is_wrong = true;
-        step.velocity.reset(); // neither side of a jump tells it: the next step is not judged, the one after it is
-        step.acceleration.reset();
-        step.scatter = 0;
-        step.is_jump = true;
-        raiseJump(extent, time_s);
-      }
+      is_wrong |= step.is_jump;
+      if (step.is_jump)
+        raiseJump(change.norm(), time_s);
     }
+    if (!step.is_jump && !step.is_held && !before.is_held)
+      step.believed = Velocity{moved / dt, step.stamp_ns, dt};
   }
   m_steps.push_back(step);
   checkStandingStill(time_s);
@@ -68,7 +81,9 @@ void SensorMonitor::checkSteps(const Frame &frame, const std::vector<RelativeMot
 /// Checks the height at which the flight begins: trunks are looked for above the ground, z = 0.
 void SensorMonitor::checkHeight(double height, double time_s)
 {
-  if (height < m_options.height_low || height > m_options.height_high)
+  constexpr double kLow = -2,
+                   kHigh = 10; // [m]: it may count from the body at take-off, above the crowns no trunk is seen
+  if (height < kLow || height > kHigh)
     raise(Sensor::odometry, "height", time_s,
           fmt::format("odometry: its heights begin at {:.1f} m, must be over the ground (over the sea?)", height));
 }
@@ -116,7 +131,7 @@ void SensorMonitor::checkScatter()
       break;
     scatters.push_back(step->scatter);
   }
-  if (scatters.size() >= kLeast && medianOf(scatters) > std::pow(m_options.noise_factor, 2))
+  if (scatters.size() >= kLeast && medianOf(scatters) > std::pow(kNoiseFactor, 2))
     raise(Sensor::odometry, "noise", secondsOf((step - 1)->stamp_ns),
           "odometry: its positions scatter from frame to frame");
 }
@@ -125,7 +140,6 @@ void SensorMonitor::checkScatter()
 void SensorMonitor::checkDirection()
 {
   constexpr std::size_t kLeast = 24; // comparisons
-  constexpr double kTogether = 3;    // that overlap
   std::vector<double> x, y, z;
   double information = 0;
   for (const Comparison &c : m_comparisons) {
@@ -140,68 +154,60 @@ void SensorMonitor::checkDirection()
     return;
   const Vector3d askew(medianOf(x), medianOf(y), medianOf(z));
   const double sigma = std::sqrt(1.6 * kTogether / information); // 1.6: of a median
-  if (askew.norm() > std::max(m_options.direction_limit, 5 * sigma))
+  if (askew.norm() > std::max(kAskew, 5 * sigma))
     raise(Sensor::odometry, "direction", secondsOf(m_comparisons.front().a_ns),
           fmt::format("odometry: stands {:.0f} degrees askew to the camera", askew.norm() / kDegree));
 }
 
-/// Gravity of the odometry's roll and pitch against the accelerometer's: the mean force between two moments, less the
-/// change of the odometry's own velocity from one to the other.
-void SensorMonitor::checkTilt(const Frame &frame)
+/// Gravity by the accelerometer against that by the odometry's roll and pitch. The accelerometer is wrong where the
+/// length of the force is, and where a bias explains the difference and the points do not show the odometry turned.
+void SensorMonitor::checkGravity()
 {
-  constexpr double kLeast_s = 1.8, kVelocity_s = 0.6; // of the memory, and that a velocity is taken over
+  constexpr double kLeast_s = 1.8, kDecided_s = 3.8; // of the memory, and where it needs the points
+  constexpr double kLimit = 0.06 * kGravity;         // [m/s^2]: what roll, pitch and a bias that is usual amount to
+  constexpr double kMostSigma = 1;                   // beyond it the limit does not grow [m/s^2]
+  constexpr double kMostBias = 3 * accelerometer::kFaultSigma;
   const auto isOdd = [](const Step &step) { return step.is_held || step.is_jump; };
-  if (m_steps.empty() || secondsOf(m_steps.back().stamp_ns - m_steps.front().stamp_ns) < kLeast_s ||
-      !frame.wMb_odometry || m_samples.empty() ||
-      secondsOf(m_steps.back().stamp_ns - m_samples.back().stamp_ns) > kMostGap_s ||
-      secondsOf(m_samples.front().stamp_ns - m_steps.front().stamp_ns) > kMostGap_s ||
-      std::any_of(m_steps.begin(), m_steps.end(), isOdd))
-    return; // force and velocity would be of different times
-  struct Velocity
-  {
-    std::int64_t at_ns;
-    Vector3d mean;
-  };
-  const auto between = [](const Step &a, const Step &b) {
-    return Velocity{(a.stamp_ns + b.stamp_ns) / 2, (b.wMb.t - a.wMb.t) / secondsOf(b.stamp_ns - a.stamp_ns)};
-  };
-  const auto isAfter = [](double time_s) {
-    return [time_s](const Step &step) { return secondsOf(step.stamp_ns) > time_s - 1e-3; };
-  };
-  const Step &first = m_steps.front(), &last = m_steps.back();
-  const auto first_end =
-      std::find_if(m_steps.begin() + 1, m_steps.end(), isAfter(secondsOf(first.stamp_ns) + kVelocity_s));
-  const auto last_begin =
-      std::find_if(m_steps.begin(), m_steps.end() - 1, isAfter(secondsOf(last.stamp_ns) - kVelocity_s));
-  const Velocity begin = between(first, *first_end), end = between(*last_begin, last);
-  Vector3d sum = Vector3d::Zero();
-  int count = 0;
-  bool varies = false;
-  auto step = m_steps.begin();
-  const Vector3d *first_force = nullptr;
-  std::int64_t before_ns = m_samples.front().stamp_ns;
-  for (const GyroSample &sample : m_samples) {
-    if (secondsOf(sample.stamp_ns - before_ns) > kMostGap_s)
-      return;
-    before_ns = sample.stamp_ns;
-    while (step + 1 != m_steps.end() && (step->stamp_ns + (step + 1)->stamp_ns) / 2 < sample.stamp_ns)
-      ++step; // the one nearest in time
-    if (!sample.force || sample.stamp_ns <= begin.at_ns || sample.stamp_ns > end.at_ns)
-      continue;
-    first_force = first_force == nullptr ? &*sample.force : first_force;
-    varies = varies || *first_force != *sample.force;
-    sum += step->wMb.R * *sample.force;
-    ++count;
-  }
-  if (count < 40 || !varies)
+  const double remembered_s = m_steps.empty() ? 0 : secondsOf(m_steps.back().stamp_ns - m_steps.front().stamp_ns);
+  if (remembered_s < kLeast_s || !trusts(Sensor::gyro) || std::any_of(m_steps.begin(), m_steps.end(), isOdd))
+    return; // force and velocity would be of different times; what beside it is wrong is no witness
+  Trajectory poses;
+  for (const Step &step : m_steps)
+    poses.push_back({step.stamp_ns, step.wMb});
+  const auto gravity = compareGravity(poses, m_samples);
+  if (!gravity)
     return;
-  const double dt = secondsOf(end.at_ns - begin.at_ns);
-  const Vector3d mean = sum / count - (end.mean - begin.mean) / dt;
-  const double tilt = std::atan2(mean.head<2>().norm(), mean.z());
-  constexpr double kLongest = 0.2; // beyond it the limit does not grow
-  const double allowed = m_options.tilt_limit + std::min(kLongest, 0.2 / (kGravity * dt));
-  if (tilt > allowed)
-    raise(Sensor::odometry, "tilt", secondsOf(m_steps.front().stamp_ns),
-          fmt::format("odometry: its roll and pitch are {:.0f} degrees off gravity", tilt / kDegree));
+  const double off = gravity->off.norm(), limit = kLimit + 2 * std::min(kMostSigma, gravity->sigma);
+  const double since_s = secondsOf(m_steps.front().stamp_ns);
+  if (off < 0.5 * limit && of(Sensor::accelerometer).may_recover)
+    recover(Sensor::accelerometer, since_s);
+  if (!(off > limit))
+    return;
+  const Vector3d up = kGravity * Vector3d::UnitZ() + gravity->off;
+  const bool is_length_wrong = std::abs(up.norm() - kGravity) > limit, is_bias = off < kMostBias;
+  if (is_bias && remembered_s < kDecided_s)
+    return;
+  if (is_length_wrong || (is_bias && !isTurnedBy(up)))
+    raise(Sensor::accelerometer, "bias", since_s,
+          fmt::format("accelerometer: off by {:.1f} m/s^2 since {:.1f} s", off, since_s), Lasts::until_agree);
+  else
+    raise(Sensor::odometry, "tilt", since_s,
+          fmt::format("odometry: its roll and pitch are {:.0f} degrees off gravity",
+                      std::atan2(up.head<2>().norm(), up.z()) / kDegree));
+}
+
+/// Whether the points show the odometry turned as it is where \p up is upwards in its world.
+bool SensorMonitor::isTurnedBy(const Vector3d &up) const
+{
+  constexpr double kBetter = 9 * kTogether, kMostEach = 6; // twice the log of the likelihood; of one comparison
+  const Vector3d turn = m_steps.back().wMb.R.transpose() * Vector3d::UnitZ().cross(up.normalized());
+  double gain = 0;
+  for (const Comparison &c : m_comparisons) {
+    if (c.askew_variance <= 0)
+      continue;
+    const Vector3d left = c.askew - (turn - c.direction * c.direction.dot(turn));
+    gain += std::clamp((c.askew.squaredNorm() - left.squaredNorm()) / c.askew_variance, -kMostEach, kMostEach);
+  }
+  return gain > kBetter;
 }
 } // namespace bole

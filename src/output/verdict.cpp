@@ -172,7 +172,7 @@ Verdict judge(const RunSummary &summary)
     judgeReference(verdict, summary);
   for (const SensorVerdict &sensor : summary.sensors) {
     verdict.is_trusted = false;
-    verdict.doubts.push_back(sensor.sensor == "images"
+    verdict.doubts.push_back(sensor.sensor == "images" || sensor.sensor == "accelerometer"
                                  ? sensor.text + "."
                                  : fmt::format("{}: --without {} would map without it.", sensor.text, sensor.sensor));
   }

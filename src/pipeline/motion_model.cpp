@@ -14,8 +14,11 @@ using Eigen::Vector3d;
 
 namespace
 {
-constexpr double kStep_s = 0.1;   // of the walks that the options state
-constexpr double kLeast_s = 1e-3; // between two frames; those of one stamp are no step without noise
+constexpr double kStep_s = 0.1;    // of the walks that the options state
+constexpr double kGyroTurn = 8e-4; // least walk of the gyro's rotation in a step [rad]
+constexpr double kFreeStep = 0.15; // of a step that nothing measured: of a constant velocity [m]
+constexpr double kFreeTurn = 0.02; // of a turn that nothing measured [rad]
+constexpr double kLeast_s = 1e-3;  // between two frames; those of one stamp are no step without noise
 
 /// Height, roll and pitch of \p wMb, with the yaw of \p wRb_yaw: x, y and yaw stay free.
 PosePrior levelPrior(const Pose &wMb, const Matrix3d &wRb_yaw, double height_sigma, double tilt_sigma)
@@ -65,7 +68,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
   if (gyro.complete && !frame.gyro.empty()) {
     step.turn_from_gyro = true;
     step.aMb.R = gyro.R;
-    turn_covariance = gyro.covariance() + std::pow(walked * m_options.gyro_turn_sigma, 2) * Matrix3d::Identity();
+    turn_covariance = gyro.covariance() + std::pow(walked * kGyroTurn, 2) * Matrix3d::Identity();
   }
   else if (odometry) {
     step.aMb.R = filter.R;
@@ -73,7 +76,7 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
   }
   else {
     step.aMb.R = expSo3(velocity.tail<3>() * dt);
-    turn_covariance = std::pow(longer * m_options.free_turn_sigma, 2) * Matrix3d::Identity();
+    turn_covariance = std::pow(longer * kFreeTurn, 2) * Matrix3d::Identity();
   }
 
   Vector3d sigma;
@@ -85,14 +88,14 @@ MotionStep MotionModel::step(const Frame &frame, const Pose &wMa, const GyroBias
     sigma << across, across, std::hypot(m_options.step_sigma_vertical, along);
     step.absolute = levelPrior(*frame.wMb_odometry, wMa.R * step.aMb.R, m_options.height_sigma, m_options.tilt_sigma);
   }
-  else if (inertial && inertial->sigma < longer * m_options.free_step_sigma) {
+  else if (inertial && inertial->sigma < longer * kFreeStep) {
     step.is_step_measured = true;
     step.aMb.t = inertial->moved;
     sigma.setConstant(inertial->sigma);
   }
   else {
     step.aMb.t = velocity.head<3>() * dt;
-    sigma.setConstant(longer * m_options.free_step_sigma);
+    sigma.setConstant(longer * kFreeStep);
   }
   step.covariance.setZero();
   // the tangent rho stands in b: turned by aRb from the steps measured in a, equal to first order for small turns

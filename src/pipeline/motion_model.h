@@ -26,12 +26,9 @@ struct MotionModelOptions
   double step_scale_sigma = 0.03;    ///< error in proportion to the way of 0.1 s, 0 to 1
   double scale_sigma = 0.03;         ///< of the one scale by which all steps of the filter are off, 0 to 1
   double step_sigma_vertical = 0.03; ///< of the difference of two heights [m], 1e-4 to 1
-  double height_sigma = 0.02;      ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
-  double tilt_sigma = 0.005;       ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
-  double turn_sigma = 0.006;       ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
-  double gyro_turn_sigma = 0.0008; ///< least walk of the gyro's rotation in 0.1 s [rad], 1e-6 to 1
-  double free_step_sigma = 0.15;   ///< of 0.1 s that nothing measured (constant velocity) [m], 1e-3 to 10; as the time
-  double free_turn_sigma = 0.02;   ///< of a turn of 0.1 s that nothing measured [rad], 1e-4 to 1; as the time
+  double height_sigma = 0.02; ///< of the filter's height round the truth [m], 1e-3 to 10; bumps of the ground too
+  double tilt_sigma = 0.005;  ///< of the filter's roll and pitch round the truth [rad], 1e-4 to 1
+  double turn_sigma = 0.006;  ///< of the filter's rotation between frames, used without gyro [rad], 1e-5 to 1
 };
 
 /// One step: what the smoother is given for a new frame.

@@ -40,8 +40,7 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_use_points(options.flow.use_points),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
-      m_path_scale(options.points.gyro,
-                   options.flow.use_points ? PathScale::kWalkAmongTrees : options.points.odometry_walk),
+      m_path_scale(options.points.gyro, options.flow.use_points ? PathScale::kWalkAmongTrees : odometry::kWalk),
       m_inertial(bMc, options.points.gyro),
       m_monitor(bMc)
 {
@@ -71,6 +70,8 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
   m_path_scale.add(trusted);
+  if (m_inertial.hasBegunAnew())
+    m_path_scale.forget(InertialScale::kMisfit_s);
   m_last_ns = frame.stamp_ns;
   return seen;
 }

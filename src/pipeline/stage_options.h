@@ -17,14 +17,6 @@
 
 namespace bole
 {
-/// Points for the smoother, which has the pose filter already: it must not count twice.
-inline PointMotionOptions withoutOdometry()
-{
-  PointMotionOptions options;
-  options.use_odometry = false;
-  return options;
-}
-
 /// More iterations a frame than the smoother takes by itself: what the detector and the map choose rests on where the
 /// trunks stand now, and a flight has few poses against those the smoother is made for.
 inline SmootherOptions closeToTheOptimum()
@@ -66,7 +58,7 @@ struct StageOptions
 {
   FlowOptions flow;
   MotionModelOptions motion;
-  PointMotionOptions points = withoutOdometry();
+  PointMotionOptions points;
   double camera_height = 0; ///< over the ground, where it is known [m]; 0: unknown
   double focal_sigma = 0;   ///< of the log of the focal length; 0: calibrated
   GradientOptions gradient;

@@ -149,6 +149,27 @@ TEST(PathScale, APathAThirdTooLongContradictsWhatWasExpected)
   EXPECT_NEAR(scale->mean, std::log(1.33), 0.005);
 }
 
+TEST(PathScale, WhatABiasThatChangesSaidIsTakenBack)
+{
+  MadeFlight flight = noisy();
+  PathScale forgetful, credulous;
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    if (i == 60)
+      flight.force_bias += Eigen::Vector3d(1, -1, 0);
+    const Frame frame = flight.frame(i);
+    forgetful.add(frame);
+    credulous.add(frame);
+    if (i == 75)
+      forgetful.forget(2);
+  }
+  const std::vector<Pose> path = MadePath().poses(flight);
+  const auto at = [&path](std::size_t i) { return path[i]; };
+  const auto scale = forgetful.measure(at, kWide), wrong = credulous.measure(at, kWide);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->mean, 0, 0.02);
+  EXPECT_TRUE(!wrong || std::abs(wrong->mean) > 0.02);
+}
+
 TEST(PathScale, BeginsAnewAfterSamplesThatAreMissing)
 {
   const auto scale = measure({}, {1.05}, kWide, 50, 60);
@@ -236,6 +257,28 @@ TEST(InertialScale, AnAccelerometerThatRepeatsOneValueIsNotBelieved)
   MadeFlight made;
   made.has_constant_force = true;
   EXPECT_FALSE(fly(6, made).scale(0.03));
+}
+
+TEST(InertialScale, ABiasThatChangesInFlightTellsNoWrongScale)
+{
+  for (const Eigen::Vector3d &bias : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1.5, 0)}) {
+    MadeFlight made;
+    made.odometry_noise = 0.012;
+    made.force_noise = 0.1;
+    InertialScale inertial(forwardCamera());
+    int begun_anew = 0;
+    for (std::size_t i = 0; i < 120; ++i) {
+      made.force_bias = i < 50 ? Eigen::Vector3d(0, 0, 0) : bias;
+      inertial.process(made.frame(i), made.seen(i));
+      begun_anew += inertial.hasBegunAnew();
+      EXPECT_TRUE(i >= 50 || begun_anew == 0) << i;
+    }
+    EXPECT_GT(begun_anew, 0);
+    const auto scale = inertial.scale(0.03);
+    ASSERT_TRUE(scale);
+    EXPECT_LT(std::abs(scale->mean), 3 * scale->sigma) << bias.transpose();
+    EXPECT_FALSE(scale->contradicts_prior);
+  }
 }
 
 TEST(InertialScale, AnOdometryAThirdTooLongContradictsWhatWasExpected)

@@ -45,6 +45,22 @@ TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
   EXPECT_GT(aMb.t.norm(), 0.2);
 }
 
+TEST(PointTracker, FollowsCornersThroughExposuresThatHunt)
+{
+  constexpr std::size_t kFrames = 6;
+  const auto followed = [](double darkest) {
+    PointTracker tracker(kCamera);
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      vpImage<unsigned char> image = drawWalls(kCamera, poseAt(static_cast<int>(k)));
+      for (unsigned i = 0; i < image.getSize(); ++i)
+        image.bitmap[i] = static_cast<unsigned char>(std::lround((k % 2 == 0 ? 1 : darkest) * image.bitmap[i]));
+      tracker.track(image);
+    }
+    return tracker.matches(kFrames - 1).size();
+  };
+  EXPECT_GT(followed(0.5), 0.9 * static_cast<double>(followed(1)));
+}
+
 TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
 {
   PointTracker tracker(kCamera);
@@ -179,7 +195,7 @@ TEST(PointMotion, FindsTheMotionOfEveryFrame)
   }
 }
 
-TEST(PointMotion, FallsBackToTheSensorsWithinAFrameAndRecovers)
+TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
 {
   Pose bMc;
   bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -193,7 +209,6 @@ TEST(PointMotion, FallsBackToTheSensorsWithinAFrameAndRecovers)
   EXPECT_EQ(blind[0].estimate.status, RelativePoseStatus::too_few_points);
   const Pose aMb = poseAt(2).inverse() * poseAt(3);
   EXPECT_LT(logSo3(blind[0].estimate.aRb.transpose() * aMb.R).norm(), 1e-3);
-  EXPECT_LT(directionMinus(aMb.t.normalized(), blind[0].estimate.direction).norm(), 1e-6);
   motion.process(frameAt(4, drawWalls(kCamera, poseAt(4)), bMc));
   const auto seeing = motion.process(frameAt(5, drawWalls(kCamera, poseAt(5)), bMc));
   EXPECT_EQ(seeing[0].estimate.status, RelativePoseStatus::ok);
@@ -268,7 +283,7 @@ TEST(LucasKanade, FindsWhatOpenCvFinds)
     if (roundness(a.front(), from[i]) < 1.2 * kLeastRoundness)
       continue; // OpenCV follows what slides along a line
     cv::Point2f ours = from[i];
-    const bool is_found = followWindow(a, b, from[i], ours, {});
+    const bool is_found = followWindow(a, b, from[i], ours, 3);
     one += is_found != (found[i] != 0);
     both += is_found && found[i];
     same += is_found && found[i] && cv::norm(ours - theirs[i]) < 1e-3;
@@ -286,7 +301,7 @@ TEST(LucasKanade, HasNoAnswerWhereThereIsNoTextureOrNoImage)
   for (const cv::Point2f from :
        {cv::Point2f(100, 80), cv::Point2f(-50, 80), cv::Point2f(1e9f, 3), cv::Point2f(NAN, 3)}) {
     cv::Point2f to = from;
-    EXPECT_FALSE(followWindow(a, a, from, to, {}));
+    EXPECT_FALSE(followWindow(a, a, from, to, 3));
   }
 }
 

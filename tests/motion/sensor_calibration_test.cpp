@@ -31,7 +31,8 @@ SensorCalibration fly(
     MadeFlight flight, const std::function<void(Frame &)> &damage = [](Frame &) {}, double gyro_late_s = 0,
     double odometry_late_s = 0, const std::function<Matrix3d(const Matrix3d &)> &look = nullptr)
 {
-  SensorCalibrator calibrator(forwardCamera());
+  std::vector<Frame> frames;
+  std::vector<RelativeMotion> motions;
   const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
   std::mt19937 random(3);
   std::normal_distribution<double> turn(0, 0.003);
@@ -54,9 +55,10 @@ SensorCalibration fly(
     for (RelativeMotion &motion : seen)
       if (look)
         motion.points.aRb = look(motion.points.aRb) * expSo3({turn(random) / 5, turn(random) / 5, turn(random) / 5});
-    calibrator.add(frame, seen.empty() ? std::nullopt : std::optional<RelativeMotion>(seen.front()));
+    motions.insert(motions.end(), seen.begin(), seen.end());
+    frames.push_back(std::move(frame));
   }
-  return calibrator.estimate();
+  return calibrate(frames, motions, forwardCamera());
 }
 
 const CalibratedConstant *constant(const SensorCalibration &calibration, const std::string &name)
@@ -78,6 +80,7 @@ void expectAsStated(const SensorCalibration &calibration)
   EXPECT_EQ(calibration.gyro_bias, Vector3d(0, 0, 0));
   EXPECT_EQ(calibration.bRo, Matrix3d(Matrix3d::Identity()));
   EXPECT_EQ(calibration.odometry_scale, 1);
+  EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
 }
 
 void turnRates(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
@@ -146,8 +149,47 @@ TEST(SensorCalibration, ATurnedBodyOfTheOdometryIsFound)
     const SensorCalibration calibration =
         fly(noisy(), [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
     EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.02) << turned.transpose();
+    EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0)) << turned.transpose();
     EXPECT_GT(calibration.odometry_rotation_sigma, 0) << turned.transpose();
   }
+}
+
+TEST(SensorCalibration, AnAccelerometerThatIsOffIsFoundAndTheOdometryStaysAsStated)
+{
+  for (const Vector3d &bias : {Vector3d(1, 0.5, 0), Vector3d(0, -1.2, 0), Vector3d(0, 0, 1), Vector3d(-2, 0, 0)}) {
+    MadeFlight flight = noisy();
+    flight.force_bias = bias;
+    const SensorCalibration calibration = fly(flight);
+    const CalibratedConstant *found = constant(calibration, "accelerometer_bias");
+    ASSERT_TRUE(found && found->used) << bias.transpose();
+    EXPECT_LT((calibration.force_bias - bias).norm(), 3 * std::sqrt(3.0) * found->sigma) << bias.transpose();
+    EXPECT_LT(found->sigma, 0.25) << bias.transpose();
+    EXPECT_EQ(calibration.bRo, Matrix3d(Matrix3d::Identity())) << bias.transpose();
+    EXPECT_TRUE(calibration.verdicts.empty()) << calibration.verdicts.front().text;
+  }
+}
+
+TEST(SensorCalibration, ATurnedOdometryAndAnAccelerometerThatIsOffAreToldApart)
+{
+  const Vector3d turned(0, 0.17, 0), bias(0, 1.2, 0);
+  MadeFlight flight = noisy();
+  flight.force_bias = bias;
+  const SensorCalibration calibration =
+      fly(flight, [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
+  EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.03);
+  EXPECT_LT((calibration.force_bias - bias).norm(), 0.4);
+  EXPECT_TRUE(calibration.verdicts.empty()) << calibration.verdicts.front().text;
+}
+
+TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFault)
+{
+  const Matrix3d A = forwardCamera().R.transpose();
+  const SensorCalibration calibration = fly(noisy(), [&](Frame &f) {
+    *f.wMb_odometry = {A * f.wMb_odometry->R * A.transpose(), A * f.wMb_odometry->t};
+  });
+  EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
+  ASSERT_FALSE(calibration.verdicts.empty());
+  EXPECT_EQ(calibration.verdicts[0].sensor, "odometry") << calibration.verdicts[0].text;
 }
 
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
@@ -291,7 +333,7 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
     const Eigen::Matrix3d S = prior.covariance(),
                           gain = S * (S + sigma * sigma * Eigen::Matrix3d::Identity()).inverse();
     const Eigen::Matrix3d fused = prior.R * expSo3(gain * logSo3(prior.R.transpose() * seen));
-    bias = refineBias(bias, prior, fused, S - gain * S, options);
+    bias = refineBias(bias, prior, fused, S - gain * S);
   }
   const Eigen::Vector3d error = bias.mean - truth;
   EXPECT_LT(error.norm(), 0.002);

@@ -117,6 +117,61 @@ TEST(SensorMonitor, SensorsThatAgreeRaiseNothingAtAnyRate)
     }
 }
 
+TEST(SensorMonitor, AnAccelerometerThatIsOffCostsTheOdometryNothing)
+{
+  const auto off = [](const Vector3d &bias, double until_s) {
+    return [bias, until_s](Frame &f) {
+      for (GyroSample &sample : f.gyro)
+        if (sample.stamp_ns < MadeFlight::nanoseconds(until_s))
+          *sample.force += bias;
+    };
+  };
+  for (const Vector3d &bias : {Vector3d(1, 0.5, 0), Vector3d(0, -2, 0), Vector3d(0, 0, 1.5)}) {
+    const SensorMonitor monitor = fly(off(bias, 100));
+    ASSERT_EQ(monitor.verdicts().size(), 1u) << bias.transpose();
+    EXPECT_EQ(monitor.verdicts()[0].sensor, "accelerometer") << monitor.verdicts()[0].text;
+    EXPECT_TRUE(monitor.trusts(Sensor::odometry) && monitor.trusts(Sensor::gyro));
+    Frame scratch;
+    const Frame frame = MadeFlight().frame(5);
+    const Frame &trusted = monitor.trusted(frame, scratch);
+    EXPECT_TRUE(trusted.wMb_odometry);
+    ASSERT_FALSE(trusted.gyro.empty());
+    EXPECT_FALSE(trusted.gyro.front().force);
+  }
+  const SensorMonitor after = fly(off({0, -2, 0}, 6), 10, 14);
+  EXPECT_TRUE(after.trusts(Sensor::accelerometer));
+  ASSERT_EQ(after.verdicts().size(), 1u);
+  EXPECT_NE(after.verdicts()[0].text.find(" until "), std::string::npos) << after.verdicts()[0].text;
+}
+
+TEST(SensorMonitor, TwoSecondsWithoutAPictureRaiseNothing)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  std::vector<GyroSample> waiting;
+  for (std::size_t i = 0; i < 120; ++i) {
+    Frame frame = flight.frame(i);
+    waiting.insert(waiting.end(), frame.gyro.begin(), frame.gyro.end());
+    if (i >= 50 && i < 70)
+      continue;
+    frame.gyro.swap(waiting);
+    waiting.clear();
+    monitor.process(frame, i < 50 || i >= 73 ? flight.seen(i) : std::vector<RelativeMotion>());
+    EXPECT_TRUE(monitor.trusts(Sensor::odometry) && monitor.trusts(Sensor::accelerometer)) << i;
+  }
+  EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
+}
+
+TEST(SensorMonitor, AnAccelerometerThatFeelsNoGravityIsNotTheOdometrysFault)
+{
+  const SensorMonitor monitor = fly([](Frame &f) {
+    for (GyroSample &sample : f.gyro)
+      *sample.force *= isLate(f) ? 1e-3 : 1;
+  });
+  EXPECT_TRUE(monitor.trusts(Sensor::odometry));
+  EXPECT_FALSE(monitor.trusts(Sensor::accelerometer));
+}
+
 TEST(SensorMonitor, OneOddStampCostsTheOdometryNothingFromTheSecondFrameOn)
 {
   for (const std::int64_t early_ns : {60'000'000, 95'000'000, 99'999'999}) {
@@ -124,6 +179,18 @@ TEST(SensorMonitor, OneOddStampCostsTheOdometryNothingFromTheSecondFrameOn)
     EXPECT_TRUE(monitor.trustsNow(Sensor::odometry)) << early_ns;
     for (const SensorVerdict &verdict : monitor.verdicts())
       EXPECT_NE(verdict.kind, "noise") << verdict.text;
+  }
+}
+
+TEST(SensorMonitor, APoseThatIsOffAndComesBackIsTwoJumpsOfWhichNoneIsBelieved)
+{
+  MadeFlight flight;
+  SensorMonitor monitor(forwardCamera());
+  for (std::size_t i = 0; i < 60; ++i) {
+    Frame frame = flight.frame(i);
+    frame.wMb_odometry->t.y() += i >= 40 && i < 42 ? 1 : 0;
+    monitor.process(frame, flight.seen(i));
+    EXPECT_EQ(monitor.trustsNow(Sensor::odometry), i != 40 && i != 42) << i;
   }
 }
 
