@@ -64,6 +64,7 @@ Eigen::Vector2d toEigen(const cv::Point2f &p) { return {double(p.x), double(p.y)
 void brighten(GreyPyramid &before, const GreyPyramid &now)
 {
   constexpr double kLeast = 0.1; // of change: less is followed as it is
+  constexpr double kMost = 3;    // factor: what is darker has too few grey levels
   constexpr double kDark = 8;    // grey levels that are no light
   const cv::Mat &a = before.back(), &b = now.back();
   std::vector<double> ratios;
@@ -71,7 +72,7 @@ void brighten(GreyPyramid &before, const GreyPyramid &now)
     for (int x = 0; x < a.cols; ++x)
       ratios.push_back((b.at<unsigned char>(y, x) + kDark) / (a.at<unsigned char>(y, x) + kDark));
   const double ratio = medianOf(std::move(ratios));
-  if (std::abs(ratio - 1) < kLeast)
+  if (std::abs(ratio - 1) < kLeast || std::max(ratio, 1 / ratio) > kMost)
     return;
   cv::Mat brighter;
   before.front().convertTo(brighter, CV_8U, ratio, (ratio - 1) * kDark);
