@@ -170,7 +170,9 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
   if (!support::hasFlight("park-forward"))
     GTEST_SKIP() << "the rendered flights are not here: " << BOLE_SHARED_DATA_DIR;
   const support::ForestFlight flight = support::readForestFlight("park-forward", 0, 110);
-  SaliencyEstimator estimator(flight.camera);
+  SaliencyOptions options;
+  options.near_range = 6;
+  SaliencyEstimator estimator(flight.camera, options);
   support::RocCurve roc;
   double worst_turn = 0;
   for (std::size_t i = 0; i < flight.size(); ++i) {
@@ -186,7 +188,7 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
     const auto mask = support::texturedAboveHorizon(flight.images[i], flight.camera, flight.wMc_truth(i).R);
     for (unsigned p = 0; p < mask.getSize(); ++p)
       if (mask.bitmap[p])
-        roc.add(1 - saliency.p_background.bitmap[p], flight.depths_m[i].bitmap[p] < 6);
+        roc.add(1 - saliency.p_background.bitmap[p], flight.depths_m[i].bitmap[p] < options.near_range);
   }
   EXPECT_GT(roc.area(), 0.88);
   EXPECT_LT(worst_turn, 0.003); // 0.17 degrees
