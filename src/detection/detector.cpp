@@ -97,7 +97,7 @@ struct RangeCurve
 struct SweptRanges
 {
   explicit SweptRanges(const DetectorOptions &options)
-      : far(1 / options.rangeSwept()), step((1 / options.range_min - far) / (kCount - 1))
+      : far(1 / (1.2 * options.range_max)), step((1 / options.range_min - far) / (kCount - 1))
   {
     for (std::size_t i = 0; i < kCount; ++i)
       range[i] = static_cast<float>(1 / (far + step * static_cast<double>(i)));

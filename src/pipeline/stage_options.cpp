@@ -82,7 +82,7 @@ void setRange(StageOptions &o, const Options::Range &range)
   o.detection.range_max = range.detect_max;
   constexpr double kParallax = 0.04; // rad: least that two views of the window differ by at the nearest trunk
   o.flow.view_spacing = kParallax * range.detect_min;
-  o.saliency.near_range = o.detection.rangeSwept(); // what is farther is nothing to look for
+  o.saliency.near_range = range.detect_max; // what is farther is nothing to look for
   o.saliency.min_range = std::min(o.saliency.min_range, o.saliency.near_range / 2);
   o.map.through_range = range.through;
 }

@@ -26,7 +26,7 @@ struct SaliencyOptions
 
   // --- labels that ask about inverse depth, where the translation is given
   double sigma_residual = 0.05; ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
-  double near_range = 12.6;     ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
+  double near_range = 10.5;     ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
   double min_range = 2;         ///< nearest range of the sweep [m]; (0.05, near_range)
   int window_width_px = 3;      ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
   int window_height_px = 9;     ///< trunks are upright: taller than wide; odd, [1, 31]

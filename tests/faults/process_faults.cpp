@@ -39,7 +39,8 @@ std::string trackOf(const Shop &shop, const std::string &run, const std::string 
   return shop.bole + " track " + shop.flight + " -o " + run + more;
 }
 
-/// A run that gets \p signal when it has written fifty poses. \return its status as waitpid() tells it.
+/// A run that gets \p signal when it has written a pose: later a quick one may have ended. \return its status as
+/// waitpid() tells it.
 int runUntil(const Shop &shop, const std::string &run, int signal)
 {
   const pid_t child = fork();
@@ -51,7 +52,7 @@ int runUntil(const Shop &shop, const std::string &run, int signal)
     _exit(127);
   }
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(300);
-  while (posesIn(run) < 50 && std::chrono::steady_clock::now() < give_up)
+  while (posesIn(run) == 0 && std::chrono::steady_clock::now() < give_up)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   kill(child, signal);
   int status = 0;
@@ -72,7 +73,7 @@ Fault interrupted(const std::string &name, int signal)
     const std::size_t poses = posesIn(run);
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     const bool is_told = test::textOf(run + "/summary.json").find("interrupted") != std::string::npos;
-    return Seen{code == 130 && poses >= 50 && is_told && fs::exists(run + "/trunks.csv") && hiddenIn(run) == 0,
+    return Seen{code == 130 && poses > 0 && is_told && fs::exists(run + "/trunks.csv") && hiddenIn(run) == 0,
                 fmt::format("exit {}, {} poses kept", code, poses)};
   });
 }
@@ -85,7 +86,7 @@ Seen killedAndResumed(const Shop &shop)
   const std::size_t kept = posesIn(run);
   const int resumed = test::runShell(shop.bole + " track -q --resume " + run).status;
   const int unbroken = test::runShell(trackOf(shop, whole, " --no-video -q")).status;
-  bool is_same = resumed == 0 && unbroken == 0 && kept >= 50;
+  bool is_same = resumed == 0 && unbroken == 0 && kept > 0;
   for (const char *file : {"/trajectory.tum", "/trunks.csv", "/graph.g2o"})
     is_same = is_same && test::textOf(run + file) == test::textOf(whole + file);
   return {is_same && hiddenIn(run) == 0, fmt::format("{} poses kept; --resume: exit {}, {}", kept, resumed,
