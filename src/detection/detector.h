@@ -36,7 +36,7 @@ struct DetectorOptions
   double rms_max_px = 0.85;      ///< of the inliers, [px]
   double parallax_min = 0.03;    ///< change of the bearing of a border over the window, [rad]
   double range_sigma_max = 0.15; ///< of the fitted range, relative
-  double foreground_min = 0.25;  ///< mean of 1 - p(background) along a line beside a border, 0 to 1; .3 before looking
+  double foreground_min = 0.2;   ///< mean of 1 - p(background) along a line beside a border, 0 to 1; .3 before looking
 };
 
 /// One frame of the window: its profile and its pose as it is known now.
