@@ -293,6 +293,7 @@ bool inhibited(const std::vector<InhibitedRange> &known, double q_right, double 
     return overlaps && !holds_it;
   });
 }
+
 /// The lines of the newest view that have something beside them that is near enough to matter (paper, Section 5):
 /// trunks are sought between these alone.
 std::vector<ProfilePeak> salientPeaks(const DetectorView &view, const PinholeCamera &camera,

@@ -68,8 +68,7 @@ struct InhibitedRange
 
 /// Trunks seen in views.back() (the current frame) and agreed on by the others, best first, with every hypothesis for
 /// the same lines. \p p_background: of the current frame: trunks are sought where it is salient alone; nullptr:
-/// everywhere. Cost: 3 to 6 ms at 320x240 with a window of 18.
-/// Thread-safe.
+/// everywhere. Cost: 3 to 6 ms at 320x240 with a window of 18. Thread-safe.
 std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, const PinholeCamera &camera,
                                     const std::vector<InhibitedRange> &known, const vpImage<float> *p_background,
                                     const DetectorOptions &options);
