@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "smoothing/front_loops.h"
+#include "smoothing/normal_equations.h"
 
 #include "geometry/vector_clones.h"
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "smoothing/normal_equations.h"
 
-#include "smoothing/front_loops.h"
-
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 

@@ -147,15 +147,6 @@ public:
   void absorb(std::size_t from, std::size_t until);
   void shrink();
   void forget(std::size_t until);
-
-  // whole.cpp
-  Places placeWhole() const;
-  double addWhole(const Places &places, NormalEquations *system) const;
-  void keepCovariances(const Places &places, const std::vector<int> &variables, const Eigen::MatrixXd &C);
-  UpdateResult solveWhole(double tolerance, int max_iterations, bool with_covariances);
-  UpdateResult optimize(double tolerance, int max_iterations);
-
-  // marginals.cpp
   Matrix5d trunkCovariance(std::size_t trunk) const;
   using FromPose = Eigen::Matrix<double, 2, 6>;
   FromPose placeJacobian(const TrunkState &trunk) const; ///< of its place as the last pose saw it, by that pose
@@ -163,6 +154,12 @@ public:
   Matrix6d poseCovariance(std::size_t pose) const;
   Eigen::MatrixXd relativeCovariance(std::size_t pose, std::size_t trunk, const Eigen::MatrixXd &which) const;
 
-  Graph graph() const; // export.cpp
+  // whole.cpp
+  Places placeWhole() const;
+  double addWhole(const Places &places, NormalEquations *system) const;
+  void keepCovariances(const Places &places, const std::vector<int> &variables, const Eigen::MatrixXd &C);
+  UpdateResult solveWhole(double tolerance, int max_iterations, bool with_covariances);
+  UpdateResult optimize(double tolerance, int max_iterations);
+  Graph graph() const;
 };
 } // namespace bole
