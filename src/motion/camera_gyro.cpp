@@ -28,12 +28,12 @@ struct Relation
 };
 constexpr Relation kAttitude{3, 3, kMount}, kFocalLengths{6, 2, kFocal}, kRates{8, 1, kGyroScale};
 
-std::vector<RowOf<kShares>> rowsOfShares(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns,
-                                         const Matrix3d &bRc, double late_s, double overlap)
+std::vector<RowOf<kShares>> rowsOfShares(const GyroTurns &gyro, const std::vector<Turn> &turns, const Matrix3d &bRc,
+                                         double late_s, double overlap)
 {
   std::vector<RowOf<kShares>> rows;
   for (const Turn &turn : turns) {
-    const auto turned = turnBetween(samples, turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
+    const auto turned = gyro.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
     if (!turned)
       continue;
     const Vector3d angle = logSo3(*turned), seen = bRc.transpose() * angle;
@@ -80,12 +80,11 @@ SensorVerdict verdictOf(const Relation &relation, const Eigen::VectorXd &x, doub
 }
 } // namespace
 
-Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
-               double scatter)
+Fitted fitBias(const GyroTurns &gyro, const std::vector<Turn> &turns, double late_s, double overlap, double scatter)
 {
   std::vector<Row> rows;
   for (const Turn &turn : turns) {
-    const auto turned = turnBetween(samples, turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
+    const auto turned = gyro.between(turn.a_ns + nsOf(late_s), turn.b_ns + nsOf(late_s));
     if (turned) // the rates less the bias: what is left of it turns the other way
       rows.emplace_back(Matrix3d(turn.duration() * Matrix3d::Identity()),
                         logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
@@ -93,13 +92,13 @@ Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &
   return solve(rows, kWideBias * kWideBias, scatter);
 }
 
-std::vector<SensorVerdict> judgeCamera(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns,
-                                       const Matrix3d &bRc, double overlap)
+std::vector<SensorVerdict> judgeCamera(const GyroTurns &gyro, const std::vector<Turn> &turns, const Matrix3d &bRc,
+                                       double overlap)
 {
   constexpr double kAsGood = 9;   // the data do not tell one from the other: three standard deviations
   constexpr double kInHalves = 6; // two and a half: what begins later is no constant
   const std::vector<Relation> all = {kAttitude, kFocalLengths, kRates};
-  const auto rowsAt = [&](double late_s) { return rowsOfShares(samples, turns, bRc, late_s, overlap); };
+  const auto rowsAt = [&](double late_s) { return rowsOfShares(gyro, turns, bRc, late_s, overlap); };
   const Minimum late = minimiseLate([&](double late_s) { return fitShares(rowsAt(late_s), all, 1).cost; });
   if (!late.is_inside)
     return {};

@@ -22,14 +22,13 @@ struct Turn
 
 /// The bias of a gyro that is \p late_s, by the rotations of the points.
 /// \param scatter of the noise; 0: that of what is left
-Fitted fitBias(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns, double late_s, double overlap,
-               double scatter);
+Fitted fitBias(const GyroTurns &gyro, const std::vector<Turn> &turns, double late_s, double overlap, double scatter);
 
 /// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of \p turns; empty
 /// where they do as it is. Nothing is corrected: the numbers are the user's. SensorVerdict::since_s is left at 0.
-/// \param samples of the gyro less its bias
+/// \param gyro less its bias
 /// \param bRc attitude of the camera on the body, as stated
 /// \param overlap turns that share an interval of time
-std::vector<SensorVerdict> judgeCamera(const std::vector<GyroSample> &samples, const std::vector<Turn> &turns,
+std::vector<SensorVerdict> judgeCamera(const GyroTurns &gyro, const std::vector<Turn> &turns,
                                        const Eigen::Matrix3d &bRc, double overlap);
 } // namespace bole::calibration

@@ -10,6 +10,7 @@ namespace bole
 {
 namespace
 {
+constexpr auto kMostGap_ns = static_cast<std::int64_t>(1e9 * kMostGap_s);
 constexpr double kRateSigma = 0.5; ///< of a rate that nothing measured [rad/s]
 /// Walk of the rate between samples [rad/s/sqrt(s)]: 0.15 to 0.4 between two, 0.2 to 0.5 after the last, measured on
 /// the rendered flights over 0.01 to 0.2 s.
@@ -27,6 +28,14 @@ Eigen::Vector3d rateAt(const std::vector<GyroSample> &samples, std::size_t next,
     return b.rate;
   const double along = double(stamp_ns - a.stamp_ns) / double(b.stamp_ns - a.stamp_ns);
   return a.rate + along * (b.rate - a.rate);
+}
+
+/// Number of the first sample after a stamp.
+std::size_t firstAfter(const std::vector<GyroSample> &samples, std::int64_t stamp_ns)
+{
+  const auto isBefore = [](std::int64_t stamp, const GyroSample &sample) { return stamp < sample.stamp_ns; };
+  return static_cast<std::size_t>(std::upper_bound(samples.begin(), samples.end(), stamp_ns, isBefore) -
+                                  samples.begin());
 }
 
 /// What the samples leave open of an interval.
@@ -80,10 +89,7 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   GyroRotation result;
   result.duration = 1e-9 * double(to_ns - from_ns);
   const double dt_all = result.duration;
-  auto next = static_cast<std::size_t>(
-      std::upper_bound(samples.begin(), samples.end(), from_ns,
-                       [](std::int64_t stamp_ns, const GyroSample &sample) { return stamp_ns < sample.stamp_ns; }) -
-      samples.begin());
+  std::size_t next = firstAfter(samples, from_ns);
   const Gaps gaps = gapsOf(samples, next, from_ns, to_ns);
   result.complete = !samples.empty() && gaps.longest_s <= kMostGap_s;
   const double open = samples.empty() ? kRateSigma * kRateSigma * dt_all * dt_all : gaps.variance;
@@ -102,6 +108,38 @@ GyroRotation integrateGyro(const std::vector<GyroSample> &samples, std::int64_t 
   }
   result.R = orthonormalized(result.R);
   return result;
+}
+
+GyroTurns::GyroTurns(std::vector<GyroSample> samples) : m_samples(std::move(samples))
+{
+  for (std::size_t i = 0; i < m_samples.size(); ++i) {
+    const std::int64_t stamp_ns = m_samples[i].stamp_ns;
+    m_turned.push_back(i == 0 ? Eigen::Matrix3d::Identity() : turnedUntil(stamp_ns, i));
+    m_run.push_back(i > 0 && stamp_ns - m_samples[i - 1].stamp_ns <= kMostGap_ns ? m_run.back() : i);
+  }
+}
+
+/// \p next: number of the first sample after \p stamp_ns.
+Eigen::Matrix3d GyroTurns::turnedUntil(std::int64_t stamp_ns, std::size_t next) const
+{
+  const std::size_t known = next == 0 ? 0 : next - 1;
+  const GyroSample &sample = m_samples[known];
+  const Eigen::Vector3d rate = 0.5 * (sample.rate + rateAt(m_samples, next, stamp_ns));
+  return m_turned[known] * expSo3(rate * (1e-9 * double(stamp_ns - sample.stamp_ns)));
+}
+
+std::optional<Eigen::Matrix3d> GyroTurns::between(std::int64_t from_ns, std::int64_t to_ns) const
+{
+  if (m_samples.empty())
+    return std::nullopt;
+  const std::size_t begin = firstAfter(m_samples, from_ns), end = firstAfter(m_samples, to_ns);
+  const bool is_covered = begin == end
+                              ? to_ns - from_ns <= kMostGap_ns
+                              : m_samples[begin].stamp_ns - from_ns <= kMostGap_ns && m_run[end - 1] <= begin &&
+                                    to_ns - m_samples[end - 1].stamp_ns <= kMostGap_ns;
+  if (!is_covered)
+    return std::nullopt;
+  return orthonormalized(turnedUntil(from_ns, begin).transpose() * turnedUntil(to_ns, end));
 }
 
 GyroBias refineBias(const GyroBias &bias, const GyroRotation &prior, const Eigen::Matrix3d &R,

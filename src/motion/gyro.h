@@ -71,6 +71,23 @@ inline std::optional<Eigen::Matrix3d> turnBetween(const std::vector<GyroSample> 
   return turned.complete ? std::optional<Eigen::Matrix3d>(turned.R) : std::nullopt;
 }
 
+/// The rotations between any two stamps, by samples that are integrated once: each costs two look-ups.
+class GyroTurns
+{
+public:
+  /// \p samples: oldest first.
+  explicit GyroTurns(std::vector<GyroSample> samples);
+  /// What turnBetween() says.
+  std::optional<Eigen::Matrix3d> between(std::int64_t from_ns, std::int64_t to_ns) const;
+
+private:
+  Eigen::Matrix3d turnedUntil(std::int64_t stamp_ns, std::size_t next) const;
+
+  std::vector<GyroSample> m_samples;
+  std::vector<Eigen::Matrix3d> m_turned; ///< since the first sample
+  std::vector<std::size_t> m_run;        ///< number of the first sample from which on none is missing
+};
+
 /// Bias after the rotation \p prior was refined to \p R with the covariance \p covariance [rad^2],
 /// the prior having been used in the refinement (a conditional Gaussian: exact to first order).
 /// Feed intervals that do not overlap.

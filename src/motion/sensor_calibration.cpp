@@ -135,7 +135,7 @@ private:
   void addDirections(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
   void addGravity(const std::vector<Frame> &frames, std::vector<AttitudeRow> &rows) const;
   template <int P>
-  void addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
+  void addTurns(const std::vector<Frame> &frames, const GyroTurns &gyro, double late_s,
                 std::vector<RowOf<P>> &rows) const;
 
   void addConstant(const char *name, double value, double sigma, bool used, std::string text)
@@ -160,17 +160,17 @@ void Estimation::calibrateGyro()
   Minimum late;
   Fitted fit;
   std::vector<GyroSample> samples = m_samples; // less the bias
-  std::vector<Turn> turns;                     // that every offset can be tried on
-  for (int round = 0; round < 2; ++round) {    // the second one with the bias taken off exactly
+  GyroTurns gyro(samples);
+  std::vector<Turn> turns;                  // that every offset can be tried on
+  for (int round = 0; round < 2; ++round) { // the second one with the bias taken off exactly
+    gyro = GyroTurns(samples);
     turns.clear();
     for (const Turn &turn : m_turns)
-      if (turnBetween(samples, turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
+      if (gyro.between(turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
         turns.push_back(turn);
     if (turns.size() < kLeastMotions)
       return;
-    const auto fitAt = [&](double late_s, double scatter) {
-      return fitBias(samples, turns, late_s, m_overlap, scatter);
-    };
+    const auto fitAt = [&](double late_s, double scatter) { return fitBias(gyro, turns, late_s, m_overlap, scatter); };
     const double scatter = leastScatter(fitAt);
     late = minimiseLate([&](double late_s) { return fitAt(late_s, scatter).cost; });
     fit = fitAt(late.is_inside ? late.late_s : 0, scatter);
@@ -178,7 +178,7 @@ void Estimation::calibrateGyro()
     for (GyroSample &sample : samples)
       sample.rate -= fit.value;
   }
-  m_result.verdicts = judgeCamera(samples, turns, m_bMc.R, m_overlap);
+  m_result.verdicts = judgeCamera(GyroTurns(samples), turns, m_bMc.R, m_overlap);
   for (SensorVerdict &verdict : m_result.verdicts)
     verdict.since_s = secondsOf(m_frames.front().stamp_ns);
   m_is_gyro_explained = fit.failing < kMostFailing;
@@ -246,7 +246,7 @@ void Estimation::addGravity(const std::vector<Frame> &frames, std::vector<Attitu
 
 /// Rotations over half a second: bRo carries those of the odometry to those of the gyro.
 template <int P>
-void Estimation::addTurns(const std::vector<Frame> &frames, const std::vector<GyroSample> &samples, double late_s,
+void Estimation::addTurns(const std::vector<Frame> &frames, const GyroTurns &gyro, double late_s,
                           std::vector<RowOf<P>> &rows) const
 {
   constexpr std::int64_t kApart_ns = 500'000'000;
@@ -259,7 +259,7 @@ void Estimation::addTurns(const std::vector<Frame> &frames, const std::vector<Gy
       return;
     if (!frames[a].wMb_odometry || !frames[b].wMb_odometry)
       continue;
-    const auto turned = turnBetween(samples, frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
+    const auto turned = gyro.between(frames[a].stamp_ns - nsOf(late_s), frames[b].stamp_ns - nsOf(late_s));
     if (!turned)
       continue;
     const Vector3d by_gyro = logSo3(*turned);
@@ -288,7 +288,7 @@ std::optional<Estimation::Attitude> Estimation::fitAttitude(double mount_sigma, 
     if (rows.size() < kLeastMotions)
       return std::nullopt;
     addGravity(frames, rows);
-    addTurns(frames, samplesOf(frames), 0, rows);
+    addTurns(frames, GyroTurns(samplesOf(frames)), 0, rows);
     attitude.fit = solve(rows, prior2, scatter, attitude.value());
     attitude.bRo = expSo3(attitude.fit.value.head<3>()) * attitude.bRo;
     attitude.force_bias += attitude.fit.value.tail<3>();
@@ -346,16 +346,16 @@ void Estimation::calibrateOdometryClock()
   SensorCalibration tried = m_result;
   tried.odometry_late_s = 0;
   const std::vector<Frame> frames = corrected(m_frames, tried);
-  const std::vector<GyroSample> samples = samplesOf(frames);
+  const GyroTurns gyro(samplesOf(frames));
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)
-    if (turnBetween(samples, frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
+    if (gyro.between(frame.stamp_ns - nsOf(kMostLate_s), frame.stamp_ns + nsOf(kMostLate_s)))
       usable.push_back(frame);
   if (usable.size() < 2 * kLeastMotions)
     return;
   const auto fitAt = [&](double late_s, double scatter) {
     std::vector<Row> rows;
-    addTurns(usable, samples, late_s, rows);
+    addTurns(usable, gyro, late_s, rows);
     return solve(rows, kWideMount * kWideMount, scatter); // whatever its body stands like
   };
   const double scatter = leastScatter(fitAt);

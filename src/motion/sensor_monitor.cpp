@@ -394,6 +394,7 @@ void SensorMonitor::diagnoseGyro()
 {
   constexpr double kExplained = 6; // mean squared difference that is left when the cause is found
   constexpr std::size_t kLeast = 3;
+  const GyroTurns gyro(m_samples);
   std::vector<calibration::Turn> turns, at_any_time;
   for (const Comparison &c : m_comparisons) {
     if (c.gyro_points <= 0.5 * kLimitPoints)
@@ -401,17 +402,17 @@ void SensorMonitor::diagnoseGyro()
     const double white = std::pow(1e-3 * secondsOf(c.b_ns - c.a_ns), 2); // of the gyro
     turns.push_back({c.a_ns, c.b_ns, *c.points, (c.points_covariance + white * Matrix3d::Identity()).inverse()});
     const std::int64_t most_ns = nanoseconds(calibration::kMostLate_s);
-    if (turnBetween(m_samples, c.a_ns - most_ns, c.b_ns + most_ns))
+    if (gyro.between(c.a_ns - most_ns, c.b_ns + most_ns))
       at_any_time.push_back(turns.back());
   }
   SensorVerdict &verdict = m_verdicts.back();
-  const calibration::Fitted constant = calibration::fitBias(m_samples, turns, 0, 1, 0);
+  const calibration::Fitted constant = calibration::fitBias(gyro, turns, 0, 1, 0);
   if (turns.size() >= kLeast && constant.scatter < kExplained && constant.value.norm() > 3 * kBiasSigma) {
     verdict.kind = "bias";
     verdict.text = fmt::format("gyro: bias {:.2f} rad/s", constant.value.norm());
     return;
   }
-  const auto fitAt = [&](double late_s) { return calibration::fitBias(m_samples, at_any_time, late_s, 1, 1); };
+  const auto fitAt = [&](double late_s) { return calibration::fitBias(gyro, at_any_time, late_s, 1, 1); };
   const calibration::Minimum late = calibration::minimiseLate([&](double late_s) { return fitAt(late_s).cost; });
   if (at_any_time.size() >= kLeast && late.is_inside && fitAt(late.late_s).failing == 0 &&
       fitAt(late.late_s).cost < 0.3 * fitAt(0).cost) {

@@ -306,6 +306,25 @@ TEST(Gyro, AGapIsNotBridgedAsKnown)
   EXPECT_FALSE(integrateGyro({}, 0, 1000000000).complete);
 }
 
+TEST(Gyro, TurnsThatAreLookedUpAreThoseThatAreIntegrated)
+{
+  std::vector<GyroSample> samples;
+  for (int i = 0; i <= 200; ++i)
+    if (i < 100 || i > 130) // a gap of 0.15 s
+      samples.push_back({i * 5000000LL, {std::sin(0.1 * i), std::cos(0.07 * i), 0.3}});
+  const GyroTurns turns(samples);
+  for (std::int64_t from_ns = -200000000; from_ns < 1200000000; from_ns += 7300000)
+    for (const std::int64_t duration_ns : {2000000LL, 33000000LL, 150000000LL, 400000000LL}) {
+      const std::optional<Eigen::Matrix3d> looked_up = turns.between(from_ns, from_ns + duration_ns),
+                                           integrated = turnBetween(samples, from_ns, from_ns + duration_ns);
+      ASSERT_EQ(looked_up.has_value(), integrated.has_value()) << from_ns << " " << duration_ns;
+      if (integrated) {
+        EXPECT_LT(logSo3(looked_up->transpose() * *integrated).norm(), 1e-5) << from_ns << " " << duration_ns;
+      }
+    }
+  EXPECT_FALSE(GyroTurns({}).between(0, 10000000));
+}
+
 TEST(Gyro, TheGyrosOwnRotationTeachesNothing)
 {
   GyroBias bias = GyroBias::unknown({});
