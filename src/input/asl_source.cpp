@@ -49,7 +49,7 @@ std::vector<ImageRow> readImageRows(const fs::path &cam0)
 /// Throws for rates and stamps in other units than rad/s and ns.
 void requirePlausible(const std::vector<GyroSample> &gyro, const std::string &path)
 {
-  constexpr double kFastest_rad_s = 5; // 290 degrees a second for a quarter of the flight: a moment of it is a fault
+  constexpr double kFastest_rad_s = 35; // 2000 degrees a second, the range of the gyros that small drones carry
   constexpr double kSlowest_Hz = 5, kFastest_Hz = 20000;
   if (gyro.empty())
     throw ioError("{}: no sample in it (without a gyro the folder imu0 must not be there)", path);
