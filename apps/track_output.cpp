@@ -15,8 +15,8 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <iterator>
+#include <malloc.h>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <visp3/core/vpException.h>
 
 namespace bole::apps
@@ -135,6 +135,7 @@ vpImage<vpRGBa> TrackOutput::add(const Frame &frame, const FrameReport &report, 
   timing.index = frame.index;
   timing.stamp_ns = frame.stamp_ns;
   timing.age_ms = age_ms;
+  timing.stages_ms.reserve(report.timing_ms.size());
   for (const auto &[stage, ms] : report.timing_ms) {
     if (timing.stages_ms.size() >= m_summary.timing.stages.size())
       m_summary.timing.stages.emplace_back(stage);
@@ -174,7 +175,6 @@ bool TrackOutput::hasImage(const Frame &frame) const
 void TrackOutput::trace(const Frame &frame, const FrameReport &report)
 {
   constexpr double kFar = 15; // points beyond are no evidence of a trunk of the map [m]
-  constexpr std::size_t kForgottenAtOnce = 64;
   const Eigen::Matrix3d wRb = report.wMb.R;
   const Eigen::Matrix3d place_covariance = wRb * report.pose_covariance.topLeftCorner<3, 3>() * wRb.transpose();
   m_trace.frames.push_back({frame.index, frame.stamp_ns, report.frame_status, report.wMb.t,
@@ -183,12 +183,7 @@ void TrackOutput::trace(const Frame &frame, const FrameReport &report)
     m_trace.evidence.add(point);
   for (const int id : report.given_up) {
     m_best_views.forget(id);
-    m_given_up.insert(id);
-  }
-  if (m_given_up.size() >= kForgottenAtOnce) {
-    const auto isGone = [this](const TrunkTrace &view) { return m_given_up.count(view.id) > 0; };
-    m_trace.views.erase(std::remove_if(m_trace.views.begin(), m_trace.views.end(), isGone), m_trace.views.end());
-    m_given_up.clear();
+    m_views.erase(id);
   }
   traceTrunks(frame, report);
 }
@@ -204,8 +199,8 @@ void TrackOutput::traceTrunks(const Frame &frame, const FrameReport &report)
     const double across = line.norm() * std::sqrt(std::max(0.0, known->bearing_variance));
     const Eigen::Array2d variance = along.array().square() * std::pow(line.norm() * relative_sigma, 2) +
                                     along.reverse().array().square() * across * across;
-    m_trace.views.push_back({frame.index, frame.stamp_ns, view.id, view.distance, view.distance * relative_sigma,
-                             radius, radius * relative_sigma, known->trunk.xy, variance.sqrt()});
+    m_views[view.id].push_back({frame.index, frame.stamp_ns, view.id, view.distance, view.distance * relative_sigma,
+                                radius, radius * relative_sigma, known->trunk.xy, variance.sqrt()});
     if (view.relative.isFinite() && hasImage(frame))
       m_best_views.add(view.id, frame.image, m_summary.camera, view.relative, view.tan_low, view.tan_high);
   }
@@ -295,22 +290,25 @@ void TrackOutput::setLink(const LinkCounters &link)
   figures["live_navdata_late"] = static_cast<double>(link.navdata_late);
 }
 
-void TrackOutput::take(const Pipeline &pipeline, bool is_complete)
+/// What is known now: the picture, with m_summary up to date.
+MapPicture TrackOutput::take(const Pipeline &pipeline, bool is_complete)
 {
-  m_picture.smoothed = pipeline.smoothedTrajectory();
-  m_picture.online = pipeline.onlineTrajectory();
-  m_picture.trunks = pipeline.map();
-  m_summary.trunks = m_picture.trunks;
+  MapPicture picture = m_picture;
+  picture.smoothed = pipeline.smoothedTrajectory();
+  picture.online = pipeline.onlineTrajectory();
+  picture.trunks = pipeline.map();
+  m_summary.trunks = picture.trunks;
   m_summary.reference = pipeline.reference();
-  m_picture.caption = describe(m_summary.reference);
-  m_picture.has_ranges = m_summary.reference.has_ranges;
+  picture.caption = describe(m_summary.reference);
+  picture.has_ranges = m_summary.reference.has_ranges;
   m_summary.is_complete = is_complete;
   m_summary.duration_s = 1e-9 * static_cast<double>(m_last_ns - m_first_ns);
-  measureMotion(m_picture.smoothed, m_summary);
-  if (!m_picture.smoothed.empty()) {
-    m_summary.first_place = m_picture.smoothed.front().wMb.t.head<2>();
-    m_picture.camera = (m_picture.smoothed.front().wMb * m_bMc).t.head<2>();
+  measureMotion(picture.smoothed, m_summary);
+  if (!picture.smoothed.empty()) {
+    m_summary.first_place = picture.smoothed.front().wMb.t.head<2>();
+    picture.camera = (picture.smoothed.front().wMb * m_bMc).t.head<2>();
   }
+  return picture;
 }
 
 void TrackOutput::waitForKeeping()
@@ -323,7 +321,8 @@ void TrackOutput::waitForKeeping()
     loseVideos(error); // the disk may be full of them
 }
 
-/// With the views of confirmed trunks alone, and without lengths where none is known.
+/// With the views of confirmed trunks alone, one a trunk and frame: as it was known in flight, or else as the final map
+/// has it. Without lengths where none is known.
 FlightTrace TrackOutput::confirmedTrace() const
 {
   FlightTrace trace;
@@ -331,12 +330,16 @@ FlightTrace TrackOutput::confirmedTrace() const
   if (!m_summary.reference.has_ranges)
     return trace;
   trace.evidence = m_trace.evidence;
-  std::set<int> confirmed;
+  std::vector<TrunkTrace> &views = trace.views;
   for (const TrunkRecord &trunk : m_summary.trunks)
-    if (trunk.status == TrunkStatus::confirmed)
-      confirmed.insert(trunk.id);
-  std::copy_if(m_trace.views.begin(), m_trace.views.end(), std::back_inserter(trace.views),
-               [&confirmed](const TrunkTrace &view) { return confirmed.count(view.id) > 0; });
+    if (const auto seen = m_views.find(trunk.id); trunk.status == TrunkStatus::confirmed && seen != m_views.end())
+      views.insert(views.end(), seen->second.begin(), seen->second.end());
+  const auto place = [](const TrunkTrace &view) { return std::pair(view.frame, view.id); };
+  std::stable_sort(views.begin(), views.end(),
+                   [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) < place(b); });
+  views.erase(std::unique(views.begin(), views.end(),
+                          [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) == place(b); }),
+              views.end());
   return trace;
 }
 
@@ -347,21 +350,32 @@ void TrackOutput::keep(const Pipeline &pipeline)
   if (m_keeping.valid() && m_keeping.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return;
   waitForKeeping();
-  take(pipeline, false);
+  struct Known
+  {
+    MapPicture picture;
+    RunSummary summary;
+    FlightTrace trace;
+    Graph graph;
+  };
   m_summary.has_ended = false;
-  m_keeping = std::async(std::launch::async,
-                         [this, picture = m_picture, summary = m_summary, trace = confirmedTrace(),
-                          graph = pipeline.graph()]() -> std::string {
-                           try {
-                             writeTrace(m_folder.path(), trace);
-                             writeG2o(m_folder.file("graph.g2o"), graph);
-                             writeFiles(m_folder, picture, summary);
-                           }
-                           catch (const std::exception &error) {
-                             return error.what();
-                           }
-                           return {};
-                         });
+  auto known = std::make_unique<Known>();
+  known->picture = take(pipeline, false);
+  known->summary = m_summary;
+  known->trace = confirmedTrace();
+  known->graph = pipeline.graph();
+  m_keeping = std::async(std::launch::async, [this, known = std::move(known)]() mutable -> std::string {
+    try {
+      writeTrace(m_folder.path(), known->trace);
+      writeG2o(m_folder.file("graph.g2o"), known->graph);
+      writeFiles(m_folder, known->picture, known->summary);
+    }
+    catch (const std::exception &error) {
+      return error.what();
+    }
+    known.reset();
+    malloc_trim(0); // a long flight has megabytes of it, which the system would get back at its end
+    return {};
+  });
 }
 
 void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
@@ -371,31 +385,18 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
   m_is_cancelled = !is_complete;
   if (m_digest.valid())
     m_summary.digest = m_digest.get();
-  take(pipeline, is_complete);
+  const MapPicture picture = take(pipeline, is_complete);
   m_summary.has_ended = true;
   try {
-    writeFiles(m_folder, m_picture, m_summary);
+    writeFiles(m_folder, picture, m_summary);
   }
   catch (const vpException &error) {
     loseVideos(error.what());
-    writeFiles(m_folder, m_picture, m_summary);
+    writeFiles(m_folder, picture, m_summary);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
-  keepViewsOfTrunks();
   writeTrace(m_folder.path(), confirmedTrace());
   writeBestViews();
-}
-
-/// One view of a trunk a frame: as it was known in flight, or else as the final map has it.
-void TrackOutput::keepViewsOfTrunks()
-{
-  std::vector<TrunkTrace> &views = m_trace.views;
-  const auto place = [](const TrunkTrace &view) { return std::pair(view.frame, view.id); };
-  std::stable_sort(views.begin(), views.end(),
-                   [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) < place(b); });
-  views.erase(std::unique(views.begin(), views.end(),
-                          [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) == place(b); }),
-              views.end());
 }
 
 void TrackOutput::finish()

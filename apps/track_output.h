@@ -15,9 +15,10 @@
 
 #include <atomic>
 #include <future>
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
+#include <vector>
 
 namespace bole::apps
 {
@@ -59,25 +60,24 @@ public:
 private:
   void trace(const Frame &frame, const FrameReport &report);
   void traceTrunks(const Frame &frame, const FrameReport &report);
-  void keepViewsOfTrunks();
   bool hasImage(const Frame &frame) const;
   void writeBestViews() const;
   FlightTrace confirmedTrace() const;
   vpImage<vpRGBa> draw(const Frame &frame, const FrameReport &report);
   template <typename Action> void film(const Action &action);
   void loseVideos(const std::string &why);
-  void take(const Pipeline &pipeline, bool is_complete);
+  MapPicture take(const Pipeline &pipeline, bool is_complete);
   void waitForFilm();
   void waitForKeeping();
 
   OutputFolder m_folder;
   std::size_t m_frames_before = 0; ///< of the run that was in the folder
   RunSummary m_summary;
-  std::vector<SensorVerdict> m_sensors_before; ///< that were left out from the start
-  MapPicture m_picture;
-  FlightTrace m_trace; ///< of all hypotheses until the end
+  std::vector<SensorVerdict> m_sensors_before;    ///< that were left out from the start
+  MapPicture m_picture;                           ///< as far as frames tell
+  FlightTrace m_trace;                            ///< without views
+  std::map<int, std::vector<TrunkTrace>> m_views; ///< of each hypothesis that was not given up
   BestViews m_best_views;
-  std::set<int> m_given_up; ///< whose part of m_trace is still to go
   Pose m_bMc;
   bool m_has_pictures, m_is_overlay_due; ///< the overlay is drawn by the map at hand
   std::unique_ptr<VideoWriter> m_overlay, m_saliency;
