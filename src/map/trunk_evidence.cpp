@@ -49,10 +49,18 @@ double TrunkMap::evidence(const MapTrunk &trunk) const
          kLogPlaceSigma * std::log(trunk.placeSigma() + 1e-3);
 }
 
+double logOddsOfSurface(double continuity)
+{
+  constexpr double kContinues = 0.15, kByContinuity = 24; // correlation at which both are as likely; log-odds of a unit
+  return std::log((1 + std::exp(kByContinuity * (continuity - kContinues))) / 2);
+}
+
 double TrunkMap::logOdds(const MapTrunk &trunk) const
 {
   if (trunk.final_odds)
     return *trunk.final_odds;
-  return trunk.consistency_views == 0 ? evidence(trunk) : std::min(evidence(trunk), trunk.consistency_odds);
+  const double odds =
+      trunk.consistency_views == 0 ? evidence(trunk) : std::min(evidence(trunk), trunk.consistency_odds);
+  return trunk.continuity_views == 0 ? odds : odds - std::max(0.0, logOddsOfSurface(trunk.continuity));
 }
 } // namespace bole

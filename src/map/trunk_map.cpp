@@ -175,6 +175,10 @@ void TrunkMap::addView(MapTrunk &trunk, const TrunkView &view) const
   ++trunk.observations;
   trunk.innovation2 += (view.innovation2 - trunk.innovation2) / std::min(trunk.observations, kMemory);
   trunk.evenness += (view.evenness - trunk.evenness) / std::min(trunk.observations, kMemory);
+  if (view.continuity) {
+    ++trunk.continuity_views;
+    trunk.continuity += (*view.continuity - trunk.continuity) / std::min(trunk.continuity_views, kMemory);
+  }
   ++trunk.hits;
   trunk.misses_in_a_row = 0;
   const double weaker = std::min(std::abs(view.left_contrast), std::abs(view.right_contrast));

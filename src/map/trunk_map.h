@@ -113,6 +113,8 @@ struct MapTrunk
   int redetections = 0;                          ///< times the detector came to the same hypothesis later
   double contrast = 0;                           ///< running mean of the weaker border's
   double evenness = 0;                           ///< running mean of TrunkView::evenness
+  double continuity = 0;                         ///< running mean of TrunkView::continuity
+  int continuity_views = 0;                      ///< that told it
   double first_seen_s = 0, last_seen_s = 0;
   std::optional<double> left_contrast, right_contrast; ///< signed, running mean
   BearingSpread left, right;                           ///< of its borders over its views
@@ -140,6 +142,11 @@ struct MapTrunk
   bool isGap() const { return 2 * points.behind > hits + misses; }
 };
 
+/// Log-odds of a strip of a surface against a trunk, by how far what it shows goes on across its borders
+/// (continuityOf()). Every other surface shows rows that go on; of trunks 95 in 100 stay below .15, on path-traced,
+/// simulated and real flights alike.
+double logOddsOfSurface(double continuity);
+
 /// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.
 void updateMeanContrast(std::optional<double> &mean, double now);
 
@@ -151,6 +158,7 @@ struct TrunkView
   double half_angle = 0;                        ///< of its silhouette [rad]
   double left_contrast = 0, right_contrast = 0; ///< 0: not used
   double evenness = 0;                          ///< of the borders along their length, 0 to 1
+  std::optional<double> continuity;             ///< correlation of what it shows with what is beside it
   double innovation2 = 0; ///< mean square of prediction against what was found, over both borders [px^2], divided by
                           ///< what a wide trunk with rough borders is allowed
   Eigen::Vector3d camera = Eigen::Vector3d::Zero(); ///< place of the camera [m]

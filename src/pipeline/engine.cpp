@@ -106,7 +106,8 @@ FrameReport Engine::process(const Frame &frame)
       maskTextureEdges(predicted);
     if (m_units.flow.track_texture && view.has_ranges && newest() > 0)
       m_texture.predict(frame.image, newest(), cameraAt(newest() - 1), view, m_map, predicted);
-    const std::vector<TrackedTrunk> tracked = trackTrunks(*gradient, predicted, m_map, view, m_units); // Eq. 3-4
+    const std::vector<TrackedTrunk> tracked =
+        trackTrunks(frame.image, *gradient, predicted, m_map, view, m_units); // Eq. 3-4
     if (m_units.flow.track_texture)
       m_texture.correct(tracked, view.camera);
     add(tracked, view); // Eq. 9

@@ -41,7 +41,9 @@ public:
   const std::vector<ScoredHypothesis> &scored() const { return m_scored; }
 
 private:
-  std::optional<ScoredHypothesis> score(const Hypothesis &hypothesis, const std::vector<ColumnView> &views) const;
+  std::optional<double> continuity(const ScoredHypothesis &one) const;
+  std::optional<ScoredHypothesis> score(const Hypothesis &hypothesis, double first_s, double last_s,
+                                        const std::vector<ColumnView> &views) const;
   std::vector<ScoredHypothesis> scoreAll(const std::vector<ColumnView> &views,
                                          const std::vector<ScoredHypothesis> &before = {}) const;
   template <typename Frames> std::vector<ColumnView> columnViews(const Frames &frames) const;

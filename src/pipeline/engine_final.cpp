@@ -2,6 +2,9 @@
 // The final pass over the keyframes of a flight: which hypotheses are trunks.
 #include "pipeline/engine.h"
 
+#include "detection/border_continuity.h"
+#include "geometry/silhouette.h"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -35,12 +38,47 @@ Viewpoint Engine::viewpointOf(std::size_t pose, double time_s) const
   return {m_camera, cameraAt(pose), m_motion->hasRanges(), m_ground[pose], time_s};
 }
 
-/// Scores \p hypothesis against chance, and, where it is worth the work, against a strip of a surface.
-std::optional<ScoredHypothesis> Engine::score(const Hypothesis &hypothesis, const std::vector<ColumnView> &views) const
+/// How far what the keyframes show goes on across both borders of a hypothesis while it was seen: the mean correlation
+/// over its nearest views, nothing where too few show it.
+std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
+{
+  constexpr std::size_t kNearest = 16, kLeast = 4;     // views; borders in them
+  std::vector<std::pair<double, std::size_t>> nearest; // range, number of the keyframe
+  for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i)
+    if (const Keyframe &frame = m_keyframes.frames()[i];
+        frame.time_s >= one.first_seen_s && frame.time_s <= one.last_seen_s)
+      nearest.emplace_back(horizontalView(cameraAt(frame.pose), one.trunk).range, i);
+  std::sort(nearest.begin(), nearest.end());
+  nearest.resize(std::min(nearest.size(), kNearest));
+  double sum = 0;
+  std::size_t count = 0;
+  for (const auto &[range, i] : nearest) {
+    const Keyframe &frame = m_keyframes.frames()[i];
+    const Viewpoint at = viewpointOf(frame.pose, frame.time_s);
+    const RelativeTrunk relative = relativeTrunk(at.wMc, Pose(), one.trunk);
+    if (!relative.isFinite())
+      continue;
+    if (const auto across =
+            continuityOf(frame.image, m_camera, relative, textureRange(relative, one.trunk, at, m_units))) {
+      sum += *across;
+      ++count;
+    }
+  }
+  return count >= kLeast ? std::optional(sum / static_cast<double>(count)) : std::nullopt;
+}
+
+/// Scores \p hypothesis, which was seen from \p first_s to \p last_s, against chance, and, where it is worth the work,
+/// against a strip of a surface.
+std::optional<ScoredHypothesis> Engine::score(const Hypothesis &hypothesis, double first_s, double last_s,
+                                              const std::vector<ColumnView> &views) const
 {
   auto scored = scoreHypothesis(hypothesis, views, farthestScored());
-  if (scored && scored->log_odds > kLikely)
-    weighAgainstSurface(*scored, views, farthestScored());
+  if (!scored)
+    return scored;
+  scored->first_seen_s = first_s;
+  scored->last_seen_s = last_s;
+  if (scored->log_odds > kLikely)
+    weighAgainstSurface(*scored, views, farthestScored(), continuity(*scored));
   return scored;
 }
 
@@ -55,11 +93,9 @@ std::vector<ScoredHypothesis> Engine::scoreAll(const std::vector<ColumnView> &vi
     const Hypothesis hypothesis{trunk.id, trunk.trunk, m_map.evidence(trunk), trunk.pointsBeside()};
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const ScoredHypothesis &one) { return isOf(one, hypothesis); });
-    if (auto one = known != before.end() ? *known : score(hypothesis, views)) {
-      one->first_seen_s = trunk.first_seen_s;
-      one->last_seen_s = trunk.last_seen_s;
+    if (const auto one =
+            known != before.end() ? *known : score(hypothesis, trunk.first_seen_s, trunk.last_seen_s, views))
       all.push_back(*one);
-    }
   }
   return all;
 }
@@ -122,16 +158,14 @@ std::vector<Engine::RetrackedHypothesis> Engine::retrackLikely(const std::vector
     std::vector<RetrackedHypothesis> results;
     std::vector<CandidateTrack> followed = trackThroughKeyframes(hypotheses, map, gradients);
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-      const auto refit =
-          score({hypotheses[i].id, followed[i].trunk.trunk, hypotheses[i].online, hypotheses[i].points_beside}, views);
       RetrackedHypothesis result;
       result.is_seen = !followed[i].views.empty();
-      if (refit && followed[i].views.size() >= kLeastViews) {
-        result.scored = *refit;
-        result.scored->first_seen_s = followed[i].trunk.views.front().time_s;
-        result.scored->last_seen_s = followed[i].trunk.views.back().time_s;
+      const NewTrunk &trunk = followed[i].trunk;
+      if (followed[i].views.size() >= kLeastViews)
+        result.scored = score({hypotheses[i].id, trunk.trunk, hypotheses[i].online, hypotheses[i].points_beside},
+                              trunk.views.front().time_s, trunk.views.back().time_s, views);
+      if (result.scored)
         result.views = std::move(followed[i]);
-      }
       results.push_back(std::move(result));
     }
     return results;

@@ -75,13 +75,15 @@ ScoredHypothesis scoreFrom(const PhotoConsistency &evidence, const Hypothesis &h
 
 /// The weights were chosen on ten path-traced woods, 16 simulated ones (seeds 900001 to 900016), a path-traced street
 /// and a real one: of 236 right trunks 2 are lost, of 25 strips of walls and shops 7 stay.
-void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest)
+void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest,
+                         const std::optional<double> &continuity)
 {
   constexpr double kBias = 0.5; // log-odds where nothing beside it tells
   constexpr double kBeside = 6; // of a unit of freeBeside()
   constexpr double kMost = 1;   // units: one border alone does not decide
-  const double against =
-      kBias + scored.points_beside + kBeside * std::clamp(freeBeside(scored.trunk, views, farthest), -kMost, kMost);
+  const double against = kBias + scored.points_beside +
+                         kBeside * std::clamp(freeBeside(scored.trunk, views, farthest), -kMost, kMost) -
+                         (continuity ? logOddsOfSurface(*continuity) : 0);
   scored.log_odds = -std::log(std::exp(-scored.log_odds) + std::exp(-against));
 }
 

@@ -78,8 +78,9 @@ std::optional<ScoredHypothesis> scoreHypothesis(const Hypothesis &hypothesis, co
                                                 double farthest);
 
 /// The log-odds of a trunk before a background, of which scoreHypothesis() told those against chance, now against a
-/// strip of a surface too: a window, the corner of a wall.
-void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest);
+/// strip of a surface too: a window, the corner of a wall. \p continuity: mean of continuityAcross() its borders.
+void weighAgainstSurface(ScoredHypothesis &scored, const std::vector<ColumnView> &views, double farthest,
+                         const std::optional<double> &continuity);
 
 /// The same as scoreHypothesis() from a photo-consistency that is known already.
 ScoredHypothesis scoreFrom(const PhotoConsistency &evidence, const Hypothesis &hypothesis);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "pipeline/trunk_measurement.h"
 
+#include "detection/border_continuity.h"
 #include "geometry/silhouette.h"
 
 #include <Eigen/LU>
@@ -80,8 +81,9 @@ bool isFlippedNear(const PredictedTrunk &predicted, const TrackingResult &result
 }
 } // namespace
 
-std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vector<PredictedTrunk> &predicted,
-                                      const TrunkMap &map, const Viewpoint &view, const StageOptions &options)
+std::vector<TrackedTrunk> trackTrunks(const vpImage<unsigned char> &image, const Gradient &gradient,
+                                      const std::vector<PredictedTrunk> &predicted, const TrunkMap &map,
+                                      const Viewpoint &view, const StageOptions &options)
 {
   const FlowOptions &flow = options.flow;
   std::vector<TrackedTrunk> seen;
@@ -96,6 +98,9 @@ std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vecto
     const int flipped_in_a_row = map.trunk(prediction.id).flipped_in_a_row + 1;
     if (tracked.is_flipped && flow.turned_frames > 0 && flipped_in_a_row >= flow.turned_frames)
       result.status = TrackingStatus::tracked;
+    if (result.status == TrackingStatus::tracked)
+      tracked.continuity = continuityOf(image, view.camera, result.optimum,
+                                        textureRange(result.optimum, map.trunk(prediction.id).trunk, view, options));
     seen.push_back(tracked);
   }
   return seen;
@@ -113,6 +118,7 @@ TrunkMeasurement measurementOf(const TrackedTrunk &tracked, const TrunkMap &map,
     measurement.kind = TrunkMeasurement::Kind::seen;
     measurement.view =
         viewOf(tracked.result, predicted.tracking.relative, map.trunk(predicted.id).trunk, view, options);
+    measurement.view.continuity = tracked.continuity;
   }
   else if (status == TrackingStatus::occluded || status == TrackingStatus::not_visible)
     measurement.kind = TrunkMeasurement::Kind::hidden;

@@ -12,8 +12,9 @@ namespace bole
 struct TrackedTrunk
 {
   PredictedTrunk predicted;
-  TrackingResult result;   ///< `tracked` only inside the gate
-  bool is_flipped = false; ///< borders of the other sign stand where it was expected
+  TrackingResult result;            ///< `tracked` only inside the gate
+  bool is_flipped = false;          ///< borders of the other sign stand where it was expected
+  std::optional<double> continuity; ///< continuityOf() it
 };
 
 /// Whether the measurement is inside the gate: chi-square bound on the squared Mahalanobis distance of bearing and
@@ -37,9 +38,10 @@ SummaryFactor summaryOf(const TrackingResult &result, double weight);
 TrunkView viewOf(const TrackingResult &result, const RelativeTrunk &expected, const Trunk &trunk, const Viewpoint &view,
                  const FlowOptions &options);
 
-/// Looks for each predicted trunk.
-std::vector<TrackedTrunk> trackTrunks(const Gradient &gradient, const std::vector<PredictedTrunk> &predicted,
-                                      const TrunkMap &map, const Viewpoint &view, const StageOptions &options);
+/// Looks for each predicted trunk in the \p gradient of \p image.
+std::vector<TrackedTrunk> trackTrunks(const vpImage<unsigned char> &image, const Gradient &gradient,
+                                      const std::vector<PredictedTrunk> &predicted, const TrunkMap &map,
+                                      const Viewpoint &view, const StageOptions &options);
 
 /// The measurement that the map records of a tracked trunk.
 TrunkMeasurement measurementOf(const TrackedTrunk &tracked, const TrunkMap &map, const Viewpoint &view,

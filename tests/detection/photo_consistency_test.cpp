@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the columns of a flight say of a trunk, on drawn ones before a striped wall.
+#include "detection/border_continuity.h"
 #include "detection/photo_consistency.h"
 #include "drawn_trunks.h"
 
 #include <gmock/gmock.h>
+#include <random>
 
 namespace
 {
@@ -183,5 +185,40 @@ TEST(PhotoConsistency, WithoutParallaxThereIsNone)
   EXPECT_FALSE(photoConsistency(trunkOf(trunk), still.views(), kFarthest).has_value());
   const LevelFlight flight({trunk}, sweep());
   EXPECT_FALSE(photoConsistency(trunkOf({-4, 0, 0.15, 40}), flight.views(), kFarthest).has_value()); // behind
+}
+
+/// Brightness that changes from row to row at random: alike over the whole width, or another left of column 60.
+vpImage<unsigned char> rows(bool is_one_surface)
+{
+  std::mt19937 random(7);
+  std::uniform_int_distribution<int> brightness(40, 200);
+  vpImage<unsigned char> image(100, 120);
+  for (unsigned v = 0; v < image.getHeight(); ++v) {
+    const int left = brightness(random), right = brightness(random);
+    for (unsigned u = 0; u < image.getWidth(); ++u)
+      image[v][u] = static_cast<unsigned char>(u < 60 && !is_one_surface ? left : right);
+  }
+  return image;
+}
+
+TEST(BorderContinuity, RowsOfAWallGoOnAcrossABorderAndThoseOfATrunkDoNot)
+{
+  const BorderLine line{60, 0, 10, 90};
+  for (const Border border : kBorders) {
+    const auto wall = continuityAcross(rows(true), line, border, 6),
+               trunk = continuityAcross(rows(false), line, border, 6);
+    ASSERT_TRUE(wall && trunk);
+    EXPECT_GT(*wall, 0.99);
+    EXPECT_LT(std::abs(*trunk), 0.3); // three sigma of 76 rows that are smoothed by three
+  }
+}
+
+TEST(BorderContinuity, NothingIsSaidOfAShortBorderOneBesideTheImageOrOneWithoutTexture)
+{
+  const vpImage<unsigned char> wall = rows(true), grey(100, 120, 128);
+  EXPECT_FALSE(continuityAcross(wall, {60, 0, 10, 45}, Border::left, 6));
+  EXPECT_FALSE(continuityAcross(wall, {5, 0, 10, 90}, Border::left, 6));
+  EXPECT_FALSE(continuityAcross(wall, {60, 0.9, 10, 90}, Border::right, 6));
+  EXPECT_FALSE(continuityAcross(grey, {60, 0, 10, 90}, Border::left, 6));
 }
 } // namespace

@@ -72,17 +72,20 @@ TEST(FinalPass, AStripOfAFacadeIsNoTrunkHoweverClearItsBordersAre)
 {
   constexpr double kFarthest = 14;
   const test::DrawnTrunk one{4, 0.4, 0.15, 40};
-  const auto weighed = [&](const test::LevelFlight &flight, double points_beside) {
+  const auto weighed = [&](const test::LevelFlight &flight, double points_beside,
+                           std::optional<double> continuity = {}) {
     ScoredHypothesis scored = judgedAt(1, test::trunkOf(one), 4);
     scored.points_beside = points_beside;
-    weighAgainstSurface(scored, flight.views(), kFarthest);
+    weighAgainstSurface(scored, flight.views(), kFarthest, continuity);
     return scored.log_odds;
   };
   const test::LevelFlight free({one}, test::sweep()), facade(test::facadeAround(one), test::sweep());
   EXPECT_GT(weighed(free, 0), 2);
   EXPECT_LT(weighed(facade, 0), 0);
-  EXPECT_LT(weighed(free, -8), 0);  // points beside it lie at its range,
-  EXPECT_GT(weighed(facade, 6), 0); // or behind it
+  EXPECT_LT(weighed(free, -8), 0);     // points beside it lie at its range,
+  EXPECT_GT(weighed(facade, 6), 0);    // or behind it
+  EXPECT_LT(weighed(free, 0, 0.6), 0); // what it shows goes on beside it, or does not
+  EXPECT_GT(weighed(free, 0, 0.05), 2);
 }
 
 /// Only the lit part of a trunk is read.
