@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The live path against the emulator. Nothing here measures time; limits are for machines that hang.
 #include "flight.h"
-
-#include <gtest/gtest.h>
-#include <map>
-#include <visp3/core/vpException.h>
+#include "support/test.h"
 
 using namespace bole;
 using test::addressOf;

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "files.h"
+#include "support/test.h"
+
 #include "ardrone/video_decoder.h"
 #include "emulator/wire_format.h"
-
-#include "files.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <random>
 
 using namespace bole;
 

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight.h"
+#include "support/test.h"
 
 #include <bole/pose.h>
 #include <bole/vpRobotArDrone.h>
-
-#include <gtest/gtest.h>
-
 #include <cstring>
-#include <limits>
-#include <visp3/core/vpException.h>
 #include <visp3/robot/vpRobotException.h>
 
 using namespace bole;

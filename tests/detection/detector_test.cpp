@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The detector that asks a window of frames, on drawn borders.
 #include "drawn_trunks.h"
+#include "support/test.h"
 
 #include "detection/line_detector.h"
-
-#include <gmock/gmock.h>
-
-#include <visp3/core/vpException.h>
 
 namespace
 {

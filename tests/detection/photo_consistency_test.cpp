@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the columns of a flight say of a trunk, on drawn ones before a striped wall.
-#include "detection/photo_consistency.h"
 #include "drawn_trunks.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
+#include "detection/photo_consistency.h"
 
 namespace
 {

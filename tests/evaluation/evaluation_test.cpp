@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/files.h"
+#include "support/test.h"
 
 #include "evaluation/trajectory_metrics.h"
 #include "evaluation/trunk_metrics.h"
@@ -8,18 +8,7 @@
 #include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
-
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-
-#include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <algorithm>
-#include <filesystem>
-#include <numeric>
-#include <random>
-#include <sstream>
-#include <visp3/core/vpException.h>
 
 using namespace bole;
 

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/direction.h"
 #include "geometry/so3.h"
 #include <bole/pose.h>
-#include <bole/visp.h>
-
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
-#include <vector>
 #include <visp3/core/vpExponentialMap.h>
 #include <visp3/core/vpPoint.h>
 #include <visp3/core/vpRotationMatrix.h>

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight_folder.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "input/frame_builder.h"
 #include "input/recorded_source.h"
-
-#include <gmock/gmock.h>
 
 using namespace bole;
 using bole::test::FlightFolder;
@@ -205,7 +203,7 @@ TEST(AslSource, NamesFileAndLineOfAFaultyRow)
   for (const Case &c : cases) {
     FlightFolder flight(3);
     flight.write(c.file, c.text);
-    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(c.message)) << c.text;
+    EXPECT_REFUSED(c.message, AslSource source(flight.path())) << c.text;
   }
 }
 
@@ -236,7 +234,7 @@ TEST(AslSource, NamesTheUnitOfAnAccelerometerThatDoesNotFeelGravity)
   for (const auto &[force, message] : cases) {
     FlightFolder flight(3);
     flight.write("mav0/imu0/data.csv", imuWith(force));
-    EXPECT_THAT(messageOf([&] { AslSource source(flight.path()); }), HasSubstr(message)) << force;
+    EXPECT_REFUSED(message, AslSource source(flight.path())) << force;
   }
   FlightFolder without(3);
   without.write("mav0/imu0/data.csv", imuWith("0,0,0"));
@@ -301,11 +299,11 @@ TEST(AslSource, ReadsEveryKindOfImage)
 TEST(AslSource, RefusesFoldersThatAreNoFlight)
 {
   const FlightFolder flight(1);
-  EXPECT_THAT(messageOf([&] { AslSource source(flight.path() + "/none"); }), HasSubstr("no ASL folder"));
+  EXPECT_REFUSED("no ASL folder", AslSource source(flight.path() + "/none"));
   FlightFolder blind(2);
   blind.removeImage(0);
   blind.removeImage(1);
-  EXPECT_THAT(messageOf([&] { AslSource source(blind.path()); }), HasSubstr("none of the 2 images"));
+  EXPECT_REFUSED("none of the 2 images", AslSource source(blind.path()));
 }
 
 TEST(AslSource, ReadsTheRenderedFlight)

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "input/camera_plausibility.h"
 #include "input/frame_builder.h"
 #include "input/frame_check.h"
-
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <random>
 
 using namespace bole;
 using testing::HasSubstr;

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Streams by their address, from a camera behind HTTP on this machine.
-#include "support/files.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "input/live_video.h"
 #include "input/steady_clock.h"
 #include "output/video_writer.h"
-
 #include <arpa/inet.h>
 #include <atomic>
-#include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <netinet/in.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -22,8 +18,8 @@ extern "C" {
 #include <libavformat/avformat.h>
 }
 
-namespace bole
-{
+using namespace bole;
+
 namespace
 {
 using testing::HasSubstr;
@@ -274,4 +270,3 @@ TEST(LiveVideo, OnlyAddressesAndCamerasAreTakenForStreams)
     EXPECT_FALSE(LiveVideoSource::accepts(other)) << other;
 }
 } // namespace
-} // namespace bole

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight_folder.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "input/csv_reader.h"
 #include "input/recorded_source.h"
@@ -9,9 +9,6 @@
 #include "input/user_text.h"
 #include "input/yaml_file.h"
 #include <bole/open_source.h>
-
-#include <gmock/gmock.h>
-
 #include <sys/stat.h>
 
 namespace
@@ -60,7 +57,7 @@ TEST_F(RegularFile, NothingElseIsOpenedByAnyReader)
 TEST_F(RegularFile, IsReadUpToALimit)
 {
   EXPECT_EQ(readWholeFile(at("text"), 100).size(), 17u);
-  EXPECT_THAT(messageOf([&] { readWholeFile(at("text"), 16); }), HasSubstr("text: 17 bytes, must be at most 16"));
+  EXPECT_REFUSED("text: 17 bytes, must be at most 16", readWholeFile(at("text"), 16));
 }
 
 TEST_F(RegularFile, LinesLoseTheirEndsAndTheMarkOfTheFile)
@@ -211,7 +208,7 @@ TEST_F(Tables, AreReadWhereEveryFieldIsQuoted)
 {
   EXPECT_THAT(rowsOf("\"stamp\",\"name\"\n\"0\",\"a.png\"\n\"5\",\"b.png\"\r\n"),
               ElementsAre(ElementsAre("0", "a.png"), ElementsAre("5", "b.png")));
-  EXPECT_THAT(messageOf([&] { rowsOf("1,\"a\n2,b\n3,c\n"); }), HasSubstr("table.csv:1: a quote is never closed"));
+  EXPECT_REFUSED("table.csv:1: a quote is never closed", rowsOf("1,\"a\n2,b\n3,c\n"));
   EXPECT_EQ(refusal("\"t\",\"x\",\"y\",\"z\",\"w\",\"x\",\"y\",\"z\"\n"
                     "\"0\",\"0\",\"0\",\"1\",\"1\",\"0\",\"0\",\"0\"\n"),
             "");
@@ -231,15 +228,15 @@ TEST_F(Tables, HaveOneHeaderAtMostAndNoRowIsTakenForIt)
   EXPECT_THAT(refusal(std::string("t,x,y,z,qw,qx,qy,qz\nt,x,y,z,qw,qx,qy,qz\n") + row),
               HasSubstr("table.csv:2: timestamp = \"t\""));
   m_flight.write("mav0/cam0/data.csv", "x0,0000.png\n100000000,0001.png\n");
-  EXPECT_THAT(messageOf([&] { AslSource(m_flight.path()); }), HasSubstr("data.csv:1: timestamp = \"x0\""));
+  EXPECT_REFUSED("data.csv:1: timestamp = \"x0\"", AslSource(m_flight.path()));
 }
 
 TEST_F(Tables, TellWhatSeparatesTheirColumns)
 {
-  EXPECT_THAT(messageOf([&] { rowsOf("0\t1\n", {2}); }), HasSubstr("separated by tabs, must be by commas"));
-  EXPECT_THAT(messageOf([&] { rowsOf("0 1\n", {2}); }), HasSubstr("separated by blanks, must be by commas"));
-  EXPECT_THAT(messageOf([&] { rowsOf("0;1\n", {2}); }), HasSubstr("separated by semicolons, must be by commas"));
-  EXPECT_THAT(messageOf([&] { rowsOf("0,1,2\n", {2, ' ', {}}); }), HasSubstr("by commas, must be by blanks"));
+  EXPECT_REFUSED("separated by tabs, must be by commas", rowsOf("0\t1\n", {2}));
+  EXPECT_REFUSED("separated by blanks, must be by commas", rowsOf("0 1\n", {2}));
+  EXPECT_REFUSED("separated by semicolons, must be by commas", rowsOf("0;1\n", {2}));
+  EXPECT_REFUSED("by commas, must be by blanks", rowsOf("0,1,2\n", {2, ' ', {}}));
   EXPECT_THAT(refusal("0;0;0;1;0;0;0;1\n"), HasSubstr("separated by semicolons"));
   EXPECT_THAT(refusal("0,0;0,1;0,2;1,0;0,0;0,0;0,0;1,0\n"), HasSubstr("with a point"));
   EXPECT_THAT(refusal("0,5 0,1 0,2 1,0 0,0 0,0 0,0 1,0\n"), HasSubstr("with a point"));
@@ -259,6 +256,5 @@ TEST_F(Tables, TellWhichOtherFormOfATrajectoryTheyHave)
   EXPECT_THAT(refusal("0 0 0 1 0.1 0.2 0.3 0\n"), HasSubstr("must be t [s] x y z qx qy qz qw"));
   EXPECT_THAT(refusal(",time,x,y,z,qw,qx,qy,qz\n0,100000000,0,0,1,1,0,0,0\n"), HasSubstr("must be stamp [ns],x,y,z"));
   m_flight.write("mav0/cam0/data.csv", ",time,filename\n0,0,0000.png\n1,5,0000.png\n2,10,0000.png\n");
-  EXPECT_THAT(messageOf([&] { AslSource(m_flight.path()); }),
-              HasSubstr("data.csv:4: timestamp = 2 ns: looks like an index"));
+  EXPECT_REFUSED("data.csv:4: timestamp = 2 ns: looks like an index", AslSource(m_flight.path()));
 }

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The life of a trunk: what it must show before it is confirmed, and what loses it.
+#include "support/test.h"
+
 #include "map/trunk_map.h"
-
-#include <gmock/gmock.h>
-
-#include <Eigen/Geometry>
-#include <functional>
-#include <random>
 
 namespace
 {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A host program whose decimals have a comma reads and writes the same bytes.
+#include "support/german_locale.h"
+#include "support/test.h"
+
 #include "exchange/exchange.h"
 #include "input/recorded_source.h"
 #include "input/trajectory.h"
@@ -8,13 +11,9 @@
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
-#include "support/files.h"
-#include "support/german_locale.h"
 #include <bole/config.h>
 #include <bole/graph.h>
 #include <bole/pipeline.h>
-
-#include <gmock/gmock.h>
 
 namespace
 {

@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "input/recorded_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
 namespace
 {

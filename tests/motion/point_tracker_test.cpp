@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "motion/lucas_kanade.h"
 #include "motion/point_motion.h"
 #include "motion/window_loops.h"
-
-#include <gtest/gtest.h>
-
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
-#include <set>
 
 namespace
 {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
 #include "synthetic.h"
 
 #include "motion/epipolar.h"
 #include "motion/row_shear.h"
-
-#include <gtest/gtest.h>
-
-#include <Eigen/Dense>
 
 namespace
 {

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "motion/gyro.h"
 #include "motion/made_flight.h"
+#include "support/test.h"
+
+#include "motion/gyro.h"
 #include "motion/sensor_calibration.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <Eigen/Dense>
-#include <functional>
-#include <random>
-
-namespace bole
-{
 namespace
 {
 using Eigen::Matrix3d;
@@ -340,4 +336,3 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
   EXPECT_LT(error.dot(bias.covariance.inverse() * error), 16);
 }
 } // namespace
-} // namespace bole

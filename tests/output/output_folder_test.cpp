@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/files.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "input/atomic_file.h"
 #include <bole/output_folder.h>
-
-#include <gmock/gmock.h>
-
 #include <sys/stat.h>
 
 namespace

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What people look at: the overlay, the videos, the map.
-#include "support/files.h"
+#include "support/test.h"
 
 #include "input/recorded_source.h"
 #include "output/map_svg.h"
 #include "output/video_writer.h"
 #include <bole/open_source.h>
 #include <bole/overlay.h>
-
-#include <gmock/gmock.h>
-
-#include <filesystem>
 #include <regex>
-#include <visp3/core/vpException.h>
 
 namespace
 {

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/files.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "input/atomic_file.h"
 #include "input/trajectory.h"
 #include "output/flight_trace.h"
 #include "output/trunks_csv.h"
-
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <fmt/format.h>
-#include <sstream>
 
 using namespace bole;
 namespace fs = std::filesystem;
@@ -69,7 +62,7 @@ TEST_F(RunFiles, TheReasonOfAFrameComesBackWhateverItSays)
 
 TEST_F(RunFiles, NamesTheFileThatCannotBeWritten)
 {
-  EXPECT_THAT(test::messageOf([&] { writeAtomically(path("none/a.txt"), "x"); }), testing::HasSubstr("none/a.txt"));
+  EXPECT_REFUSED("none/a.txt", writeAtomically(path("none/a.txt"), "x"));
 }
 
 TEST_F(RunFiles, TrajectoriesComeBackWithExactStampsAlsoFromBeforeZero)
@@ -200,6 +193,6 @@ TEST_F(RunFiles, RefusesTrunksThatAreNone)
            {with(",1.500000,", ",nan,"), "trunks.csv:3: x = \"nan\""},
            {with(fmt::format(",{:.6e},", confirmedTrunk().covariance(0, 0)), ",-1,"), "trunks.csv:3: var_xx"}}) {
     writeAtomically(path("trunks.csv"), text);
-    EXPECT_THAT(test::messageOf([&] { readTrunks(path("trunks.csv")); }), testing::HasSubstr(message)) << text;
+    EXPECT_REFUSED(message, readTrunks(path("trunks.csv"))) << text;
   }
 }

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a run says of itself.
-#include "support/files.h"
+#include "support/test.h"
 
 #include "output/summary_json.h"
-
-#include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
-
 #include <atomic>
+#include <nlohmann/json.hpp>
 
 using namespace bole;
 using testing::HasSubstr;

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/drawn_trunks.h"
+#include "support/test.h"
+
 #include "pipeline/consistency_window.h"
 #include "pipeline/final_pass.h"
-
-#include <gmock/gmock.h>
-
-#include <cmath>
 
 namespace
 {

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What moves the pipeline when the pose filter, the points or both are missing.
 #include "motion/rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "pipeline/engine.h"
 
-#include <algorithm>
-#include <array>
-#include <gtest/gtest.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -186,4 +183,3 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
   EXPECT_GT(post->pointsBeside(), 1);
 }
 } // namespace
-} // namespace bole

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The pipeline as a user calls it.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "pipeline/engine.h"
 #include "pipeline/stage_options.h"
 #include "pipeline/units.h"
 #include <bole/pipeline.h>
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <cmath>
-#include <map>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -265,4 +260,3 @@ TEST(ViewCorrelation, OneViewSeenAgainAndAgainTeachesLittle)
   EXPECT_GT(shared, 0.95 * moved);
 }
 } // namespace
-} // namespace bole

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include <bole/vpFeatureTrunk.h>
-
-#include <Eigen/Geometry>
-
-#include <cmath>
-#include <gtest/gtest.h>
-#include <memory>
 #include <visp3/core/vpCylinder.h>
-#include <visp3/core/vpException.h>
 #include <visp3/visual_features/vpFeatureBuilder.h>
 #include <visp3/visual_features/vpFeaturePoint.h>
 #include <visp3/vs/vpServo.h>

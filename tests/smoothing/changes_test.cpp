@@ -2,13 +2,12 @@
 // Removing, merging, outliers and what leaves the window.
 #include "support/dense_reference.h"
 #include "support/flight.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
 #include <malloc.h>
-#include <visp3/core/vpException.h>
 
-namespace bole
-{
+using namespace bole;
+
 namespace
 {
 using namespace test;
@@ -362,4 +361,3 @@ TEST(Changes, AWindowThatForgetsKeepsAPoseAFrameAndNothingElse)
   EXPECT_LT(keptAFrame(0), kMost);
 }
 } // namespace
-} // namespace bole

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "gradient/gradient.h"
 #include "tracking/border_profile.h"
-
-#include <Eigen/Geometry>
-#include <gmock/gmock.h>
-
-#include <cmath>
 
 namespace
 {

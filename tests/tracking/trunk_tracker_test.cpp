@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "summary/square_root.h"
 #include "tracking/trunk_tracker.h"
 #include <bole/open_source.h>
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
 
 namespace
 {

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
-#include "support/files.h"
-#include "support/units.h"
+#include "support/test.h"
 
 #include "baseline/comparison.h"
 #include "baseline/comparison_report.h"
+#include "support/units.h"
 #include <bole/cylinder.h>
 #include <bole/vpMbTrunkTracker.h>
-
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-
 #include <opencv2/videoio.hpp>
 
 namespace

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The paper's method on drawn trees: what the paper says, and nothing else.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "paper/paper_mapper.h"
 #include "support/units.h"
 #include <bole/smoother.h>
-
-#include <Eigen/Cholesky>
-#include <gmock/gmock.h>
 
 namespace
 {

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "simulation/vpSimulatorArDrone.h"
 #include "tasks/trunk_task.h"
 #include "trials/flight_record.h"
 #include "trials/servo_trial.h"
-
-#include <gtest/gtest.h>
+#include <complex>
 #include <nlohmann/json.hpp>
 
-#include <cmath>
-#include <complex>
-#include <fmt/format.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using Complex = std::complex<double>;
@@ -229,4 +226,3 @@ TEST(LoopMargins, APredictorThatKnowsNoDelayLeavesLess)
     EXPECT_LT(marginsOf(axis, options).modulus, 0.45);
 }
 } // namespace
-} // namespace bole
