@@ -90,20 +90,15 @@ TEST(NavdataOdometry, ADroneAtRestFeelsItsWeightUpwards)
   EXPECT_LT((*samples[0].force - Eigen::Vector3d(0, 0, 9.81)).norm(), 1e-6);
 }
 
-TEST(NavdataOdometry, FlyingForwardAfterATurnToTheRightGoesToTheRight)
+TEST(NavdataOdometry, AheadAfterATurnToTheRightAndASlipToTheRightAreNegativeY)
 {
-  NavdataOdometry odometry;
-  for (int i = 0; i <= 200; ++i)
-    odometry.add(seconds(i * 0.005), packet({0, 0, kQuarter_mdeg}, {2000, 0, 0}));
-  EXPECT_LT((odometry.newest()->wMb.t - Eigen::Vector3d(0, -2, 1)).norm(), 1e-6);
-}
-
-TEST(NavdataOdometry, ASlipToTheRightIsNegativeY)
-{
-  NavdataOdometry odometry;
-  for (int i = 0; i <= 200; ++i)
-    odometry.add(seconds(i * 0.005), packet({0, 0, 0}, {0, 1000, 0}));
-  EXPECT_LT((odometry.newest()->wMb.t - Eigen::Vector3d(0, -1, 1)).norm(), 1e-6);
+  for (const auto &[yaw_mdeg, velocity_mm_s, y] :
+       {std::tuple{kQuarter_mdeg, Eigen::Vector3f(2000, 0, 0), -2.0}, {0.f, Eigen::Vector3f(0, 1000, 0), -1.0}}) {
+    NavdataOdometry odometry;
+    for (int i = 0; i <= 200; ++i)
+      odometry.add(seconds(i * 0.005), packet({0, 0, yaw_mdeg}, velocity_mm_s));
+    EXPECT_LT((odometry.newest()->wMb.t - Eigen::Vector3d(0, y, 1)).norm(), 1e-6);
+  }
 }
 
 TEST(NavdataOdometry, ACircleFlownInBurstsClosesInDroneTime)
