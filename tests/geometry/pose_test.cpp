@@ -51,8 +51,6 @@ TEST(Pose, ComposesAndMovesPointsAsVispDoes)
   EXPECT_NEAR(point.get_Z(), moved.z(), 1e-12);
 }
 
-TEST(Pose, ComesBackFromVisp) { EXPECT_LT(Pose::fromVisp(kA.toVisp()).minus(kA).norm(), 1e-9); }
-
 TEST(Pose, AQuaternionNeedNotBeNormalised)
 {
   // half the angle in w: 60 degrees about z
@@ -187,6 +185,7 @@ TEST(Direction, PlusUndoesMinus)
       }
     }
   }
+  EXPECT_NEAR(directionMinus({std::sin(0.3), 0, std::cos(0.3)}, {0, 0, 1}).norm(), 0.3, 1e-12) << "it is the angle";
 }
 
 TEST(Direction, IsTurnedToAnotherByTheLeastRotation)
@@ -203,9 +202,4 @@ TEST(Direction, IsTurnedToAnotherByTheLeastRotation)
   }
 }
 
-TEST(Direction, MinusIsTheAngle)
-{
-  const Eigen::Vector3d d(0, 0, 1), e(std::sin(0.3), 0, std::cos(0.3));
-  EXPECT_NEAR(directionMinus(e, d).norm(), 0.3, 1e-12);
-}
 } // namespace

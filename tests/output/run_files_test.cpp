@@ -41,6 +41,7 @@ TEST_F(RunFiles, AnAtomicFileTakesThePlaceOfTheOldOneOnlyWhenItIsCommitted)
     EXPECT_EQ(content("a.txt"), is_committed ? "new" : "old");
     EXPECT_EQ(files(), 1u);
   }
+  EXPECT_REFUSED("none/a.txt", writeAtomically(path("none/a.txt"), "x"));
 }
 
 TEST_F(RunFiles, TheReasonOfAFrameComesBackWhateverItSays)
@@ -58,11 +59,6 @@ TEST_F(RunFiles, TheReasonOfAFrameComesBackWhateverItSays)
   ASSERT_EQ(read.size(), reasons.size());
   for (std::size_t i = 0; i < reasons.size(); ++i)
     EXPECT_EQ(read[i].reason, reasons[i]);
-}
-
-TEST_F(RunFiles, NamesTheFileThatCannotBeWritten)
-{
-  EXPECT_REFUSED("none/a.txt", writeAtomically(path("none/a.txt"), "x"));
 }
 
 TEST_F(RunFiles, TrajectoriesComeBackWithExactStampsAlsoFromBeforeZero)
@@ -138,6 +134,10 @@ TEST_F(RunFiles, TrunksCsvHoldsTrunksAndHypothesesCsvTheRestWithTheReason)
   ASSERT_EQ(rest.size(), 1u);
   EXPECT_EQ(rest[0].id, 8);
   EXPECT_EQ(rest[0].reject_reason, RejectReason::outdone);
+  TrunkRecord thread; // a candidate may shrink to anything before it is rejected
+  thread.radius = 3e-8;
+  writeHypotheses(path("thin.csv"), {thread});
+  EXPECT_DOUBLE_EQ(readTrunks(path("thin.csv")).at(0).radius, 3e-8);
 }
 
 TEST_F(RunFiles, EveryColumnHasAUnitInALineThatBeginsAsAComment)
@@ -167,14 +167,6 @@ TEST_F(RunFiles, ARotatedCamerasTrunksHaveABearingAndAWidth)
   writeBearings(path("bearings.csv"), {trunk, TrunkRecord()}, {1, 1});
   EXPECT_THAT(content("bearings.csv"), testing::HasSubstr("\n3,confirmed,90.0000,11.4783,8.5944,0.0000,17\n"));
   EXPECT_THAT(content("bearings.csv"), testing::Not(testing::HasSubstr("candidate")));
-}
-
-TEST_F(RunFiles, TheThinnestHypothesisStillComesBack)
-{
-  TrunkRecord thread; // a candidate may shrink to anything before it is rejected
-  thread.radius = 3e-8;
-  writeHypotheses(path("thin.csv"), {thread});
-  EXPECT_DOUBLE_EQ(readTrunks(path("thin.csv")).at(0).radius, 3e-8);
 }
 
 TEST_F(RunFiles, RefusesTrunksThatAreNone)

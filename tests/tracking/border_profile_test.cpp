@@ -46,18 +46,6 @@ TEST(BorderProfile, MeanAcrossIsTheMeanAlongTheMovedLine)
   }
 }
 
-TEST(BorderProfile, ARampHasItsSlopeAsContrast)
-{
-  std::vector<float> ramp, contrast;
-  for (int k = 0; k < 15; ++k)
-    ramp.push_back(3.f * float(k));
-  differentiate(ramp, contrast);
-  ASSERT_THAT(contrast, SizeIs(15));
-  for (std::size_t k = 3; k < 12; ++k)
-    EXPECT_NEAR(contrast[k], 3, 1e-5);
-  EXPECT_EQ(contrast[2], 0);
-}
-
 TEST(BorderProfile, GreyLevelsAndTheGradientImageGiveTheSamePeak)
 {
   const vpImage<unsigned char> image = steps({30, 44}, 0.1);
