@@ -105,16 +105,11 @@ TEST(FlightRecord, NamesATrunkNearAheadThatTheMapDoesNotHold)
   EXPECT_FALSE(findParting(flight.record, flight.trunks));
 }
 
-TEST(FlightRecord, TellsWhichSensorsContradictedTheOthers)
+TEST(FlightRecord, HoldsTheMapAtThePartingAndAtTheEndAndTheSensorsThatContradictedOthers)
 {
   Resting flight;
   flight.record.verdicts.push_back({"gyro", "rotation", 1.5, "gyro: contradicts the points since 1.5 s"});
   EXPECT_EQ(flight.failure()["sensors"], nlohmann::json({"gyro: contradicts the points since 1.5 s"}));
-}
-
-TEST(FlightRecord, HoldsTheMapAtThePartingAndAtTheEnd)
-{
-  Resting flight;
   EXPECT_EQ(flight.failure()["maps"].size(), 1u);
   flight.trunks.push_back(standing(1.5, 0.4));
   const nlohmann::json maps = flight.failure()["maps"];
