@@ -160,9 +160,8 @@ TEST(So3, OrthonormalizedIsARotationBesideItsArgument)
 std::vector<Eigen::Vector3d> directions()
 {
   std::vector<Eigen::Vector3d> all{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}, {1, 1, 1}, {-3, 0.2, 1}};
-  for (auto &d : all) {
+  for (auto &d : all)
     d.normalize();
-  }
   return all;
 }
 

@@ -21,9 +21,8 @@ Pose poseAt(int k) { return {expSo3({0, 0.004 * k, 0}), {0.08 * k, 0.01 * k, 0.0
 TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
 {
   PointTracker tracker(kCamera);
-  for (int k = 0; k < 4; ++k) {
+  for (int k = 0; k < 4; ++k)
     tracker.track(drawWalls(kCamera, poseAt(k)));
-  }
   const auto matches = tracker.matches(3);
   ASSERT_GT(matches.size(), 60u);
   // Every wall is at a known depth: one of them explains the match to a fraction of a pixel.
@@ -70,16 +69,14 @@ TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
       EXPECT_EQ(dead.count(track.id), 0u);
     }
     for (std::uint64_t id : alive) {
-      if (now.count(id) == 0) {
+      if (now.count(id) == 0)
         dead.insert(id);
-      }
     }
     alive = now;
   }
   std::set<int> cells;
-  for (const PointTrack &track : tracker.tracks()) {
+  for (const PointTrack &track : tracker.tracks())
     cells.insert(int(track.current().x() / 80) + 10 * int(track.current().y() / 80));
-  }
   EXPECT_EQ(cells.size(), 12u); // every cell of 4 x 3
 }
 
@@ -198,9 +195,8 @@ TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
   bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   PointMotion motion(kCamera, bMc);
   const vpImage<unsigned char> white(240, 320, 250);
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3; ++k)
     motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
-  }
   const auto blind = motion.process(frameAt(3, white, bMc));
   ASSERT_FALSE(blind.empty());
   EXPECT_EQ(blind[0].estimate.status, RelativePoseStatus::too_few_points);

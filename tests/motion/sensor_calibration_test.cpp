@@ -266,9 +266,8 @@ std::vector<GyroSample> samplesOf(const Eigen::Vector3d &rate, double noise, std
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, noise);
   std::vector<GyroSample> samples;
-  for (std::int64_t stamp = 0; stamp <= end_ns; stamp += 5000000) {
+  for (std::int64_t stamp = 0; stamp <= end_ns; stamp += 5000000)
     samples.push_back({stamp, rate + Eigen::Vector3d(normal(random), normal(random), normal(random))});
-  }
   return samples;
 }
 

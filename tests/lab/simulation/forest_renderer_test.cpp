@@ -206,9 +206,8 @@ TEST(H264Link, RefusesOddSizes) { EXPECT_THROW(H264Link(321, 240, 15, 1000), vpE
 std::vector<Eigen::Vector3d> straightPath(double length)
 {
   std::vector<Eigen::Vector3d> path;
-  for (double x = 0; x <= length; x += 0.1) {
+  for (double x = 0; x <= length; x += 0.1)
     path.push_back({x, 0, 1.2});
-  }
   return path;
 }
 
@@ -270,8 +269,7 @@ TEST(Terrain, IsFlatAtTheOriginAndSmooth)
 {
   const Terrain terrain(5, 0.1);
   EXPECT_NEAR(terrain.height(0, 0), 0, 1e-12);
-  for (double x = -20; x < 20; x += 0.37) {
+  for (double x = -20; x < 20; x += 0.37)
     EXPECT_LT(std::abs(terrain.height(x + 0.01, 2) - terrain.height(x, 2)), 0.01);
-  }
 }
 } // namespace

@@ -16,9 +16,8 @@ std::map<std::string, std::string> tree(const fs::path &folder)
 {
   std::map<std::string, std::string> files;
   for (const auto &entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
+    if (entry.is_regular_file())
       files[fs::relative(entry.path(), folder).string()] = test::textOf(entry.path());
-    }
   }
   return files;
 }
@@ -36,9 +35,8 @@ TEST_F(SimulatedFlight, SameSceneSameBytes)
   scene.setSeed(11);
   scene.h264_kbps = 800;
   scene.forest.light = Light::sun;
-  for (const char *name : {"a", "b"}) {
+  for (const char *name : {"a", "b"})
     recordFlight(scene, {(m_folder / name).string(), 3, true, false});
-  }
   EXPECT_TRUE(tree(m_folder / "a") == tree(m_folder / "b"));
   EXPECT_EQ(tree(m_folder / "a").count("depth/0000200000000.png"), 1u);
   scene.setSeed(12);
