@@ -166,7 +166,7 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
 {
   if (!support::hasFlight("park-forward"))
     GTEST_SKIP() << "the rendered flights are not here: " << BOLE_SHARED_DATA_DIR;
-  const support::ForestFlight flight = support::readForestFlight("park-forward", 0, 110);
+  const support::ForestFlight flight = support::readForestFlight("park-forward", 111);
   SaliencyOptions options;
   options.near_range = 6;
   SaliencyEstimator estimator(flight.camera, options);
