@@ -41,6 +41,9 @@ TEST(Pipeline, MapsFromFramesFilledByHandWithImageStampAndOdometry)
   EXPECT_GE(found, 3);
   EXPECT_FALSE(report.trunks.empty());
   EXPECT_FALSE(report.map.empty());
+  for (const TrunkRecord &trunk : pipeline.map()) // and of what is no trunk it tells why
+    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.reject_reason == RejectReason::none)
+        << toString(trunk.reject_reason);
 }
 
 TEST(Pipeline, AFrameOfBeforeIsReviewedWithTheMapAndThePathThatTheFlightEndedWith)
@@ -132,24 +135,12 @@ void findThinLeaningTrunk(const Options &options, int frames)
   EXPECT_EQ(found, 1);
 }
 
-TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown) { findThinLeaningTrunk(Options(), 30); }
-
-TEST(Pipeline, FindsAThinLeaningTrunkInServoing)
+TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnownAndInServoing)
 {
+  findThinLeaningTrunk(Options(), 30);
   Options options;
   options.stages.servoing = true;
   findThinLeaningTrunk(options, 60);
-}
-
-TEST(Pipeline, OfWhatIsNoTrunkItTellsWhy)
-{
-  Pipeline pipeline(kCamera, kMount);
-  for (int k = 0; k < 30; ++k)
-    pipeline.process(byHand(k));
-  pipeline.finish();
-  for (const TrunkRecord &trunk : pipeline.map())
-    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.reject_reason == RejectReason::none)
-        << toString(trunk.reject_reason);
 }
 
 TEST(Pipeline, AFrameThatIsNotOkKeepsItsReasonAndItsPose)
