@@ -78,22 +78,25 @@ TEST_F(Sources, ASequenceWithoutARateHasThatOfItsCameraFile)
   EXPECT_EQ(secondStamp(), 50000000);
 }
 
-TEST_F(Sources, ASequenceKeepsThePlaceOfImagesThatAreMissing)
+TEST_F(Sources, ASequenceKeepsThePlaceOfImagesThatAreMissingOrTruncated)
 {
-  writeImages("image%04d.png", {3, 4, 6, 7});
+  writeImages("image%04d.jpg", {3, 4, 6, 7, 8});
   m_flight.write("image0005.txt", "no image");
+  std::filesystem::resize_file(path("image0007.jpg"), std::filesystem::file_size(path("image0007.jpg")) / 2);
   SourceOptions options;
   options.frame_rate_hz = 20;
-  SequenceSource source(path("image%04d.png"), options);
+  SequenceSource source(path("image%04d.jpg"), options);
   const auto frames = readAll(source);
 
-  ASSERT_EQ(frames.size(), 5u);
-  EXPECT_EQ(source.size(), 5u);
-  EXPECT_EQ(frames[2].status, FrameStatus::missing);
-  EXPECT_EQ(frames[2].stamp_ns, 100000000);
-  EXPECT_EQ(frames[3].status, FrameStatus::ok);
-  EXPECT_EQ(frames[3].stamp_ns, 150000000);
-  EXPECT_EQ(frames[3].index, 3u);
+  ASSERT_EQ(frames.size(), 6u);
+  EXPECT_EQ(source.size(), 6u);
+  const FrameStatus expected[] = {FrameStatus::ok, FrameStatus::ok,      FrameStatus::missing,
+                                  FrameStatus::ok, FrameStatus::corrupt, FrameStatus::ok};
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(frames[i].status, expected[i]) << i;
+    EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 50000000);
+    EXPECT_EQ(frames[i].index, i);
+  }
 }
 
 TEST_F(Sources, AFolderOfNumberedImagesIsASequence)
@@ -117,17 +120,6 @@ TEST_F(Sources, AHoleOfManyNumbersIsRefused)
   writeImages("hole%d.png", {1, 500000});
   EXPECT_REFUSED("no image from number 2 to 499999, must be at most 10000 in a row",
                  SequenceSource(path("hole%d.png")));
-}
-
-TEST_F(Sources, ATruncatedJpegIsCorrupt)
-{
-  writeImages("a%02d.jpg", {0, 1, 2});
-  std::filesystem::resize_file(path("a01.jpg"), std::filesystem::file_size(path("a01.jpg")) / 2);
-  SequenceSource source(path("a%02d.jpg"));
-  const auto frames = readAll(source);
-  EXPECT_EQ(frames[0].status, FrameStatus::ok);
-  EXPECT_EQ(frames[1].status, FrameStatus::corrupt);
-  EXPECT_EQ(frames[2].status, FrameStatus::ok);
 }
 
 TEST_F(Sources, AVideoGivesEveryFrameWithItsTime)
@@ -208,25 +200,6 @@ TEST_F(Sources, ARateThatNoCameraHasIsNotBelieved)
     EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 40000000) << "25 frames a second";
 }
 
-TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
-{
-  writeVideo("v.avi", 10, 10);
-  const std::string good = textOf(path("v.avi"));
-  for (unsigned seed = 0; seed < 20; ++seed) {
-    std::mt19937 random(seed);
-    std::string bytes = good;
-    for (int i = 0; i < 30; ++i)
-      bytes[6000 + random() % (good.size() - 6000)] = static_cast<char>(random());
-    m_flight.write("w.avi", bytes);
-    VideoSource source(path("w.avi"));
-    std::int64_t last_ns = -1;
-    for (const Frame &frame : readAll(source)) {
-      EXPECT_GT(frame.stamp_ns, last_ns);
-      last_ns = frame.stamp_ns;
-    }
-  }
-}
-
 TEST_F(Sources, AVideoWhoseTimesGoBackGoesOnAtItsRate)
 {
   {
@@ -265,7 +238,6 @@ TEST_F(Sources, SaysWhatIsWrongInOneLine)
 {
   writeImages("i%02d.png", {0, 1});
   m_flight.write("o.tum", "5 0 0 0 0 0 0 1\n4 0 0 0 0 0 0 1\n");
-  m_flight.write("late.tum", "500 0 0 0 0 0 0 1\n501 0 0 0 0 0 0 1\n");
   m_flight.write("nan.tum", "0 0 0 nan 0 0 0 1\n");
   m_flight.write("video.mp4", "this is no video");
   m_flight.write("camera.yaml", "resolution: [640, 480]\nintrinsics: [500, 500, 320, 240]\n");
@@ -283,7 +255,6 @@ TEST_F(Sources, SaysWhatIsWrongInOneLine)
   EXPECT_THAT(open("i%02d%d.png", "", ""), HasSubstr("one number"));
   EXPECT_THAT(open("i%02d.png", "o.tum", ""), HasSubstr("o.tum:2: timestamp"));
   EXPECT_THAT(open("i%02d.png", "nan.tum", ""), HasSubstr("nan.tum:1: z = \"nan\""));
-  EXPECT_THAT(open("i%02d.png", "late.tum", ""), HasSubstr("never meet"));
   EXPECT_THAT(open("i%02d.png", "", "camera.yaml"), HasSubstr("resolution = 640x480, must be 96x64"));
 }
 
@@ -407,7 +378,7 @@ TEST(SourceOptions, NameTheValueThatIsOutOfRange)
   EXPECT_REFUSED("frame_rate_hz = 0, must be", options.validate());
 }
 
-TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHas)
+TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHasAndRefusesThoseOfNoClock)
 {
   std::string asl, tum;
   for (int k = 0; k < 20; ++k) {
@@ -418,11 +389,7 @@ TEST_F(Sources, NamesTheUnitOfStampsThatNoPoseFilterHas)
   m_flight.write("poses.tum", tum);
   EXPECT_REFUSED("stamps must be in nanoseconds", readTrajectory(path("poses.csv")));
   EXPECT_REFUSED("stamps must be in seconds", readTrajectory(path("poses.tum")));
-}
-
-/// Differences of stamps are taken everywhere, and have to fit.
-TEST_F(Sources, RefusesStampsThatNoClockHas)
-{
+  // differences of stamps are taken everywhere, and have to fit
   m_flight.write("poses.csv", "-9223372036854775808,0,0,1,1,0,0,0\n350000000,0,0,1,1,0,0,0\n");
   m_flight.write("poses.tum", "-9223372036854775808 0 0 1 0 0 0 1\n");
   m_flight.write("powers.tum", "1e300 0 0 1 0 0 0 1\n");

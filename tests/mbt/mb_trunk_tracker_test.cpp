@@ -45,15 +45,6 @@ protected:
   std::unique_ptr<vpMbTracker> m_tracker = std::make_unique<vpMbTrunkTracker>();
 };
 
-TEST_F(MbTrunkTracker, TracksGreyImages)
-{
-  m_tracker->initFromPose(image(0), pose(0).toVisp());
-  for (int k = 1; k <= 10; ++k) {
-    m_tracker->track(image(k));
-    expectAt(pose(k));
-  }
-}
-
 TEST_F(MbTrunkTracker, TracksColourImagesAsItTracksGreyOnes)
 {
   vpMbTrunkTracker grey;
