@@ -6,6 +6,7 @@
 #include "motion/lucas_kanade.h"
 #include "motion/point_motion.h"
 #include "motion/window_loops.h"
+#include <bole/open_source.h>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
@@ -80,7 +81,7 @@ TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
   EXPECT_EQ(cells.size(), 12u); // every cell of 4 x 3
 }
 
-TEST(PointTracker, AWhiteWallHasNoPoints)
+TEST(PointTracker, AWhiteWallHasNoPointsAndAnImageOfAnotherSizeIsAUsersMistake)
 {
   PointTracker tracker(kCamera);
   vpImage<unsigned char> white(240, 320, 250);
@@ -88,6 +89,7 @@ TEST(PointTracker, AWhiteWallHasNoPoints)
   tracker.track(white);
   EXPECT_TRUE(tracker.tracks().empty());
   EXPECT_TRUE(tracker.matches(1).empty());
+  EXPECT_THROW(tracker.track(vpImage<unsigned char>(100, 100, 0)), vpException);
 }
 
 /// A jagged rope in front of a plain wall, and spots beside it; everything moved by (x, y).
@@ -152,12 +154,6 @@ TEST(PointTracker, AForgottenImageLeavesNoTrace)
   }
 }
 
-TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
-{
-  PointTracker tracker(kCamera);
-  EXPECT_THROW(tracker.track(vpImage<unsigned char>(100, 100, 0)), vpException);
-}
-
 Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
 {
   Frame frame;
@@ -174,8 +170,7 @@ Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
 
 TEST(PointMotion, FindsTheMotionOfEveryFrame)
 {
-  Pose bMc;
-  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Pose bMc = forwardCamera();
   PointMotion motion(kCamera, bMc);
   for (int k = 0; k < 6; ++k) {
     const auto steps = motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
@@ -191,8 +186,7 @@ TEST(PointMotion, FindsTheMotionOfEveryFrame)
 
 TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
 {
-  Pose bMc;
-  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Pose bMc = forwardCamera();
   PointMotion motion(kCamera, bMc);
   const vpImage<unsigned char> white(240, 320, 250);
   for (int k = 0; k < 3; ++k)
