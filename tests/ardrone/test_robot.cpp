@@ -103,8 +103,6 @@ TEST(RobotArDrone, TakesOffMovesAndLands)
 {
   InAir flying;
   ASSERT_TRUE(eventually([&] { return flying.inAir(); }));
-  robot.setMaxRotationVelocity(3);
-
   // Camera's z is forward and its y down: faster than it flies, so nose down; climbing; turning left.
   const AtCommand move = flying.moves(vpRobot::CAMERA_FRAME, twist({0, -0.35, 8, 0, -0.435, 0}));
   ASSERT_EQ(move.arguments.size(), 5u);
