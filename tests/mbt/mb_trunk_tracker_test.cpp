@@ -113,7 +113,6 @@ TEST_F(MbTrunkTracker, ErrorsWeightsCovarianceAndFeaturesBelongToTheLastFrame)
   EXPECT_NEAR(std::sqrt(covariance[1][1]), std::hypot(0.01, step / 4),
               1e-3); // the height is not seen: as it was and one frame more
   const double right = m_tracker->getProjectionError();
-  const double right = m_tracker->getProjectionError();
   const double off =
       m_tracker->computeCurrentProjectionError(image(1), cameraAt({0, 0.4, 1.2}).toVisp(), m_camera.toVisp());
   EXPECT_LT(right, 25);

@@ -302,64 +302,65 @@ protected:
       if (name == wanted)
         return value;
     return 1e3;
-    void find()
-    {
-      while (m_task.target() < 0 && m_frame < 400)
-        see(0.2, true);
-      ASSERT_EQ(m_task.target(), 7);
-    }
-    /// By how much the task believes itself too far from the trunk [%].
-    double distanceError() const { return error("distance [%]"); }
-    /// By how much a pose that is turned for one frame moves the bearing that is believed [degrees].
-    double movedByOneTurn(bool is_tracked)
-    {
-      for (int k = 0; k < 60; ++k)
-        see(0.2, true);
-      const double before = error("bearing [deg]");
-      see(0.2, is_tracked, 0.01);
-      return std::abs(error("bearing [deg]") - before);
-    }
-
-    TrunkTask m_task{forwardCamera(), circling()};
-    std::int64_t m_frame = 0;
-  };
-
-  TEST_F(OneTrunk, IsAtItsDistanceAlsoWhereTheFirstImageMissedIt)
+  }
+  void find()
   {
-    find();
-    see(0.2, false);
-    for (int k = 0; k < 30; ++k) {
+    while (m_task.target() < 0 && m_frame < 400)
       see(0.2, true);
-      ASSERT_NEAR(distanceError(), 0, 10) << k; // the drone is believed to move a little, as it is told to
-    }
-  }
-
-  /// By map and pose a bearing scatters by several times what it does in the image.
-  TEST_F(OneTrunk, ThatIsMissedInAnImageMovesItsBearingByLess)
-  {
-    find();
-    const double tracked = movedByOneTurn(true), missed = movedByOneTurn(false);
-    EXPECT_GT(tracked, 0.1);
-    EXPECT_LT(missed, 0.5 * tracked);
-  }
-
-  TEST_F(OneTrunk, ThatIsReadAgainBetweenWiderBordersIsNoDrift)
-  {
-    for (int k = 0; k < 250; ++k)
-      see(0.15, true);
     ASSERT_EQ(m_task.target(), 7);
-    for (int k = 0; k < 10; ++k)
-      see(0.25, true);
-    const double there = 100 * (0.05 / 0.25 * 4 - 1);
-    EXPECT_NEAR(distanceError(), there, 10);
+  }
+  /// By how much the task believes itself too far from the trunk [%].
+  double distanceError() const { return error("distance [%]"); }
+  /// By how much a pose that is turned for one frame moves the bearing that is believed [degrees].
+  double movedByOneTurn(bool is_tracked)
+  {
+    for (int k = 0; k < 60; ++k)
+      see(0.2, true);
+    const double before = error("bearing [deg]");
+    see(0.2, is_tracked, 0.01);
+    return std::abs(error("bearing [deg]") - before);
   }
 
-  TEST(TrunkTask, KeepsItsLargestSpeed)
-  {
-    Flight flight = before(12, 3, 0.2);
-    TrunkTaskOptions options;
-    options.largest_speed = 0.4;
-    TrunkTask task(flight.bMc, options);
-    EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
+  TrunkTask m_task{forwardCamera(), circling()};
+  std::int64_t m_frame = 0;
+};
+
+TEST_F(OneTrunk, IsAtItsDistanceAlsoWhereTheFirstImageMissedIt)
+{
+  find();
+  see(0.2, false);
+  for (int k = 0; k < 30; ++k) {
+    see(0.2, true);
+    ASSERT_NEAR(distanceError(), 0, 10) << k; // the drone is believed to move a little, as it is told to
   }
+}
+
+/// By map and pose a bearing scatters by several times what it does in the image.
+TEST_F(OneTrunk, ThatIsMissedInAnImageMovesItsBearingByLess)
+{
+  find();
+  const double tracked = movedByOneTurn(true), missed = movedByOneTurn(false);
+  EXPECT_GT(tracked, 0.1);
+  EXPECT_LT(missed, 0.5 * tracked);
+}
+
+TEST_F(OneTrunk, ThatIsReadAgainBetweenWiderBordersIsNoDrift)
+{
+  for (int k = 0; k < 250; ++k)
+    see(0.15, true);
+  ASSERT_EQ(m_task.target(), 7);
+  for (int k = 0; k < 10; ++k)
+    see(0.25, true);
+  const double there = 100 * (0.05 / 0.25 * 4 - 1);
+  EXPECT_NEAR(distanceError(), there, 10);
+}
+
+TEST(TrunkTask, KeepsItsLargestSpeed)
+{
+  Flight flight = before(12, 3, 0.2);
+  TrunkTaskOptions options;
+  options.largest_speed = 0.4;
+  TrunkTask task(flight.bMc, options);
+  EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
+}
 } // namespace

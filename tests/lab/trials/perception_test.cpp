@@ -30,14 +30,14 @@ Forest wood()
 
 const Pose kHere{Eigen::Matrix3d::Identity(), {0, 0, 1.2}};
 
-const Pose kHere{Eigen::Matrix3d::Identity(), {0, 0, 1.2}};
-
 struct Looking
 {
   Forest forest = wood();
   TrueSight sight;
   FrameReport report;
-  explicit Looking(const std::vector<int> &only = {}) : sight({}, forwardCamera(), forest, 1, only) {}
+  explicit Looking(const std::vector<int> &only = {}) : sight({}, forwardCamera(), forest, only.empty() ? 0 : 1, only)
+  {
+  }
   void look(const Pose &wMb = kHere) { sight.look(wMb, wMb, true, report = {}); }
 };
 
