@@ -200,6 +200,25 @@ TEST_F(Sources, ARateThatNoCameraHasIsNotBelieved)
     EXPECT_EQ(frames[i].stamp_ns, static_cast<std::int64_t>(i) * 40000000) << "25 frames a second";
 }
 
+TEST_F(Sources, RandomDamageNeverThrowsAndNeverTurnsBackTime)
+{
+  writeVideo("v.avi", 10, 10);
+  const std::string good = textOf(path("v.avi"));
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::string bytes = good;
+    for (int i = 0; i < 30; ++i)
+      bytes[6000 + random() % (good.size() - 6000)] = static_cast<char>(random());
+    m_flight.write("w.avi", bytes);
+    VideoSource source(path("w.avi"));
+    std::int64_t last_ns = -1;
+    for (const Frame &frame : readAll(source)) {
+      EXPECT_GT(frame.stamp_ns, last_ns);
+      last_ns = frame.stamp_ns;
+    }
+  }
+}
+
 TEST_F(Sources, AVideoWhoseTimesGoBackGoesOnAtItsRate)
 {
   {

@@ -97,6 +97,27 @@ TEST_F(Safety, AnOdometryThatIsContradictedEndsTheTaskAndAGyroDoesNot)
   EXPECT_EQ(task.step({}).reason, "odometry: frozen since 2.0 s: hovers");
 }
 
+TEST_F(Safety, NoTaskFliesIntoWhatIsBelieved)
+{
+  for (const bool is_confirmed : {true, false}) {
+    Ahead task; // at 1 m/s
+    FrameReport report;
+    KnownTrunk trunk;
+    trunk.status = is_confirmed ? TrunkStatus::confirmed : TrunkStatus::candidate;
+    trunk.trunk.xy = {3, 0};
+    trunk.log_odds = 3;
+    trunk.observations = 20;
+    report.map = {trunk};
+    for (int k = 0; k < 200; ++k) {
+      report.stamp_ns = k * 100000000LL;
+      report.wMb.t.x() += 0.1 * task.step(report).velocity.x();
+    }
+    const SafetyOptions options;
+    const double bark = 3 - trunk.trunk.radius() - options.hull;
+    EXPECT_EQ(report.wMb.t.x() < bark, is_confirmed) << report.wMb.t.x(); // a candidate is for the planner to avoid
+  }
+}
+
 TEST(Sidestep, GoesToAndFroByItsAmplitudeAndKeepsItsHeading)
 {
   Sidestep sidestep(0.5, 8);
