@@ -44,5 +44,4 @@ inline std::string messageOf(const std::function<void()> &action)
 } // namespace bole::test
 
 /// The statement is refused with \p part in what is said.
-#define EXPECT_REFUSED(part, ...)                                                                                      \
-  EXPECT_THAT(bole::test::messageOf([&] { __VA_ARGS__; }), testing::HasSubstr(part))
+#define EXPECT_REFUSED(part, ...) EXPECT_THAT(bole::test::messageOf([&] { __VA_ARGS__; }), testing::HasSubstr(part))
