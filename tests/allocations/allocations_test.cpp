@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // How often a frame in flight asks for memory, once the window is full, and how much of it stays. Counts operator new
 // of all libraries; what OpenCV and Eigen take by malloc are images and a few matrices.
+#include "support/test.h"
+
+#include <atomic>
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <atomic>
-#include <cstdlib>
 #include <malloc.h>
 #include <new>
-#include <vector>
 
 namespace
 {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "ardrone/drone_clock.h"
 #include "emulator/wire_format.h"
-
-#include <gtest/gtest.h>
-#include <random>
 
 using namespace bole;
 

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight.h"
-#include "support/files.h"
+#include "support/test.h"
 
 #include "ardrone/flight_folder.h"
 #include "input/recorded_source.h"
 #include <bole/ardrone_source.h>
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <visp3/core/vpException.h>
 
 using namespace bole;
 

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Whoever speaks on the drone's ports: the client neither believes it, nor fills its memory, nor ever answers with a
 // flight command. On loopback; every loop is bounded, nothing measures time.
+#include "files.h"
+#include "flight.h"
+#include "support/test.h"
+
 #include "ardrone/pave.h"
 #include "emulator/emulator_packets.h"
 #include "emulator/server_socket.h"
 #include "emulator/uvlc_encoder.h"
-
-#include "files.h"
-#include "flight.h"
-
-#include <gtest/gtest.h>
 #include <netinet/in.h>
-#include <random>
-#include <set>
 
 using namespace bole;
 using test::eventually;

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The live path against the emulator. Nothing here measures time; limits are for machines that hang.
 #include "flight.h"
-
-#include <gtest/gtest.h>
-#include <map>
-#include <visp3/core/vpException.h>
+#include "support/test.h"
 
 using namespace bole;
 using test::addressOf;
@@ -13,42 +10,47 @@ using test::eventually;
 
 namespace
 {
-/// All frames until the emulated flight is over and the source has given what it has.
-std::vector<Frame> fly(const ArDroneAddress &address, std::vector<std::uint32_t> *numbers = nullptr,
-                       LinkCounters *counters = nullptr)
+struct Flown
 {
+  std::vector<Frame> frames;
+  std::vector<std::uint32_t> numbers;
+  LinkCounters counters;
+  ArDroneEmulator::Counters sent;
+};
+
+/// All that comes until an emulated flight of \p count frames is over and the source has given what it has.
+Flown fly(int generation, std::size_t count, const ArDroneEmulator::Options &emulated = {})
+{
+  const auto emulator = emulate(generation, count, emulated);
   ArDroneSource::Options options;
   options.give_up_s = 2; // longer than the reboot below
   options.grabber.open_timeout_s = test::kPatience_s;
-  ArDroneSource source(address.toString(), options);
-  std::vector<Frame> frames;
+  ArDroneSource source(addressOf(*emulator).toString(), options);
+  Flown flown;
+  std::vector<Frame> &frames = flown.frames;
   frames.reserve(1000); // ViSP copies empty images by memcpy from null
   for (;;) {
     Frame frame; // a new one each time: ViSP 3.5 leaks what is assigned to an image moved from
     if (!source.next(frame))
       break;
     frames.push_back(std::move(frame));
-    if (numbers != nullptr)
-      numbers->push_back(source.liveFrame().number);
+    flown.numbers.push_back(source.liveFrame().number);
   }
-  if (counters != nullptr)
-    *counters = source.counters();
-  return frames;
-}
-
-std::map<FrameStatus, int> countByStatus(const std::vector<Frame> &frames)
-{
-  std::map<FrameStatus, int> count;
-  for (const Frame &frame : frames)
-    ++count[frame.status];
-  return count;
-}
-
-void expectRisingStamps(const std::vector<Frame> &frames)
-{
+  flown.counters = source.counters();
+  flown.sent = emulator->counters();
   for (std::size_t i = 1; i < frames.size(); ++i)
-    ASSERT_GT(frames[i].stamp_ns, frames[i - 1].stamp_ns) << i;
+    EXPECT_GT(frames[i].stamp_ns, frames[i - 1].stamp_ns) << i;
+  return flown;
 }
+
+/// Twice as fast as life.
+ArDroneEmulator::Options quick()
+{
+  ArDroneEmulator::Options options;
+  options.speed = 2;
+  return options;
+}
+
 } // namespace
 
 class Live : public testing::TestWithParam<int>
@@ -59,10 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Generation, Live, testing::Values(1, 2),
 
 TEST_P(Live, GivesFramesWithTheMotionThatWasFlown)
 {
-  const auto emulator = emulate(GetParam(), 60);
-  std::vector<std::uint32_t> numbers;
-  const auto frames = fly(addressOf(*emulator), &numbers);
-  expectRisingStamps(frames);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 60);
   const double largest_error_m = 0.25; // 1 m/s: a quarter of a second of a machine that stumbles
   int checked = 0;
   std::optional<Pose> first_seen, first_flown;
@@ -107,15 +106,11 @@ TEST_P(Live, ASlowConsumerGetsTheNewestFrameAndTheOthersAreCounted)
 
 TEST_P(Live, ComesBackByItselfAfterAReboot)
 {
-  ArDroneEmulator::Options options;
-  options.speed = 2;
+  ArDroneEmulator::Options options = quick();
   options.reboot_at_s = 1.5;
   options.reboot_for_s = 0.5;
-  const auto emulator = emulate(GetParam(), 120, options);
-  LinkCounters counters;
-  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
-  expectRisingStamps(frames);
-  EXPECT_EQ(emulator->counters().reboots, 1u);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 120, options);
+  EXPECT_EQ(sent.reboots, 1u);
   EXPECT_GE(counters.connections, GetParam() == 2 ? 2u : 1u);
   EXPECT_EQ(counters.navdata_restarts, 1u);
   // Frames of before and of after, and an odometry that goes on: nothing jumps by more than was flown.
@@ -130,13 +125,9 @@ TEST_P(Live, ComesBackByItselfAfterAReboot)
 
 TEST_P(Live, ClocksThatWrapAreNotNoticed)
 {
-  ArDroneEmulator::Options options;
-  options.speed = 2;
+  ArDroneEmulator::Options options = quick();
   options.clock_wrap = true; // both clocks wrap after 3 s
-  const auto emulator = emulate(GetParam(), 120, options);
-  LinkCounters counters;
-  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
-  expectRisingStamps(frames);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 120, options);
   EXPECT_EQ(counters.clock_jumps, 0u);
   EXPECT_EQ(counters.navdata_restarts, 0u);
   double travelled = 0;
@@ -153,16 +144,12 @@ TEST_P(Live, ClocksThatWrapAreNotNoticed)
 
 TEST_P(Live, LosesAndJittersPacketsWithoutLosingTheThread)
 {
-  ArDroneEmulator::Options options;
-  options.speed = 2;
+  ArDroneEmulator::Options options = quick();
   options.loss = 0.1;
   options.jitter_s = 0.03;
-  const auto emulator = emulate(GetParam(), 80, options);
-  LinkCounters counters;
-  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
-  expectRisingStamps(frames);
-  EXPECT_GT(emulator->counters().lost, 0u);
-  EXPECT_GT(countByStatus(frames)[FrameStatus::ok], 5);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 80, options);
+  EXPECT_GT(sent.lost, 0u);
+  EXPECT_GT(std::count_if(frames.begin(), frames.end(), [](const Frame &f) { return f.status == FrameStatus::ok; }), 5);
   if (GetParam() == 2) {
     EXPECT_GT(counters.video.corrupt, 0u); // frames that refer to lost ones
   }
@@ -170,15 +157,11 @@ TEST_P(Live, LosesAndJittersPacketsWithoutLosingTheThread)
 
 TEST_P(Live, CorruptionNeitherCrashesNorStopsIt)
 {
-  ArDroneEmulator::Options options;
-  options.speed = 2;
+  ArDroneEmulator::Options options = quick();
   options.corrupt = 0.2;
   options.key_interval = 5;
-  const auto emulator = emulate(GetParam(), 120, options);
-  LinkCounters counters;
-  const auto frames = fly(addressOf(*emulator), nullptr, &counters);
-  expectRisingStamps(frames);
-  EXPECT_GT(emulator->counters().corrupted_navdata, 0u);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 120, options);
+  EXPECT_GT(sent.corrupted_navdata, 0u);
   EXPECT_EQ(counters.navdata_restarts, 0u);
   EXPECT_GT(counters.navdata_refused, 0u);
   EXPECT_GT(counters.video.corrupt, 0u);
@@ -187,13 +170,10 @@ TEST_P(Live, CorruptionNeitherCrashesNorStopsIt)
 
 TEST_P(Live, AFrozenCameraIsStale)
 {
-  ArDroneEmulator::Options options;
-  options.speed = 2;
+  ArDroneEmulator::Options options = quick();
   options.freeze_at_s = 1;
   options.freeze_for_s = 1.5; // frames 21 to 50
-  const auto emulator = emulate(GetParam(), 80, options);
-  std::vector<std::uint32_t> numbers;
-  const auto frames = fly(addressOf(*emulator), &numbers);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 80, options);
   int stale = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].status == FrameStatus::missing)
@@ -212,9 +192,7 @@ TEST_P(Live, AStallOfTheVideoKeepsTheMotion)
   ArDroneEmulator::Options options;
   options.stall_at_s = 2; // the source has settled, on a slow machine too
   options.stall_for_s = 1.5;
-  const auto emulator = emulate(GetParam(), 100, options);
-  const auto frames = fly(addressOf(*emulator));
-  expectRisingStamps(frames);
+  const auto [frames, numbers, counters, sent] = fly(GetParam(), 100, options);
   int missing = 0;
   for (std::size_t i = 1; i < frames.size(); ++i) {
     const Frame &frame = frames[i], &before = frames[i - 1];
@@ -231,8 +209,7 @@ TEST_P(Live, AStallOfTheVideoKeepsTheMotion)
 
 TEST_P(Live, SilenceIsMissingFramesAndThenAnEnd)
 {
-  const auto emulator = emulate(GetParam(), 30);
-  const auto frames = fly(addressOf(*emulator));
+  const std::vector<Frame> frames = fly(GetParam(), 30).frames;
   ASSERT_FALSE(frames.empty());
   EXPECT_EQ(frames.back().status, FrameStatus::missing);
   EXPECT_EQ(frames.back().image.getSize(), 0u);

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "files.h"
+#include "support/test.h"
+
 #include "ardrone/video_decoder.h"
 #include "emulator/wire_format.h"
-
-#include "files.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <random>
 
 using namespace bole;
 
@@ -26,6 +22,17 @@ std::vector<std::uint8_t> envelope(std::uint32_t number, std::size_t payload, st
   header.frame_type = number % 15 == 0 ? PaveFrameType::idr : PaveFrameType::p;
   auto bytes = encodePaveHeader(header);
   bytes.resize(bytes.size() + payload, static_cast<std::uint8_t>(number));
+  return bytes;
+}
+
+/// Frames of these numbers, each with \p payload bytes.
+std::vector<std::uint8_t> stream(std::initializer_list<std::uint32_t> numbers, std::size_t payload)
+{
+  std::vector<std::uint8_t> bytes;
+  for (const std::uint32_t number : numbers) {
+    const auto frame = envelope(number, payload);
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+  }
   return bytes;
 }
 
@@ -100,10 +107,7 @@ TEST(Pave, GivesTheSameFramesHoweverTheStreamIsCut)
 
 TEST(Pave, FindsItsWayAfterADamagedHeaderAndSaysSo)
 {
-  auto bytes = envelope(1, 500);
-  const auto second = envelope(2, 500), third = envelope(3, 500);
-  bytes.insert(bytes.end(), second.begin(), second.end());
-  bytes.insert(bytes.end(), third.begin(), third.end());
+  auto bytes = stream({1, 2, 3}, 500);
   bytes[564] = 'X';
   PaveParser parser;
   const auto frames = parseAll(parser, bytes, 100);
@@ -116,11 +120,7 @@ TEST(Pave, FindsItsWayAfterADamagedHeaderAndSaysSo)
 
 TEST(Pave, ADamagedLengthDoesNotSwallowTheFramesBehindIt)
 {
-  std::vector<std::uint8_t> bytes;
-  for (std::uint32_t number = 1; number <= 4; ++number) {
-    const auto frame = envelope(number, 500);
-    bytes.insert(bytes.end(), frame.begin(), frame.end());
-  }
+  auto bytes = stream({1, 2, 3, 4}, 500);
   bytes[10] = 9; // 500 bytes become 590,324
   PaveParser parser;
   const auto frames = parseAll(parser, bytes, 100);
@@ -132,9 +132,7 @@ TEST(Pave, ADamagedLengthDoesNotSwallowTheFramesBehindIt)
 
 TEST(Pave, AMissingFrameNumberIsAGap)
 {
-  auto bytes = envelope(1, 50);
-  const auto third = envelope(3, 50);
-  bytes.insert(bytes.end(), third.begin(), third.end());
+  const auto bytes = stream({1, 3}, 50);
   PaveParser parser;
   const auto frames = parseAll(parser, bytes, bytes.size());
   ASSERT_EQ(frames.size(), 2u);

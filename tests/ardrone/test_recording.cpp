@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "flight.h"
+#include "support/test.h"
+
 #include "ardrone/bytes.h"
 #include "ardrone/flight_folder.h"
 #include "emulator/recording_reader.h"
-#include "support/files.h"
-
-#include "flight.h"
-
 #include <csignal>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <visp3/core/vpException.h>
 
 using namespace bole;
 using test::TemporaryFolder;

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "flight.h"
+#include "support/test.h"
 
 #include <bole/pose.h>
 #include <bole/vpRobotArDrone.h>
-
-#include <gtest/gtest.h>
-
 #include <cstring>
-#include <limits>
-#include <visp3/core/vpException.h>
 #include <visp3/robot/vpRobotException.h>
 
 using namespace bole;
@@ -83,75 +79,72 @@ TEST(RobotArDrone, SendsNothingWithoutPermission)
   EXPECT_FALSE(flying.last("PCMD"));
 }
 
+/// One whose robot has taken off.
+struct InAir : Flying
+{
+  vpRobotArDrone robot;
+  explicit InAir(const vpRobotArDrone::Options &options = patient()) : robot(grabber, options)
+  {
+    robot.open(vpRobotArDrone::Permission::fly);
+    robot.takeOff();
+    robot.setMaxTranslationVelocity(10);
+    robot.setMaxRotationVelocity(3);
+  }
+  /// The command that moves it.
+  AtCommand moves(vpRobot::vpControlFrameType frame, const vpColVector &v)
+  {
+    robot.setVelocity(frame, v);
+    EXPECT_TRUE(eventually([&] { return last("PCMD") && last("PCMD")->arguments[0] == "1"; }));
+    return last("PCMD").value_or(AtCommand());
+  }
+};
+
 TEST(RobotArDrone, TakesOffMovesAndLands)
 {
-  Flying flying;
-  vpRobotArDrone robot(flying.grabber, patient());
-  robot.open(vpRobotArDrone::Permission::fly);
-  robot.takeOff();
+  InAir flying;
   ASSERT_TRUE(eventually([&] { return flying.inAir(); }));
-  robot.setMaxTranslationVelocity(10);
-  robot.setMaxRotationVelocity(3);
-
   // Camera's z is forward and its y down: faster than it flies, so nose down; climbing; turning left.
-  vpColVector v(6, 0.0);
-  v[2] = 8;
-  v[1] = -0.35;
-  v[4] = -0.435;
-  robot.setVelocity(vpRobot::CAMERA_FRAME, v);
-  ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
-  const auto move = flying.last("PCMD");
-  EXPECT_FLOAT_EQ(atFloatValue(move->arguments[2]), -0.5f);           // pitch, at its limit
-  EXPECT_NEAR(atFloatValue(move->arguments[3]), 0.5, 1e-3);           // 0.35 of 0.7 m/s
-  EXPECT_NEAR(atFloatValue(move->arguments[4]), -0.435 / 1.74, 1e-3); // left is counter-clockwise
+  const AtCommand move = flying.moves(vpRobot::CAMERA_FRAME, twist({0, -0.35, 8, 0, -0.435, 0}));
+  ASSERT_EQ(move.arguments.size(), 5u);
+  EXPECT_FLOAT_EQ(atFloatValue(move.arguments[2]), -0.5f);           // pitch, at its limit
+  EXPECT_NEAR(atFloatValue(move.arguments[3]), 0.5, 1e-3);           // 0.35 of 0.7 m/s
+  EXPECT_NEAR(atFloatValue(move.arguments[4]), -0.435 / 1.74, 1e-3); // left is counter-clockwise
 
-  robot.land();
+  flying.robot.land();
   ASSERT_TRUE(eventually([&] { return !flying.inAir(); }));
   EXPECT_EQ(flying.emulator->counters().out_of_sequence, 0u);
 }
 
 TEST(RobotArDrone, LeftwardTiltsTheLeftSideDown)
 {
-  Flying flying;
-  vpRobotArDrone robot(flying.grabber, patient());
-  robot.open(vpRobotArDrone::Permission::fly);
-  robot.takeOff();
-  robot.setMaxTranslationVelocity(10);
-  vpColVector v(6, 0.0);
-  v[1] = 8;
-  robot.setVelocity(vpRobot::REFERENCE_FRAME, v);
-  ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "1"; }));
-  EXPECT_FLOAT_EQ(atFloatValue(flying.last("PCMD")->arguments[1]), -0.5f);
+  InAir flying;
+  const AtCommand move = flying.moves(vpRobot::REFERENCE_FRAME, twist({0, 8, 0, 0, 0, 0}));
+  ASSERT_EQ(move.arguments.size(), 5u);
+  EXPECT_FLOAT_EQ(atFloatValue(move.arguments[1]), -0.5f);
 }
 
 TEST(RobotArDrone, TheWatchdogHoversAndThenLandsWhenCommandsGoStale)
 {
-  Flying flying;
   vpRobotArDrone::Options options;
   options.laws.hover_after_s = 0.1;
   options.laws.land_after_s = 0.6;
-  vpRobotArDrone robot(flying.grabber, options);
-  robot.open(vpRobotArDrone::Permission::fly);
-  robot.takeOff();
-  robot.setVelocity(vpRobot::REFERENCE_FRAME, vpColVector(6, 0.1));
+  InAir flying(options);
+  flying.robot.setVelocity(vpRobot::REFERENCE_FRAME, vpColVector(6, 0.1));
   ASSERT_TRUE(eventually([&] { return flying.last("PCMD") && flying.last("PCMD")->arguments[0] == "0"; })); // hovers
   ASSERT_TRUE(eventually([&] { return flying.last("REF") && !flying.inAir(); }));                           // lands
   const auto commands = flying.emulator->commands();
   EXPECT_TRUE(std::any_of(commands.begin(), commands.end(), [](const AtCommand &c) {
     return c.name == "REF" && (std::stol(c.arguments[0]) & 1 << 9) != 0;
   }));
-  EXPECT_TRUE(eventually([&] { return robot.watchdog() == vpRobotArDrone::Watchdog::idle; }));
+  EXPECT_TRUE(eventually([&] { return flying.robot.watchdog() == vpRobotArDrone::Watchdog::idle; }));
 }
 
 TEST(RobotArDrone, KeepsTheFlightLaws)
 {
-  Flying flying;
   vpRobotArDrone::Options options = patient();
   options.laws.least_battery = 0.81; // the emulated drone says 80 per cent
-  vpRobotArDrone robot(flying.grabber, options);
-  robot.open(vpRobotArDrone::Permission::fly);
-  robot.takeOff();
-  EXPECT_TRUE(eventually([&] { return robot.brokenLaw() == "battery"; }));
+  InAir flying(options);
+  EXPECT_TRUE(eventually([&] { return flying.robot.brokenLaw() == "battery"; }));
   EXPECT_TRUE(eventually([&] { return flying.last("REF") && !flying.inAir(); }));
 }
 

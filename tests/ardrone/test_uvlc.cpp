@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "ardrone/uvlc.h"
 #include "emulator/uvlc_encoder.h"
-
-#include <cmath>
-#include <gtest/gtest.h>
-#include <random>
 
 using namespace bole;
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What one damaged or lost frame of an AR.Drone 2 costs, wherever in the stream it is.
+#include "flight.h"
+#include "support/test.h"
+
 #include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
 #include "emulator/uvlc_encoder.h"
-
-#include "flight.h"
-
-#include <gtest/gtest.h>
-#include <random>
 
 using namespace bole;
 

@@ -5,7 +5,6 @@
 
 #include "geometry/median.h"
 #include "input/recorded_source.h"
-#include "motion/ground_plane.h"
 #include "motion/point_motion.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"
@@ -38,9 +37,8 @@ double threadTime()
 double mean(const std::vector<double> &values)
 {
   double sum = 0;
-  for (double value : values) {
+  for (double value : values)
     sum += value;
-  }
   return sum / double(values.size());
 }
 
@@ -56,9 +54,8 @@ Flight readFlight(const std::string &name)
 {
   AslSource source(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
   Flight flight{name, source.camera(), source.bMc(), {}};
-  for (Frame frame; source.next(frame);) {
+  for (Frame frame; source.next(frame);)
     flight.frames.push_back(frame);
-  }
   return flight;
 }
 
@@ -112,29 +109,13 @@ void compareRelativePoses(const Flight &flight, bool gyro)
   }
 }
 
-/// Path aligned to the truth in x, y, yaw and scale, up being known from the first frame's truth.
-struct Aligned
-{
-  double ate = 0, scale = 1;
-};
-Aligned align(const Eigen::Matrix3Xd &path, const Eigen::Matrix3Xd &truth)
-{
-  const Eigen::Vector3d path_mean = path.rowwise().mean(), truth_mean = truth.rowwise().mean();
-  Eigen::Matrix3Xd p = path.colwise() - path_mean, q = truth.colwise() - truth_mean;
-  const double c = (p.topRows<2>().cwiseProduct(q.topRows<2>())).sum();
-  const double s = p.row(0).dot(q.row(1)) - p.row(1).dot(q.row(0));
-  p = expSo3({0, 0, std::atan2(s, c)}) * p;
-  const double scale = p.cwiseProduct(q).sum() / p.squaredNorm();
-  return {std::sqrt((scale * p - q).squaredNorm() / double(path.cols())), scale};
-}
-
-void comparePaths(const Flight &flight)
+/// The cost of points alone.
+void printCosts(const Flight &flight)
 {
   PointTracker tracker(flight.camera);
   PointOdometry odometry(flight.camera);
   VerticalFilter vertical;
-  ScaleFromHeight scale;
-  double track_ms = 0, place_ms = 0, vertical_ms = 0, length = 0;
+  double track_ms = 0, place_ms = 0, vertical_ms = 0;
   for (const Frame &frame : flight.frames) {
     const double t0 = threadTime();
     tracker.track(frame.image);
@@ -142,35 +123,13 @@ void comparePaths(const Flight &flight)
     const auto placed = odometry.process(tracker);
     const double t2 = threadTime();
     vertical.add(placed.wMc.R, VerticalFinder().find(frame.image, flight.camera, placed.wMc.R, std::nullopt));
-    const double t3 = threadTime();
     track_ms += t1 - t0;
     place_ms += t2 - t1;
-    vertical_ms += t3 - t2;
-    if (placed.status == PointOdometryStatus::ok && vertical.known()) {
-      const Eigen::Vector3d up = placed.wMc.R.transpose() * vertical.up();
-      scale.add(heightOverGround(odometry.depths(), flight.camera, up), frame.wMb_truth->t.z(), 0.02);
-    }
+    vertical_ms += threadTime() - t2;
   }
-  const auto n = static_cast<Eigen::Index>(flight.frames.size());
-  const auto path = odometry.trajectory();
-  const Eigen::Matrix3d first = flight.frames[0].wMb_truth->R * flight.bMc.R;
-  Eigen::Matrix3Xd points(3, n), filter(3, n), truth(3, n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const Frame &frame = flight.frames[static_cast<std::size_t>(k)];
-    points.col(k) = first * path[static_cast<std::size_t>(k)].wMc.t;
-    filter.col(k) = frame.wMb_odometry->t;
-    truth.col(k) = frame.wMb_truth->t;
-    length += k > 0 ? (truth.col(k) - truth.col(k - 1)).norm() : 0;
-  }
-  const Aligned by_points = align(points, truth), by_filter = align(filter, truth);
-  const double tilt = std::acos(std::min(1.0, (first * vertical.up()).z())) * kDegrees;
-  fmt::print("{:13} | {:.3f} m, {:.2f} % | {:.3f} m | {:.2f} deg | {:+.1f} % (sigma {:.1f} %) | "
-             "{:.2f} + {:.2f} + {:.2f} ms\n",
-             flight.name, by_points.ate, 100 * by_points.ate / length, by_filter.ate, tilt,
-             100 * (scale.metresPerUnit() / by_points.scale - 1), 100 * scale.relativeSigma(), track_ms / double(n),
-             place_ms / double(n), vertical_ms / double(n));
+  const double n = double(flight.frames.size());
+  fmt::print("{:13} | {:.2f} + {:.2f} + {:.2f} ms\n", flight.name, track_ms / n, place_ms / n, vertical_ms / n);
 }
-
 } // namespace
 
 int main()
@@ -181,23 +140,18 @@ int main()
     return 0;
   }
   std::vector<Flight> flights;
-  for (const char *name : {"park-forward", "winter-weave", "pine-arc"}) {
+  for (const char *name : {"park-forward", "winter-weave", "pine-arc"})
     flights.push_back(readFlight(name));
-  }
   fmt::print("flight, prior, frames apart | direction, pose filter -> points (median) | rotation, "
              "gyro -> points | "
              "NEES a degree of freedom, rotation and direction: mean (median) | with direction | "
              "cost of both distances\n");
   for (const bool gyro : {true, false}) {
-    for (const Flight &flight : flights) {
+    for (const Flight &flight : flights)
       compareRelativePoses(flight, gyro);
-    }
   }
-  fmt::print("\nwithout odometry and gyro: flight | ATE by points after x, y, yaw, scale | of the "
-             "pose filter | tilt of up | "
-             "scale by the ground | tracker + placing + vertical\n");
-  for (const Flight &flight : flights) {
-    comparePaths(flight);
-  }
+  fmt::print("\nflight | tracker + placing + vertical\n");
+  for (const Flight &flight : flights)
+    printCosts(flight);
   return 0;
 }

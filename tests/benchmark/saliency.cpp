@@ -4,6 +4,7 @@
 #include "support/forest_flight.h"
 #include "support/roc.h"
 
+#include "geometry/so3.h"
 #include "saliency/saliency.h"
 
 #include <benchmark/benchmark.h>
@@ -28,7 +29,7 @@ void fly(benchmark::State &state, const char *name, Mode mode, SaliencyOptions o
     state.SkipWithError("the rendered flights are not here");
     return;
   }
-  const support::ForestFlight flight = support::readForestFlight(name, 0, 110);
+  const support::ForestFlight flight = support::readForestFlight(name, 111);
   options.near_range = 6;
   support::RocCurve roc, known_roc;
   double turn_error = 0, frames = 0;

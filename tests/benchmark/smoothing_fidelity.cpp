@@ -5,7 +5,6 @@
 // gradient and Hessian are taken again at every view's present relative trunk in each iteration.
 // benchmark_smoothing_fidelity [sequence ...]
 #include "smoothing/factors.h"
-#include "support/rendered_flights.h"
 
 #include "evaluation/trajectory_metrics.h"
 #include "pipeline/engine.h"
@@ -274,7 +273,11 @@ void printCosts(const Flight &flight)
 
 int main(int argc, char **argv)
 {
-  for (const std::string &sequence : bole::test::flightsOf(argc, argv)) {
+  std::vector<std::string> flights(argv + 1, argv + argc);
+  if (flights.empty())
+    for (const char *name : {"park-forward", "winter-weave", "pine-arc"})
+      flights.push_back(std::string(BOLE_SHARED_DATA_DIR) + "/rendered/" + name);
+  for (const std::string &sequence : flights) {
     const Flight flight = fly(sequence);
     const Graph &summaries = flight.graph;
     const Graph anew =

@@ -2,6 +2,8 @@
 // The fuzz targets of tests/fuzz over damaged good inputs: seconds of what the fuzzers do for minutes. A target that
 // finds something aborts.
 #include "ardrone/files.h"
+#include "support/flight.h"
+#include "support/test.h"
 
 #include "ardrone/at_command.h"
 #include "ardrone/flight_folder.h"
@@ -12,18 +14,7 @@
 #include "emulator/uvlc_encoder.h"
 #include "output/video_writer.h"
 #include <bole/graph.h>
-
-#include "support/flight.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <random>
-#include <sstream>
 #include <visp3/core/vpImageConvert.h>
 
 extern "C" {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The detector that asks a window of frames, on drawn borders.
 #include "drawn_trunks.h"
+#include "support/test.h"
 
 #include "detection/line_detector.h"
-
-#include <gmock/gmock.h>
-
-#include <visp3/core/vpException.h>
 
 namespace
 {
@@ -110,21 +107,13 @@ TEST(Detector, SaysHowWellItKnowsThePlace)
             3 * std::sqrt(wide[0].covariance.topLeftCorner<2, 2>().trace()));
 }
 
-TEST(Detector, FindsNothingWithoutParallax)
+TEST(Detector, FindsNothingWithoutParallaxFarAwayInABlankImageOrInTooFewViews)
 {
-  const std::vector<Pose> still(18, lookingAhead(0, 0));
-  EXPECT_TRUE(detect(DrawnFlight({{3, 0.7, 0.15, 40}}, still)).empty());
-}
-
-TEST(Detector, FindsNothingOfTrunksThatAreFar)
-{
-  EXPECT_TRUE(detect(DrawnFlight({{20, 0.5, 0.6, 40}, {25, -2, 0.7, 40}}, sweep())).empty());
-}
-
-TEST(Detector, FindsNothingInABlankImageOrInTooFewViews)
-{
+  const std::vector<DrawnTrunk> near = {{3, 0.7, 0.15, 40}}, far = {{20, 0.5, 0.6, 40}, {25, -2, 0.7, 40}};
+  EXPECT_TRUE(detect(DrawnFlight(near, std::vector<Pose>(18, lookingAhead(0, 0)))).empty());
+  EXPECT_TRUE(detect(DrawnFlight(far, sweep())).empty());
   EXPECT_TRUE(detect(DrawnFlight({}, sweep())).empty());
-  EXPECT_TRUE(detect(DrawnFlight({{3, 0.7, 0.15, 40}}, sweep(4))).empty());
+  EXPECT_TRUE(detect(DrawnFlight(near, sweep(4))).empty());
 }
 
 TEST(Detector, IgnoresRegionsWithKnownTrunks)
@@ -236,7 +225,7 @@ const LineDetection *nearestTo(const std::vector<LineDetection> &found, const Re
   return nearest;
 }
 
-TEST(LineDetector, FindsSalientTrunksInOneFrame)
+TEST(LineDetector, FindsSalientTrunksInOneFrameAndWithoutSaliencyEveryUprightPair)
 {
   const Scene scene;
   const auto found = scene.detect();
@@ -249,19 +238,23 @@ TEST(LineDetector, FindsSalientTrunksInOneFrame)
     EXPECT_NEAR(line->relative.ratio(), truth.ratio(), 0.7 / kCamera.fx);
     EXPECT_GE(std::min(line->p_left, line->p_right), scene.options.threshold);
   }
+  const Gradient gradient = computeGradient(draw(scene.trunks, scene.wMc, kCamera), {1});
+  EXPECT_EQ(detectLines(gradient, nullptr, kCamera, scene.wMc.R, {}, {}, scene.options).size(), kTrunks.size());
 }
 
-TEST(LineDetector, FindsNothingOnTheBackground)
-{
-  EXPECT_TRUE(Scene().detect(vpImage<float>(240, 320, 0.95f)).empty());
-}
-
-TEST(LineDetector, FindsNothingWithoutBorders)
+TEST(LineDetector, FindsNothingOnTheBackgroundWithoutBordersOrOfAnotherWidth)
 {
   Scene scene;
+  EXPECT_TRUE(scene.detect(vpImage<float>(240, 320, 0.95f)).empty());
   const vpImage<float> p = salient(kTrunks, scene.wMc);
   scene.trunks.clear();
   EXPECT_TRUE(scene.detect(p).empty());
+  scene.trunks = {{3, 0.8, 0.15, 40}}; // 20 px wide
+  scene.options.width_max_px = 15;
+  EXPECT_TRUE(scene.detect().empty());
+  scene.options.width_max_px = 90;
+  scene.options.width_min_px = 25;
+  EXPECT_TRUE(scene.detect().empty());
 }
 
 TEST(LineDetector, IgnoresRegionsWithKnownTrunks)
@@ -291,14 +284,6 @@ TEST(LineDetector, OnePolarityKnowsDarkTrunksOnly)
   EXPECT_TRUE(bright.detect().empty());
 }
 
-TEST(LineDetector, WithoutSaliencyItTakesEveryUprightPair)
-{
-  const Scene scene;
-  const Gradient gradient = computeGradient(draw(scene.trunks, scene.wMc, kCamera), {1});
-  const auto found = detectLines(gradient, nullptr, kCamera, scene.wMc.R, {}, {}, scene.options);
-  EXPECT_EQ(found.size(), kTrunks.size());
-}
-
 TEST(LineDetector, ABorderBelongsToOneTrunk)
 {
   Scene scene; // two dark trunks side by side: the bright gap between them shares a border with each
@@ -307,16 +292,5 @@ TEST(LineDetector, ABorderBelongsToOneTrunk)
   ASSERT_EQ(found.size(), 2u);
   for (const LineDetection &line : found)
     EXPECT_NEAR(line.relative.ratio(), 0.15 / std::hypot(3, 0.35), 0.005);
-}
-
-TEST(LineDetector, HoldsToTheWidthsItIsGiven)
-{
-  Scene scene;
-  scene.trunks = {{3, 0.8, 0.15, 40}}; // 20 px wide
-  scene.options.width_max_px = 15;
-  EXPECT_TRUE(scene.detect().empty());
-  scene.options.width_max_px = 90;
-  scene.options.width_min_px = 25;
-  EXPECT_TRUE(scene.detect().empty());
 }
 } // namespace

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the columns of a flight say of a trunk, on drawn ones before a striped wall.
+#include "drawn_trunks.h"
+#include "support/test.h"
+
 #include "detection/border_continuity.h"
 #include "detection/photo_consistency.h"
-#include "drawn_trunks.h"
-
-#include <gmock/gmock.h>
-#include <random>
 
 namespace
 {
@@ -114,7 +113,6 @@ TEST(PhotoConsistency, BesideAnEdgeOfShadowTheTrunkGoesOn)
   EXPECT_LT(evidence->right, -0.25);
 }
 
-/// Taken view by view it is what it is taken at once; what was seen long ago fades.
 TEST(PhotoConsistency, BesideATrunkTheBackgroundAgreesAndBesideAStripOfAFacadeTheFacade)
 {
   const DrawnTrunk one{4, 0.4, 0.15, 40};
@@ -168,7 +166,7 @@ TEST(DepthBorders, AreThoseOfTheSilhouetteWhateverTheLight)
   EXPECT_NEAR(*narrow->likely[1], 0.27, 1.5 * narrow->px);
 }
 
-TEST(DepthBorders, AreNoneOfWhatIsNotThereOrHasNoParallax)
+TEST(PhotoConsistency, WithoutParallaxOrWhereNothingIsThereIsNone)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
   const LevelFlight flight({trunk}, sweep()), still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
@@ -176,14 +174,7 @@ TEST(DepthBorders, AreNoneOfWhatIsNotThereOrHasNoParallax)
   EXPECT_FALSE(depthBorders(trunkOf(trunk), still.views(), kFarthest).has_value());
   const std::vector<ColumnView> all = flight.views();
   EXPECT_FALSE(depthBorders(trunkOf(trunk), {all.begin(), all.begin() + 5}, kFarthest).has_value());
-}
-
-TEST(PhotoConsistency, WithoutParallaxThereIsNone)
-{
-  const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
-  const LevelFlight still({trunk}, std::vector<Pose>(18, lookingAhead(0, 0)));
   EXPECT_FALSE(photoConsistency(trunkOf(trunk), still.views(), kFarthest).has_value());
-  const LevelFlight flight({trunk}, sweep());
   EXPECT_FALSE(photoConsistency(trunkOf({-4, 0, 0.15, 40}), flight.views(), kFarthest).has_value()); // behind
 }
 

@@ -1,27 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Each format is read back by a reader that shares no code with its writer; where Debian's own tools are installed,
 // by those too.
+#include "input/flight_folder.h"
+#include "support/shell.h"
+#include "support/test.h"
+
 #include "exchange/exchange.h"
 #include "geometry/so3.h"
-#include "input/flight_folder.h"
 #include "input/trajectory.h"
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
-#include "support/files.h"
-#include "support/messages.h"
-#include "support/shell.h"
 #include <bole/cylinder.h>
 #include <bole/graph.h>
-
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <fmt/format.h>
-#include <map>
-#include <sstream>
 #include <visp3/mbt/vpMbGenericTracker.h>
 
 namespace
@@ -405,6 +397,6 @@ TEST_F(Exported, ARunThatOnlyRotatedIsRefused)
 TEST_F(Exported, AMapWithoutTrunksIsRefused)
 {
   writeTrunks(m_run + "/trunks.csv", {});
-  EXPECT_THAT(test::messageOf([&] { path("dxf"); }), HasSubstr("no trunk"));
+  EXPECT_REFUSED("no trunk", path("dxf"));
 }
 } // namespace

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include <bole/camera.h>
-
-#include <gtest/gtest.h>
-
 #include <visp3/core/vpMeterPixelConversion.h>
 
 namespace

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/silhouette.h"
 #include "geometry/so3.h"
 #include <bole/camera.h>
 #include <bole/cylinder.h>
 #include <bole/trunk.h>
-
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
 #include <visp3/core/vpCylinder.h>
 
 namespace

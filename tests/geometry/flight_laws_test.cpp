@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include <bole/flight_laws.h>
 
-#include <Eigen/Geometry>
+using namespace bole;
 
-#include <bole/visp.h>
-#include <cmath>
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 using Kind = FlightOrder::Kind;
@@ -146,4 +141,3 @@ TEST(FlightLaws, RefusesOptionsOutOfRange)
   EXPECT_THROW(FlightLaws{options}, vpException);
 }
 } // namespace
-} // namespace bole

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/median.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
 
 namespace
 {

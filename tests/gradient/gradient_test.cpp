@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "gradient/border_line.h"
 #include "gradient/gradient.h"
-
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <functional>
-#include <random>
-#include <visp3/core/vpException.h>
 
 namespace
 {

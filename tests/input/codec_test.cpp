@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Pictures are read as OpenCV reads them.
+#include "support/test.h"
+
 #include "input/codec.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
 using namespace bole;
 

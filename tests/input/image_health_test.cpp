@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Whether an image can be believed, before a trunk is looked for in it.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "input/frame_builder.h"
 #include "input/gyro_agreement.h"
 #include "input/image_health.h"
-
-#include <algorithm>
-#include <fmt/format.h>
-#include <functional>
-#include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
-#include <random>
-#include <visp3/core/vpException.h>
 
 namespace
 {

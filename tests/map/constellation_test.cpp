@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "map/constellation.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <random>
-
-namespace bole
-{
 namespace
 {
 constexpr double kSigma = 0.15; // [m], of a place in either map
@@ -110,4 +108,3 @@ TEST(Constellation, TwoTrunksAreNotEnough)
   EXPECT_FALSE(placeOnMap({wood[0], wood[1]}, wood));
 }
 } // namespace
-} // namespace bole

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The life of a trunk: what it must show before it is confirmed, and what loses it.
+#include "support/test.h"
+
 #include "map/trunk_map.h"
-
-#include <gmock/gmock.h>
-
-#include <Eigen/Geometry>
-#include <functional>
-#include <random>
 
 namespace
 {
@@ -68,6 +64,18 @@ protected:
     review();
     EXPECT_EQ(at(trunk).status, TrunkStatus::confirmed);
     return trunk;
+  }
+  /// Adds trunks that are in sight together, for two seconds from now on. \return their ids.
+  std::vector<int> seeTogether(const std::vector<Trunk> &trunks)
+  {
+    std::vector<int> ids;
+    const double began_s = m_time_s;
+    for (const Trunk &trunk : trunks) {
+      m_time_s = began_s;
+      ids.push_back(add(trunk));
+      see(ids.back(), 20);
+    }
+    return ids;
   }
   /// As if its history had been another.
   void change(int id, const std::function<void(MapTrunk &)> &spoil)
@@ -141,26 +149,13 @@ std::vector<Trunk> constellation(double drift, double yaw)
 
 TEST_F(Life, TrunksAreRecognisedByTheirConstellationWhenThePathHasDrifted)
 {
-  for (const Trunk &trunk : constellation(0, 0)) {
-    const int id = add(trunk);
-    const double began_s = m_time_s;
-    see(id, 20);
-    m_time_s = began_s; // all are in sight together
-  }
-  m_time_s = 3;
-  m_map.review(m_time_s);
+  seeTogether(constellation(0, 0));
+  m_map.review(3);
   ASSERT_EQ(m_map.count(TrunkStatus::confirmed), 6);
   m_time_s = 60;
-  std::vector<int> again;
-  for (const Trunk &trunk : constellation(1.4, 0.05)) {
-    again.push_back(add(trunk));
-    const double began_s = m_time_s;
-    see(again.back(), 20);
-    m_time_s = began_s;
-  }
-  m_time_s = 63;
+  const std::vector<int> again = seeTogether(constellation(1.4, 0.05));
 
-  const MapUpdate update = m_map.review(m_time_s);
+  const MapUpdate update = m_map.review(63);
 
   EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 6);
   ASSERT_EQ(update.merged.size(), 6u);
@@ -172,19 +167,10 @@ TEST_F(Life, TrunksAreRecognisedByTheirConstellationWhenThePathHasDrifted)
 
 TEST_F(Life, OtherTrunksAreNotTakenForThoseOfAnEarlierVisit)
 {
-  for (const Trunk &trunk : constellation(0, 0)) {
-    const int id = add(trunk);
-    see(id, 20);
-    m_time_s -= 2;
-  }
+  seeTogether(constellation(0, 0));
   m_map.review(3);
   m_time_s = 60;
-  for (const Trunk &trunk :
-       {trunkAt(23, 1, .15), trunkAt(25, -3, .11), trunkAt(26.5, 1.4, .2), trunkAt(29, 2.2, .13)}) {
-    const int id = add(trunk);
-    see(id, 20);
-    m_time_s -= 2;
-  }
+  seeTogether({trunkAt(23, 1, .15), trunkAt(25, -3, .11), trunkAt(26.5, 1.4, .2), trunkAt(29, 2.2, .13)});
   EXPECT_TRUE(m_map.review(63).merged.empty());
   EXPECT_EQ(m_map.count(TrunkStatus::confirmed), 10);
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A host program whose decimals have a comma reads and writes the same bytes.
+#include "support/test.h"
+
 #include "exchange/exchange.h"
 #include "input/recorded_source.h"
 #include "input/trajectory.h"
@@ -8,18 +10,47 @@
 #include "output/flight_trace.h"
 #include "output/summary_json.h"
 #include "output/trunks_csv.h"
-#include "support/files.h"
-#include "support/german_locale.h"
 #include <bole/config.h>
 #include <bole/graph.h>
 #include <bole/pipeline.h>
-
-#include <gmock/gmock.h>
+#include <clocale>
+#include <locale>
 
 namespace
 {
 using namespace bole;
 namespace fs = std::filesystem;
+
+/// Sets the locale of C and of C++ to German while it lives; the locale is made where the system has none.
+class GermanLocale
+{
+public:
+  GermanLocale()
+  {
+    const std::string make =
+        "localedef -i de_DE -f UTF-8 --no-archive " + m_folder.path() + "/de_DE.UTF-8 >/dev/null 2>&1";
+    static_cast<void>(std::system(make.c_str()));
+    setenv("LOCPATH", m_folder.path().c_str(), 1);
+    try {
+      std::locale::global(std::locale("de_DE.UTF-8")); // sets that of C, too
+    }
+    catch (const std::runtime_error &) {
+    }
+  }
+  ~GermanLocale()
+  {
+    std::locale::global(std::locale::classic());
+    unsetenv("LOCPATH");
+  }
+  GermanLocale(const GermanLocale &) = delete;
+  GermanLocale &operator=(const GermanLocale &) = delete;
+
+  /// Whether decimals have a comma now: false where the locale could not be made.
+  static bool isOn() { return std::string(std::localeconv()->decimal_point) == ","; }
+
+private:
+  test::TemporaryFolder m_folder;
+};
 
 class Locales : public testing::Test
 {
@@ -65,7 +96,7 @@ TEST_F(Locales, AFlightIsMappedToTheSameBytes)
 {
   const auto here = filesOfAFlight("here");
   EXPECT_GE(here.size(), 4u);
-  const test::GermanLocale german;
+  const GermanLocale german;
   if (!german.isOn())
     GTEST_SKIP() << "no German locale, and localedef cannot make it";
   for (const auto &[name, bytes] : filesOfAFlight("there"))
@@ -74,7 +105,7 @@ TEST_F(Locales, AFlightIsMappedToTheSameBytes)
 
 TEST_F(Locales, FilesOfOthersAreReadAlike)
 {
-  const test::GermanLocale german;
+  const GermanLocale german;
   if (!german.isOn())
     GTEST_SKIP() << "no German locale, and localedef cannot make it";
   EXPECT_EQ(readCamera(write("c.yaml", "resolution: [320, 240]\nintrinsics: [200.5, 201.25, 160.5, 120.5]\n"))

@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The mapper as a ViSP user calls it, on the demonstration flight.
+#include "support/test.h"
+
 #include "input/recorded_source.h"
 #include "map/trunk_map.h"
 #include "mbt/cao_reader.h"
 #include <bole/options.h>
 #include <bole/vpMbTrunkTracker.h>
 #include <bole/vpTrunkMapper.h>
-
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <random>
-#include <set>
 #include <visp3/core/vpTrackingException.h>
 
 using namespace bole;

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "mbt/border_vote.h"
 #include "mbt/model_trunk.h"
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include <visp3/core/vpCylinder.h>
 #include <visp3/core/vpExponentialMap.h>
 

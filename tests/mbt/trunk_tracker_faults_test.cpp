@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What vpMbTrunkTracker says when the image is no image, when it is lost, and when one trunk is all there is.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include <bole/vpMbTrunkTracker.h>
-
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <random>
 #include <visp3/core/vpTrackingException.h>
 
 namespace

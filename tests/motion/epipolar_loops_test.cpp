@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "motion/epipolar.h"
-
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <vector>
 
 namespace
 {

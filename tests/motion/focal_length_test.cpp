@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "motion/bundle.h"
 #include "motion/focal_length.h"
 #include <bole/open_source.h>
 #include <bole/trunk.h>
-
-#include <gtest/gtest.h>
 
 namespace
 {

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "motion/inertial_scale.h"
 #include "motion/made_flight.h"
+#include "support/test.h"
+
+#include "motion/inertial_scale.h"
 #include "motion/path_scale.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <vector>
-
-namespace bole
-{
 namespace
 {
 using test::MadeFlight;
@@ -321,4 +319,3 @@ TEST(InertialScale, TwoSecondsWithoutOdometryAreBridgedWithinThreeStandardDeviat
   EXPECT_LT(error.norm(), 3 * std::sqrt(3 * variance)) << error.transpose() << " +- " << std::sqrt(variance);
   EXPECT_LT(error.norm(), 0.3) << error.transpose(); // of two metres
 }
-} // namespace bole

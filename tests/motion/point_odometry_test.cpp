@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "input/recorded_source.h"
 #include "motion/ground_plane.h"
 #include "motion/point_odometry.h"
 #include "motion/vertical.h"
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
 namespace
 {
@@ -130,9 +124,8 @@ TEST(PointOdometry, LosesItsPointsWithoutMakingAnythingUp)
 TEST(PointOdometry, PlacesTheRenderedFlightsWithinTwoPercentOfTheirPath)
 {
   const std::string folder = std::string(BOLE_SHARED_DATA_DIR) + "/rendered/winter-weave";
-  if (!std::filesystem::exists(folder)) {
+  if (!std::filesystem::exists(folder))
     GTEST_SKIP() << folder << " is absent";
-  }
   AslSource source(folder);
   PointTracker tracker(source.camera());
   PointOdometry odometry(source.camera());
@@ -335,9 +328,8 @@ TEST(GroundPlane, NothingBelowTheHorizonIsNoGround)
 TEST(GroundPlane, ScaleIsARobustMeanOverFrames)
 {
   ScaleFromHeight scale;
-  for (int k = 0; k < 30; ++k) {
+  for (int k = 0; k < 30; ++k)
     scale.add({true, k % 6 == 0 ? 0.4 : 0.7 + 0.01 * (k % 3 - 1), 0.02, 20}, 1.4, 0.02);
-  }
   ASSERT_TRUE(scale.known());
   EXPECT_NEAR(scale.metresPerUnit(), 2.0, 0.06);
   EXPECT_GT(scale.relativeSigma(), 0.03);

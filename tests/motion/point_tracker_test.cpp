@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "motion/lucas_kanade.h"
 #include "motion/point_motion.h"
 #include "motion/window_loops.h"
-
-#include <gtest/gtest.h>
-
+#include <bole/open_source.h>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
-#include <set>
 
 namespace
 {
@@ -24,9 +22,8 @@ Pose poseAt(int k) { return {expSo3({0, 0.004 * k, 0}), {0.08 * k, 0.01 * k, 0.0
 TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
 {
   PointTracker tracker(kCamera);
-  for (int k = 0; k < 4; ++k) {
+  for (int k = 0; k < 4; ++k)
     tracker.track(drawWalls(kCamera, poseAt(k)));
-  }
   const auto matches = tracker.matches(3);
   ASSERT_GT(matches.size(), 60u);
   // Every wall is at a known depth: one of them explains the match to a fraction of a pixel.
@@ -73,20 +70,18 @@ TEST(PointTracker, SpreadsItsPointsAndNeverUsesAnIdTwice)
       EXPECT_EQ(dead.count(track.id), 0u);
     }
     for (std::uint64_t id : alive) {
-      if (now.count(id) == 0) {
+      if (now.count(id) == 0)
         dead.insert(id);
-      }
     }
     alive = now;
   }
   std::set<int> cells;
-  for (const PointTrack &track : tracker.tracks()) {
+  for (const PointTrack &track : tracker.tracks())
     cells.insert(int(track.current().x() / 80) + 10 * int(track.current().y() / 80));
-  }
   EXPECT_EQ(cells.size(), 12u); // every cell of 4 x 3
 }
 
-TEST(PointTracker, AWhiteWallHasNoPoints)
+TEST(PointTracker, AWhiteWallHasNoPointsAndAnImageOfAnotherSizeIsAUsersMistake)
 {
   PointTracker tracker(kCamera);
   vpImage<unsigned char> white(240, 320, 250);
@@ -94,6 +89,7 @@ TEST(PointTracker, AWhiteWallHasNoPoints)
   tracker.track(white);
   EXPECT_TRUE(tracker.tracks().empty());
   EXPECT_TRUE(tracker.matches(1).empty());
+  EXPECT_THROW(tracker.track(vpImage<unsigned char>(100, 100, 0)), vpException);
 }
 
 /// A jagged rope in front of a plain wall, and spots beside it; everything moved by (x, y).
@@ -158,12 +154,6 @@ TEST(PointTracker, AForgottenImageLeavesNoTrace)
   }
 }
 
-TEST(PointTracker, AnImageOfAnotherSizeIsAUsersMistake)
-{
-  PointTracker tracker(kCamera);
-  EXPECT_THROW(tracker.track(vpImage<unsigned char>(100, 100, 0)), vpException);
-}
-
 Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
 {
   Frame frame;
@@ -180,8 +170,7 @@ Frame frameAt(int k, const vpImage<unsigned char> &image, const Pose &bMc)
 
 TEST(PointMotion, FindsTheMotionOfEveryFrame)
 {
-  Pose bMc;
-  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Pose bMc = forwardCamera();
   PointMotion motion(kCamera, bMc);
   for (int k = 0; k < 6; ++k) {
     const auto steps = motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
@@ -197,13 +186,11 @@ TEST(PointMotion, FindsTheMotionOfEveryFrame)
 
 TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
 {
-  Pose bMc;
-  bMc.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Pose bMc = forwardCamera();
   PointMotion motion(kCamera, bMc);
   const vpImage<unsigned char> white(240, 320, 250);
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3; ++k)
     motion.process(frameAt(k, drawWalls(kCamera, poseAt(k)), bMc));
-  }
   const auto blind = motion.process(frameAt(3, white, bMc));
   ASSERT_FALSE(blind.empty());
   EXPECT_EQ(blind[0].estimate.status, RelativePoseStatus::too_few_points);

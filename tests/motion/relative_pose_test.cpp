@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
 #include "synthetic.h"
 
 #include "motion/epipolar.h"
 #include "motion/row_shear.h"
-
-#include <gtest/gtest.h>
-
-#include <Eigen/Dense>
 
 namespace
 {
@@ -44,9 +41,8 @@ TEST(RelativePose, SwappingTheFramesInvertsTheMotion)
 {
   const Pose aMb = typicalMotion(), bMa = aMb.inverse();
   auto matches = cloudMatches(kCamera, aMb, {});
-  for (auto &match : matches) {
+  for (auto &match : matches)
     std::swap(match.a_px, match.b_px);
-  }
   const auto estimate = estimateRelativePose(matches, kCamera);
   EXPECT_EQ(estimate.status, RelativePoseStatus::ok);
   EXPECT_LT(rotationErrorDeg(estimate.aRb, bMa.R), 1e-4);
@@ -120,9 +116,8 @@ TEST(RelativePose, FrozenFramesAreARestingCamera)
 {
   CloudOptions options;
   auto matches = cloudMatches(kCamera, typicalMotion(), options);
-  for (auto &match : matches) {
+  for (auto &match : matches)
     match.b_px = match.a_px;
-  }
   const auto estimate = estimateRelativePose(matches, kCamera);
   EXPECT_EQ(estimate.status, RelativePoseStatus::no_parallax);
   EXPECT_LT(rotationErrorDeg(estimate.aRb, Eigen::Matrix3d::Identity()), 1e-3);

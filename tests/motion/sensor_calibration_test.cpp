@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "motion/gyro.h"
 #include "motion/made_flight.h"
+#include "support/test.h"
+
+#include "motion/gyro.h"
 #include "motion/sensor_calibration.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <Eigen/Dense>
-#include <functional>
-#include <random>
-
-namespace bole
-{
 namespace
 {
 using Eigen::Matrix3d;
@@ -270,9 +266,8 @@ std::vector<GyroSample> samplesOf(const Eigen::Vector3d &rate, double noise, std
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, noise);
   std::vector<GyroSample> samples;
-  for (std::int64_t stamp = 0; stamp <= end_ns; stamp += 5000000) {
+  for (std::int64_t stamp = 0; stamp <= end_ns; stamp += 5000000)
     samples.push_back({stamp, rate + Eigen::Vector3d(normal(random), normal(random), normal(random))});
-  }
   return samples;
 }
 
@@ -359,4 +354,3 @@ TEST(Gyro, RotationsBetterThanTheGyroGiveItsBiasBack)
   EXPECT_LT(error.dot(bias.covariance.inverse() * error), 16);
 }
 } // namespace
-} // namespace bole

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "motion/made_flight.h"
+#include "support/test.h"
+
 #include "motion/sensor_monitor.h"
 
-#include "motion/made_flight.h"
+using namespace bole;
 
-#include <Eigen/Geometry>
-#include <functional>
-#include <gtest/gtest.h>
-
-namespace bole
-{
 namespace
 {
 using Eigen::Vector3d;
@@ -450,4 +447,3 @@ TEST(SensorMonitor, PointsThatErrForAFewFramesAreNotTheGyrosFault)
     EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
   }
 }
-} // namespace bole

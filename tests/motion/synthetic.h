@@ -40,16 +40,14 @@ inline std::vector<PointMatch> cloudMatches(const PinholeCamera &camera, const P
       point *= 1 / (1 / options.far + unit(random) * (1 / options.near - 1 / options.far));
     }
     const Eigen::Vector3d in_b = bMa * point;
-    if (in_b.z() < 0.1 || !camera.contains(camera.project(in_b))) {
+    if (in_b.z() < 0.1 || !camera.contains(camera.project(in_b)))
       continue;
-    }
     PointMatch match;
     match.id = matches.size() + 1;
     match.a_px = a + Eigen::Vector2d(noise(random), noise(random));
     match.b_px = camera.project(in_b) + Eigen::Vector2d(noise(random), noise(random));
-    if (unit(random) < options.outliers) {
+    if (unit(random) < options.outliers)
       match.b_px += Eigen::Vector2d(40 * (unit(random) - 0.5), 40 * (unit(random) - 0.5));
-    }
     matches.push_back(match);
   }
   return matches;

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a run says of itself.
-#include "support/files.h"
+#include "support/test.h"
 
 #include "output/summary_json.h"
-
-#include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
-
 #include <atomic>
+#include <nlohmann/json.hpp>
 
 using namespace bole;
 using testing::HasSubstr;
@@ -59,24 +56,17 @@ TEST(Verdict, TellsTheSigmasOfTrunksAmongThemselvesAndThatOfTheScaleApart)
   EXPECT_THAT(textOf(summary), HasSubstr("median sigma 0.050 m in place and 0.010 m in radius at this scale; 1 other"));
 }
 
-TEST(Verdict, TellsWhichFramesWereNotOkAndWhy)
-{
-  RunSummary summary = goodRun();
-  summary.frames[FrameStatus::corrupt] = 40;
-  summary.reasons[FrameStatus::corrupt] = "ends early";
-  EXPECT_THAT(textOf(summary), HasSubstr("100 of 140 frames ok, 40 corrupt (ends early)"));
-  EXPECT_THAT(textOf(summary), HasSubstr("Many frames could not be used"));
-  EXPECT_TRUE(judge(summary).is_trusted);
-}
-
-TEST(Verdict, TellsOfTimesWithoutAPicture)
+TEST(Verdict, TellsWhichFramesWereNotOkAndOfTimesWithoutAPicture)
 {
   RunSummary summary = goodRun();
   summary.gaps = {{5, 2}};
   EXPECT_THAT(textOf(summary), HasSubstr("100 frames, all ok; no picture for 2.0 s from 5.0 s on\n"));
-  summary.frames[FrameStatus::corrupt] = 1;
+  summary.frames[FrameStatus::corrupt] = 40;
+  summary.reasons[FrameStatus::corrupt] = "ends early";
   summary.gaps.push_back({8, 3});
-  EXPECT_THAT(textOf(summary), HasSubstr("1 corrupt; no picture for 3.0 s from 8.0 s on, the longest of 2 gaps\n"));
+  EXPECT_THAT(textOf(summary), HasSubstr("100 of 140 frames ok, 40 corrupt (ends early); no picture for 3.0 s from 8.0 "
+                                         "s on, the longest of 2 gaps\n"));
+  EXPECT_THAT(textOf(summary), HasSubstr("Many frames could not be used"));
   EXPECT_TRUE(judge(summary).is_trusted); // like frames that are missing
 }
 
@@ -90,18 +80,7 @@ TEST(Verdict, OffersToLeaveOutASensorButNotTheImages)
   EXPECT_THAT(textOf(summary), testing::Not(HasSubstr("--without images")));
 }
 
-TEST(Verdict, NamesTheOptionThatWouldTellWhatIsGuessed)
-{
-  RunSummary summary = goodRun();
-  summary.reference.scale = ScaleSource::prior;
-  summary.reference.scale_sigma = 0.19;
-  summary.is_camera_known = false;
-  EXPECT_THAT(textOf(summary), HasSubstr("--camera-height"));
-  EXPECT_THAT(textOf(summary), HasSubstr("+- 19 %"));
-  EXPECT_THAT(textOf(summary), HasSubstr("--field-of-view"));
-}
-
-TEST(Verdict, TellsHowWellAFieldOfViewWasMeasured)
+TEST(Verdict, NamesTheOptionThatWouldTellWhatIsGuessedAndHowWellAFieldOfViewWasMeasured)
 {
   RunSummary summary = goodRun();
   EXPECT_THAT(textOf(summary), HasSubstr("degrees, calibrated"));
@@ -109,6 +88,12 @@ TEST(Verdict, TellsHowWellAFieldOfViewWasMeasured)
   EXPECT_THAT(textOf(summary), testing::AllOf(HasSubstr("degrees, measured +- 2.1"), testing::Not(HasSubstr("guess"))));
   EXPECT_NEAR(nlohmann::json::parse(toJson(summary)).at("camera").at("field_of_view_sigma_deg").get<double>(), 2.14,
               1e-12);
+  summary = goodRun();
+  summary.reference.scale = ScaleSource::prior;
+  summary.reference.scale_sigma = 0.19;
+  summary.is_camera_known = false;
+  for (const char *said : {"--camera-height", "+- 19 %", "--field-of-view"})
+    EXPECT_THAT(textOf(summary), HasSubstr(said));
 }
 
 TEST(Verdict, ACameraThatOnlyRotatedIsNotTrustedAndHasNoLengths)
@@ -125,31 +110,24 @@ TEST(Verdict, ACameraThatOnlyRotatedIsNotTrustedAndHasNoLengths)
   EXPECT_FALSE(json.at("trunks").contains("median_of_confirmed"));
 }
 
-TEST(Verdict, ACameraThatNeverMovedOrSawNothingIsNotTrusted)
+TEST(Verdict, ACameraThatNeverMovedOrSawOrFoundNothingIsNotTrustedAndHasNoMedianOfZero)
 {
-  RunSummary still = goodRun();
+  RunSummary still = goodRun(), blind = still, meadow = still;
   still.extent_m = 0.02;
   EXPECT_FALSE(judge(still).is_trusted);
   EXPECT_THAT(textOf(still), HasSubstr("NEVER MOVED"));
-  RunSummary blind = goodRun();
   blind.frames = {{FrameStatus::corrupt, 100}};
   EXPECT_FALSE(judge(blind).is_trusted);
   EXPECT_THAT(textOf(blind), testing::AllOf(HasSubstr("SAW NOTHING"), testing::Not(HasSubstr("field of view")),
                                             testing::Not(HasSubstr("a frame")), testing::Not(HasSubstr("lengths"))));
-  RunSummary meadow = goodRun();
-  meadow.trunks.clear();
-  EXPECT_FALSE(judge(meadow).is_trusted);
-}
-
-TEST(Verdict, ARunThatFoundNothingHasNoMedianOfZero)
-{
-  RunSummary summary = goodRun();
-  summary.trunks = {TrunkRecord()};
-  EXPECT_THAT(textOf(summary), HasSubstr("0 trunks, median sigma - in place"));
-  EXPECT_THAT(textOf(summary), HasSubstr("No trunk was confirmed"));
-  const auto json = nlohmann::json::parse(toJson(summary));
+  meadow.trunks = {TrunkRecord()};
+  EXPECT_THAT(textOf(meadow),
+              testing::AllOf(HasSubstr("0 trunks, median sigma - in place"), HasSubstr("No trunk was confirmed")));
+  const auto json = nlohmann::json::parse(toJson(meadow));
   EXPECT_TRUE(json.at("trunks").at("median_of_confirmed").at("radius_m").is_null());
   EXPECT_TRUE(json.at("timing").at("median_frame_ms").is_null());
+  meadow.trunks.clear();
+  EXPECT_FALSE(judge(meadow).is_trusted);
 }
 
 TEST(Summary, HoldsWhatTheRunCanBeRedoneWith)

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // How a detection becomes a candidate: followed through the window, fitted to what was seen.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "pipeline/candidate_track.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <cmath>
-
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -126,4 +123,3 @@ TEST(DetectionWindow, KeepsViewsFromPlacesApartAndAlwaysTheNewest)
     EXPECT_GE(window.views()[i].pose - window.views()[i - 1].pose, 2u);
 }
 } // namespace
-} // namespace bole

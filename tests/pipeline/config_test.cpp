@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/files.h"
-#include "support/messages.h"
+#include "support/test.h"
 
 #include "pipeline/option_table.h"
 #include "pipeline/stage_options.h"
 #include <bole/config.h>
 #include <bole/open_source.h>
-
-#include <gmock/gmock.h>
-
-#include <fmt/format.h>
 
 namespace
 {

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/drawn_trunks.h"
+#include "support/test.h"
+
 #include "pipeline/consistency_window.h"
 #include "pipeline/final_pass.h"
-
-#include <gmock/gmock.h>
-
-#include <cmath>
 
 namespace
 {
 using namespace bole;
+
+constexpr double kFarthest = 14, kRadiusMax = 0.38;
+const test::DrawnTrunk kWhole{3.55, 0.3, 0.18, 60};
 
 Trunk trunkAt(double x, double y, double radius) { return {{x, y}, std::log(radius)}; }
 
@@ -70,7 +71,6 @@ TEST(FinalPass, TwoReadingsOfTheSameColumnsAtTwoRangesAreOne)
 
 TEST(FinalPass, AStripOfAFacadeIsNoTrunkHoweverClearItsBordersAre)
 {
-  constexpr double kFarthest = 14;
   const test::DrawnTrunk one{4, 0.4, 0.15, 40};
   const auto weighed = [&](const test::LevelFlight &flight, double points_beside,
                            std::optional<double> continuity = {}) {
@@ -91,8 +91,7 @@ TEST(FinalPass, AStripOfAFacadeIsNoTrunkHoweverClearItsBordersAre)
 /// Only the lit part of a trunk is read.
 TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
 {
-  constexpr double kFarthest = 14, kRadiusMax = 0.38;
-  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, lit{3.42, 0.39, 0.09, 0};
+  const test::DrawnTrunk &whole = kWhole, lit{3.42, 0.39, 0.09, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   const ScoredHypothesis narrow = judgedAt(1, test::trunkOf(lit), 3);
@@ -113,8 +112,7 @@ TEST(FinalPass, AWiderReadingMustTakeInWhatStoodBesideTheBorder)
 /// A rim of light of less than two pixels is left out.
 TEST(FinalPass, ForSteeringAPixelBeyondABorderIsEnoughToLookThere)
 {
-  constexpr double kFarthest = 14, kRadiusMax = 0.38;
-  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
+  const test::DrawnTrunk &whole = kWhole, without_rim{3.55, 0.3115, 0.1685, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   const auto scored = scoreHypothesis({1, test::trunkOf(without_rim), 3}, views, kFarthest);
@@ -131,8 +129,7 @@ TEST(FinalPass, ForSteeringAPixelBeyondABorderIsEnoughToLookThere)
 /// A reading with a border of something behind is too wide, one half beside the trunk is as wide as it was known to be.
 TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
 {
-  constexpr double kFarthest = 14, kRadiusMax = 0.38;
-  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, wide{3.55, 0.37, 0.25, 0}, beside{3.55, 0.43, 0.18, 0};
+  const test::DrawnTrunk &whole = kWhole, wide{3.55, 0.37, 0.25, 0}, beside{3.55, 0.43, 0.18, 0};
   const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   for (const test::DrawnTrunk &hypothesis : {wide, beside}) {
@@ -154,8 +151,7 @@ TEST(FinalPass, AReadingOfTheBackgroundIsMovedOntoTheTrunk)
 /// A reading that leaves a rim of a pixel and a half out on the right.
 TEST(FinalPass, DepthHasItsShareInWhereATrunkEnds)
 {
-  constexpr double kFarthest = 14;
-  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60}, without_rim{3.55, 0.3115, 0.1685, 0};
+  const test::DrawnTrunk &whole = kWhole, without_rim{3.55, 0.3115, 0.1685, 0};
   const test::LevelFlight flight(test::barkOf(whole, 0), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   const Matrix5d sure = 1e-6 * Matrix5d::Identity();
@@ -181,8 +177,7 @@ TEST(FinalPass, DepthHasItsShareInWhereATrunkEnds)
 /// The same lines in the images, a twelfth too near and too far.
 TEST(FinalPass, TheBarkTellsHowFarATrunkStands)
 {
-  constexpr double kFarthest = 14, kRadiusMax = 0.38;
-  const test::DrawnTrunk whole{3.55, 0.3, 0.18, 60};
+  const test::DrawnTrunk &whole = kWhole;
   const test::LevelFlight flight(test::barkOf(whole, -1), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   EXPECT_FALSE(proposeRange({1, test::trunkOf(whole)}, views, kFarthest, kRadiusMax).has_value());
@@ -272,14 +267,13 @@ TEST(ConsistencyWindow, TellsWithinHalfAMetreThatABorderHasBecomeALineOfLightAnd
 
 TEST(ConsistencyWindow, WaitsTwiceAsLongAfterARedetectionInVain)
 {
-  const test::DrawnTrunk trunk{3.55, 0.3, 0.18, 60};
-  const test::LevelFlight flight(test::barkOf(trunk, 0), test::sweep());
+  const test::LevelFlight flight(test::barkOf(kWhole, 0), test::sweep());
   const std::vector<ColumnView> views = flight.views();
   ConsistencyWindow columns;
   const auto viewsUntilItMay = [&] {
     int n = 0;
     for (; n < 100 && !columns.mayRedetect(7); ++n)
-      columns.update(7, test::trunkOf(trunk), views, 14);
+      columns.update(7, test::trunkOf(kWhole), views, 14);
     columns.noteRedetection(7);
     return n;
   };

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The plane of the ground, from points drawn on it, on bushes and at random.
+#include "support/test.h"
+
 #include "pipeline/ground.h"
-
-#include <gtest/gtest.h>
-
-#include <random>
 
 namespace
 {

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What moves the pipeline when the pose filter, the points or both are missing.
 #include "motion/rendered_walls.h"
+#include "support/test.h"
 
 #include "geometry/so3.h"
 #include "pipeline/engine.h"
 
-#include <algorithm>
-#include <array>
-#include <gtest/gtest.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -33,10 +30,12 @@ Pose bodyAt(const Pose &wMc)
 
 Pose sideways(int k) { return {expSo3({0, 0.01 * std::sin(0.4 * k), 0}), {0.1 * k, 0, 0.04 * k}}; }
 
+/// And no step stays loose once the unit is known.
 TEST(PlainVideo, StepsAreThoseOfThePointsUpToOneScale)
 {
+  constexpr std::size_t kFrames = 24;
   Pipeline pipeline(kCamera, kMount);
-  for (int k = 0; k < 24; ++k)
+  for (int k = 0; k < int(kFrames); ++k)
     pipeline.process(frameAt(k, sideways(k)));
   const auto path = pipeline.smoothedTrajectory();
   ASSERT_EQ(path.size(), 24u);
@@ -50,14 +49,6 @@ TEST(PlainVideo, StepsAreThoseOfThePointsUpToOneScale)
   EXPECT_EQ(pipeline.reference().scale, ScaleSource::prior);
   EXPECT_GT(pipeline.reference().scale_sigma, 0.1);
   EXPECT_TRUE(pipeline.reference().has_ranges);
-}
-
-TEST(PlainVideo, NoStepStaysLooseOnceTheUnitIsKnown)
-{
-  constexpr std::size_t kFrames = 24;
-  Pipeline pipeline(kCamera, kMount);
-  for (std::size_t k = 0; k < kFrames; ++k)
-    pipeline.process(frameAt(static_cast<int>(k), sideways(static_cast<int>(k))));
   std::array<double, kFrames> loosest{}; // of the steps over each frame, the tightest edge's sigma [m]
   loosest.fill(1e3);
   for (const auto &edge : pipeline.graph().odometry) {
@@ -186,4 +177,3 @@ TEST(LookThrough, ASlotBetweenTwoWallsIsSeenThroughAndAPostIsNot)
   EXPECT_GT(post->pointsBeside(), 1);
 }
 } // namespace
-} // namespace bole

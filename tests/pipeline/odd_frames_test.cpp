@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Frames that a pipeline may not take: they leave no trace.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 #include <bole/smoother.h>
-#include <bole/visp.h>
 
-#include <gmock/gmock.h>
+using namespace bole;
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -135,4 +128,3 @@ TEST(SmallPictures, AreRefusedOrTakenByEveryStage)
   EXPECT_FALSE(flies(1, 1));
 }
 } // namespace
-} // namespace bole

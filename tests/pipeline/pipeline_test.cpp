@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The pipeline as a user calls it.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "pipeline/engine.h"
 #include "pipeline/stage_options.h"
 #include "pipeline/units.h"
 #include <bole/pipeline.h>
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <cmath>
-#include <map>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 const PinholeCamera kCamera;
@@ -46,6 +41,9 @@ TEST(Pipeline, MapsFromFramesFilledByHandWithImageStampAndOdometry)
   EXPECT_GE(found, 3);
   EXPECT_FALSE(report.trunks.empty());
   EXPECT_FALSE(report.map.empty());
+  for (const TrunkRecord &trunk : pipeline.map()) // and of what is no trunk it tells why
+    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.reject_reason == RejectReason::none)
+        << toString(trunk.reject_reason);
 }
 
 TEST(Pipeline, AFrameOfBeforeIsReviewedWithTheMapAndThePathThatTheFlightEndedWith)
@@ -137,24 +135,12 @@ void findThinLeaningTrunk(const Options &options, int frames)
   EXPECT_EQ(found, 1);
 }
 
-TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnown) { findThinLeaningTrunk(Options(), 30); }
-
-TEST(Pipeline, FindsAThinLeaningTrunkInServoing)
+TEST(Pipeline, FindsAThinLeaningTrunkWhenAllFramesAreKnownAndInServoing)
 {
+  findThinLeaningTrunk(Options(), 30);
   Options options;
   options.stages.servoing = true;
   findThinLeaningTrunk(options, 60);
-}
-
-TEST(Pipeline, OfWhatIsNoTrunkItTellsWhy)
-{
-  Pipeline pipeline(kCamera, kMount);
-  for (int k = 0; k < 30; ++k)
-    pipeline.process(byHand(k));
-  pipeline.finish();
-  for (const TrunkRecord &trunk : pipeline.map())
-    EXPECT_EQ(trunk.status == TrunkStatus::confirmed, trunk.reject_reason == RejectReason::none)
-        << toString(trunk.reject_reason);
 }
 
 TEST(Pipeline, AFrameThatIsNotOkKeepsItsReasonAndItsPose)
@@ -265,4 +251,3 @@ TEST(ViewCorrelation, OneViewSeenAgainAndAgainTeachesLittle)
   EXPECT_GT(shared, 0.95 * moved);
 }
 } // namespace
-} // namespace bole

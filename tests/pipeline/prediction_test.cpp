@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What hides what, and where the detectors need not look.
+#include "support/test.h"
+
 #include "pipeline/prediction.h"
 #include "pipeline/trunk_measurement.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <cmath>
-
-namespace bole
-{
 namespace
 {
 const Pose kMount = SmootherOptions::forwardCamera();
@@ -205,4 +203,3 @@ TEST(WeightOfView, IsTheShareOfTheWayThatMakesViewsIndependent)
   EXPECT_GT(weightOfView(here, here, options), 0); // holds the pose of a drone at rest
 }
 } // namespace
-} // namespace bole

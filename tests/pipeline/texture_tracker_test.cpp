@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "pipeline/texture_tracker.h"
-
 #include "support/drawn_bark.h"
+#include "support/test.h"
 
-#include <gtest/gtest.h>
+#include "pipeline/texture_tracker.h"
 
 namespace
 {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/files.h"
 #include "support/shell.h"
+#include "support/test.h"
 
 #include "output/best_view.h"
 #include "report/report_page.h"
-
-#include <gmock/gmock.h>
-
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 

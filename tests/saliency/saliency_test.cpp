@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/forest_flight.h"
 #include "support/roc.h"
+#include "support/test.h"
 #include "synthetic.h"
 
 #include "geometry/so3.h"
 #include "saliency/saliency.h"
 
-#include <gmock/gmock.h>
+using namespace bole;
 
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 using support::paint;
@@ -169,7 +166,7 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
 {
   if (!support::hasFlight("park-forward"))
     GTEST_SKIP() << "the rendered flights are not here: " << BOLE_SHARED_DATA_DIR;
-  const support::ForestFlight flight = support::readForestFlight("park-forward", 0, 110);
+  const support::ForestFlight flight = support::readForestFlight("park-forward", 111);
   SaliencyOptions options;
   options.near_range = 6;
   SaliencyEstimator estimator(flight.camera, options);
@@ -194,4 +191,3 @@ TEST(Saliency, TellsNearFromFarOnARenderedFlight)
   EXPECT_LT(worst_turn, 0.003); // 0.17 degrees
 }
 } // namespace
-} // namespace bole

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include <bole/vpFeatureTrunk.h>
-
-#include <Eigen/Geometry>
-
-#include <cmath>
-#include <gtest/gtest.h>
-#include <memory>
 #include <visp3/core/vpCylinder.h>
-#include <visp3/core/vpException.h>
 #include <visp3/visual_features/vpFeatureBuilder.h>
 #include <visp3/visual_features/vpFeaturePoint.h>
 #include <visp3/vs/vpServo.h>
@@ -113,9 +108,8 @@ TEST(vpFeatureTrunk, AgreesWithTheInteractionOfThePointsLinesOnTheCylindersLimbs
     for (int row = 0; row < 2; ++row) {
       for (unsigned int axis = 0; axis < 6; ++axis) {
         double chained = 0;
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < 4; ++k)
           chained += J(row, k) * L[k][axis];
-        }
         EXPECT_NEAR(chained, L_line[row][axis], 1e-6) << "row " << row << " axis " << axis;
       }
     }
@@ -226,14 +220,12 @@ double servoFreely(vpServo &task, Pose &wMc, const Pose &wMc_star, vpFeaturePoin
   }
   for (int k = 0; k < 300; ++k) {
     s.buildFrom(leaningTrunk(), wMc);
-    if (point) {
+    if (point)
       view(*point, wMc);
-    }
     const vpColVector v = task.computeControlLaw();
     bole::Vector6d step;
-    for (int n = 0; n < 6; ++n) {
+    for (int n = 0; n < 6; ++n)
       step[n] = v[n] / 30;
-    }
     wMc = wMc.plus(step);
   }
   return task.getError().infinityNorm();

@@ -2,18 +2,49 @@
 // Removing, merging, outliers and what leaves the window.
 #include "support/dense_reference.h"
 #include "support/flight.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
 #include <malloc.h>
-#include <visp3/core/vpException.h>
 
-namespace bole
-{
+using namespace bole;
+
 namespace
 {
 using namespace test;
 
 const FlightOptions kShort{60};
+
+/// Round after round past the same trunks.
+FlightOptions rounds(int count, int lap = 120)
+{
+  FlightOptions o;
+  o.lap = lap;
+  o.poses = count * lap;
+  return o;
+}
+
+/// A flight in which each trunk that was seen before frame \p from counts as new from then on.
+struct Halves
+{
+  Replay replay;
+  std::vector<int> first; ///< ids of before
+
+  Halves(const Flight &flight, const SmootherOptions &options, int from) : replay(flight, options)
+  {
+    while (replay.next < from)
+      replay.step();
+    first = replay.trunk_id;
+    replay.trunk_id.assign(flight.trunks.size(), -1);
+    replay.run();
+  }
+  void merge()
+  {
+    for (std::size_t j = 0; j < first.size(); ++j)
+      if (first[j] >= 0 && replay.trunk_id[j] >= 0)
+        replay.smoother.mergeTrunks(first[j], replay.trunk_id[j]);
+    replay.smoother.update();
+  }
+};
 
 TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
 {
@@ -35,28 +66,18 @@ TEST(Changes, RemovingATrunkLeavesTheOptimumOfTheRest)
 TEST(Changes, MergingTwoHalvesOfATrunkGivesTheGraphOfTheWhole)
 {
   const Flight flight = simulateFlight(kShort);
-  Replay whole(flight, smootherFor(kShort)), halves(flight, smootherFor(kShort));
+  Replay whole(flight, smootherFor(kShort));
+  Halves halves(flight, smootherFor(kShort), 20);
   whole.run();
-  std::vector<int> first;
-  for (int i = 0; i < 60; ++i) {
-    if (i == 20) { // from here on every trunk counts as new
-      first = halves.trunk_id;
-      halves.trunk_id.assign(flight.trunks.size(), -1);
-    }
-    halves.step();
-  }
 
-  for (std::size_t j = 0; j < first.size(); ++j)
-    if (first[j] >= 0 && halves.trunk_id[j] >= 0)
-      halves.smoother.mergeTrunks(first[j], halves.trunk_id[j]);
-  halves.smoother.update();
-  halves.smoother.optimize();
+  halves.merge();
+  halves.replay.smoother.optimize();
   whole.smoother.optimize();
 
-  EXPECT_EQ(halves.smoother.observationCount(), whole.smoother.observationCount());
-  for (std::size_t j = 0; j < first.size(); ++j)
-    if (first[j] >= 0) {
-      EXPECT_LT(halves.smoother.trunk(first[j]).minus(whole.smoother.trunk(whole.trunk_id[j])).norm(), 2e-3);
+  EXPECT_EQ(halves.replay.smoother.observationCount(), whole.smoother.observationCount());
+  for (std::size_t j = 0; j < halves.first.size(); ++j)
+    if (const int id = halves.first[j]; id >= 0) {
+      EXPECT_LT(halves.replay.smoother.trunk(id).minus(whole.smoother.trunk(whole.trunk_id[j])).norm(), 2e-3);
     }
 }
 
@@ -178,34 +199,23 @@ TEST(Changes, ATrunkThatWasForgottenStandsWhereItWasWhenItIsSeenAgain)
 /// Two halves of a trunk that both left a window that forgets: each says of the one trunk what it said before.
 TEST(Changes, TrunksThatLeftTheWindowAreMergedInItsPrior)
 {
-  FlightOptions o;
-  o.lap = 120;
-  o.poses = 2 * o.lap;
+  const FlightOptions o = rounds(2);
   const Flight flight = simulateFlight(o);
-  Replay whole(flight, forgetting(o, 30)), halves(flight, forgetting(o, 30));
+  Replay whole(flight, forgetting(o, 30));
+  Halves halves(flight, forgetting(o, 30), o.lap);
+  const Smoother &merged_one = halves.replay.smoother;
   whole.run();
-  std::vector<int> first;
-  for (int i = 0; i < o.poses; ++i) {
-    if (i == o.lap) { // from here on every trunk counts as new
-      first = halves.trunk_id;
-      halves.trunk_id.assign(flight.trunks.size(), -1);
-    }
-    halves.step();
-  }
   const auto apart = [&] {
-    return halves.smoother.pose(o.poses - 1).minus(whole.smoother.pose(o.poses - 1)).head<2>().norm();
+    return merged_one.pose(o.poses - 1).minus(whole.smoother.pose(o.poses - 1)).head<2>().norm();
   };
   const double before = apart();
 
-  for (std::size_t j = 0; j < first.size(); ++j)
-    if (first[j] >= 0 && halves.trunk_id[j] >= 0)
-      halves.smoother.mergeTrunks(first[j], halves.trunk_id[j]);
-  halves.smoother.update();
+  halves.merge();
 
   const double sigma = std::sqrt(whole.smoother.currentPoseCovariance().topLeftCorner<2, 2>().trace());
   EXPECT_LT(apart(), 0.5 * sigma);
   EXPECT_LT(apart(), before);
-  const double merged = std::sqrt(halves.smoother.currentPoseCovariance().topLeftCorner<2, 2>().trace());
+  const double merged = std::sqrt(merged_one.currentPoseCovariance().topLeftCorner<2, 2>().trace());
   EXPECT_NEAR(merged / sigma, 1, 0.15);
 }
 
@@ -273,9 +283,7 @@ struct Return
 
 Return afterRounds(int remembered)
 {
-  FlightOptions o;
-  o.lap = 120;
-  o.poses = 8 * o.lap;
+  const FlightOptions o = rounds(8);
   const Flight flight = simulateFlight(o);
   SmootherOptions options = forgetting(o, o.lap / 4);
   options.remembered = remembered;
@@ -299,9 +307,7 @@ TEST(Changes, RememberedTrunksTieTheRoundsTogetherThatTheWindowHasLeft)
 
 TEST(Changes, ThirtyRoundsStayAsNearToTheTruthAsTheySay)
 {
-  FlightOptions o;
-  o.lap = 120;
-  o.poses = 30 * o.lap;
+  FlightOptions o = rounds(30);
   o.sigma_position = 0.04;
   o.sigma_ratio = 0.2;
   o.seed = 2;
@@ -320,9 +326,7 @@ TEST(Changes, ThirtyRoundsStayAsNearToTheTruthAsTheySay)
 /// Bytes of the heap a frame that twelve rounds keep after the fourth, with trunks that are given up a frame later.
 double keptAFrame(int remembered)
 {
-  FlightOptions o;
-  o.lap = 100;
-  o.poses = 12 * o.lap;
+  const FlightOptions o = rounds(12, 100);
   const Flight flight = simulateFlight(o);
   SmootherOptions options = forgetting(o, 40);
   options.remembered = remembered;
@@ -362,4 +366,3 @@ TEST(Changes, AWindowThatForgetsKeepsAPoseAFrameAndNothingElse)
   EXPECT_LT(keptAFrame(0), kMost);
 }
 } // namespace
-} // namespace bole

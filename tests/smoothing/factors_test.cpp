@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "smoothing/factors.h"
 #include <bole/smoother.h>
 
-#include <functional>
-#include <gmock/gmock.h>
-#include <visp3/core/vpException.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using Eigen::MatrixXd;
@@ -117,4 +115,3 @@ TEST(Losses, WeightIsTheDerivativeOfRhoAndNeverRises)
   EXPECT_THROW(lossKindFromString("tukey"), vpException);
 }
 } // namespace
-} // namespace bole

@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/flight.h"
+#include "support/test.h"
 
 #include "smoothing/factors.h"
 #include <bole/graph.h>
 
-#include <gmock/gmock.h>
+using namespace bole;
 
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <sstream>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 using testing::HasSubstr;
@@ -217,4 +210,3 @@ TEST(ScaledGraph, AFactorThatIsNoneIsRefused)
   EXPECT_THROW(scaled(Graph(), -1), vpException);
 }
 } // namespace
-} // namespace bole

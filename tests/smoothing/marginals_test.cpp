@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/dense_reference.h"
 #include "support/flight.h"
+#include "support/test.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
+using namespace bole;
 
-#include <gmock/gmock.h>
-#include <limits>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 using namespace test;
@@ -243,4 +237,3 @@ TEST_F(OneTrunk, RefusesWhatTheCallerGotWrong)
   EXPECT_THROW(smoother.trunk(trunk), vpException);
 }
 } // namespace
-} // namespace bole

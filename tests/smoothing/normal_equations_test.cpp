@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "smoothing/normal_equations.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+using namespace bole;
 
-#include <gmock/gmock.h>
-#include <memory>
-#include <numeric>
-#include <random>
-#include <set>
-
-namespace bole
-{
 namespace
 {
 using Eigen::MatrixXd;
@@ -162,4 +155,3 @@ TEST(NormalEquations, HoldADirectionThatNothingIsKnownOf)
   EXPECT_TRUE(equations.solve().isApprox((VectorXd(5) << 2, 0, 0, -1, -1).finished()));
 }
 } // namespace
-} // namespace bole

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/dense_reference.h"
 #include "support/flight.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using namespace test;
@@ -111,4 +110,3 @@ TEST(Smoother, CostOfAnOptimisationIsThatOfAllFactorsAlsoWhereTheWindowForgets)
   }
 }
 } // namespace
-} // namespace bole

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "summary/square_root.h"
-
-#include <Eigen/Eigenvalues>
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <random>
 
 namespace
 {

@@ -11,9 +11,7 @@
 #include <vector>
 #include <visp3/core/vpImage.h>
 
-namespace bole
-{
-namespace support
+namespace bole::support
 {
 /// Area under the curve of true against false positives, from a histogram of scores in [0, 1].
 class RocCurve
@@ -63,5 +61,4 @@ inline vpImage<unsigned char> texturedAboveHorizon(const vpImage<unsigned char> 
     }
   return mask;
 }
-} // namespace support
-} // namespace bole
+} // namespace bole::support

@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the product is worth, as its users run it: maps and trajectories of flights whose truth is known.
 #include "run_bole.h"
+#include "support/test.h"
 
 #include "input/trajectory.h"
 #include "output/trunks_csv.h"
 #include <bole/evaluation.h>
 #include <bole/open_source.h>
 #include <bole/pose.h>
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fmt/format.h>
-#include <fstream>
 #include <ostream>
 #include <visp3/io/vpImageIo.h>
 #include <visp3/mbt/vpMbGenericTracker.h>

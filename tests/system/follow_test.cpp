@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole follow` as its users run it: the demonstration flight in a model of its wood.
 #include "run_bole.h"
+#include "support/test.h"
 
 #include "input/recorded_source.h"
 #include "mbt/cao_reader.h"
 #include <bole/open_source.h>
-
-#include <gmock/gmock.h>
 
 namespace
 {

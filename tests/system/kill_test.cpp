@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A run that is killed leaves either the old files or complete new ones.
-#include "input/recorded_source.h"
 #include "run_bole.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
-
+#include "input/recorded_source.h"
 #include <chrono>
 #include <csignal>
-#include <functional>
-#include <sstream>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>

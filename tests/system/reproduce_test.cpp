@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // `bole reproduce` as its users run it, on a short simulated flight.
 #include "run_bole.h"
-
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <sstream>
+#include "support/test.h"
 
 namespace
 {

@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What is left of a run that does not go to its end, or is not worth much.
 #include "run_bole.h"
+#include "support/test.h"
 
 #include "output/flight_trace.h"
 #include "output/trunks_csv.h"
 #include <bole/open_source.h>
-
-#include <gmock/gmock.h>
-
-#include <bole/visp.h>
-#include <cstdlib>
-#include <fmt/format.h>
-#include <random>
 #include <visp3/io/vpImageIo.h>
 
 namespace

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The command as its users run it: a whole flight, and their mistakes.
 #include "run_bole.h"
+#include "support/test.h"
 
-#include <gmock/gmock.h>
-
-#include <cmath>
-#include <cstdlib>
 #include <regex>
 
 namespace

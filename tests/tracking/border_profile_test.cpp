@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "gradient/gradient.h"
 #include "tracking/border_profile.h"
-
-#include <Eigen/Geometry>
-#include <gmock/gmock.h>
-
-#include <cmath>
 
 namespace
 {
@@ -47,18 +44,6 @@ TEST(BorderProfile, MeanAcrossIsTheMeanAlongTheMovedLine)
       EXPECT_NEAR(profile[std::size_t(k + 13)], meanAlongOnly(g, line.moved(offset, offset)), 1e-6) << x << ' ' << k;
     }
   }
-}
-
-TEST(BorderProfile, ARampHasItsSlopeAsContrast)
-{
-  std::vector<float> ramp, contrast;
-  for (int k = 0; k < 15; ++k)
-    ramp.push_back(3.f * float(k));
-  differentiate(ramp, contrast);
-  ASSERT_THAT(contrast, SizeIs(15));
-  for (std::size_t k = 3; k < 12; ++k)
-    EXPECT_NEAR(contrast[k], 3, 1e-5);
-  EXPECT_EQ(contrast[2], 0);
 }
 
 TEST(BorderProfile, GreyLevelsAndTheGradientImageGiveTheSamePeak)

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tracking/texture_shift.h"
-
 #include "support/drawn_bark.h"
+#include "support/test.h"
 
-#include <gtest/gtest.h>
+#include "tracking/texture_shift.h"
 
 namespace
 {
@@ -75,14 +74,11 @@ TEST_F(BarkShifts, AreFoundByACameraThatRolls)
   EXPECT_NEAR(*shift, expected_px(), 0.3);
 }
 
-TEST_F(BarkShifts, AreNotToldByBarkThatRepeatsItself)
+TEST_F(BarkShifts, AreNotToldByBarkThatRepeatsItselfNorByATrunkOfAFewPixels)
 {
   m_bark.repeats = true;
   EXPECT_FALSE(shift_px());
-}
-
-TEST_F(BarkShifts, AreNotToldByATrunkOfAFewPixels)
-{
+  m_bark.repeats = false;
   m_trunk.xy.x() = 7;
   EXPECT_FALSE(shift_px());
 }

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "geometry/so3.h"
 #include "summary/square_root.h"
 #include "tracking/trunk_tracker.h"
 #include <bole/open_source.h>
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
 
 namespace
 {
@@ -141,31 +138,18 @@ TEST(TrunkTracker, KeepsTheKnownWidthWhereARimOfSunGrows)
   EXPECT_LT(std::abs(moved_px(together)), 0.6);
 }
 
-TEST(TrunkTracker, SaysThatABlankImageHasNoBorder)
+TEST(TrunkTracker, TellsOfABlankImageOfTheOtherPolarityAndOfNaN)
 {
-  vpImage<unsigned char> image(240, 320, 0);
-  const TrackingResult result =
-      trackTrunk(computeGradient(image), PinholeCamera(), predictionNear(seen(), Vector4d::Zero()), TrackingOptions());
-  EXPECT_EQ(result.status, TrackingStatus::no_border);
-}
-
-TEST(TrunkTracker, NoticesABorderOfTheOtherPolarity)
-{
+  const auto statusOf = [](const vpImage<unsigned char> &image, const TrackingPrediction &prediction) {
+    return trackTrunk(computeGradient(image), PinholeCamera(), prediction, TrackingOptions()).status;
+  };
   TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  EXPECT_EQ(statusOf(vpImage<unsigned char>(240, 320, 0), prediction), TrackingStatus::no_border);
   prediction.left_contrast = -0.2;
   prediction.right_contrast = 0.2;
-  const auto image = drawn(PinholeCamera(), seen(), 220, 90);
-  EXPECT_EQ(trackTrunk(computeGradient(image), PinholeCamera(), prediction, TrackingOptions()).status,
-            TrackingStatus::sign_changed);
-}
-
-TEST(TrunkTracker, NeverTracksFromNaN)
-{
-  TrackingPrediction prediction = predictionNear(seen(), Vector4d::Zero());
+  EXPECT_EQ(statusOf(drawn(PinholeCamera(), seen(), 220, 90), prediction), TrackingStatus::sign_changed);
   prediction.relative.log_ratio = std::numeric_limits<double>::quiet_NaN();
-  const auto image = drawn(PinholeCamera(), seen(), 40, 200);
-  EXPECT_EQ(trackTrunk(computeGradient(image), PinholeCamera(), prediction, TrackingOptions()).status,
-            TrackingStatus::not_visible);
+  EXPECT_EQ(statusOf(drawn(PinholeCamera(), seen(), 40, 200), prediction), TrackingStatus::not_visible);
 }
 
 /// A gradient image that is a smooth wave across and along the columns: its interpolation is smooth as well.

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
-#include "support/files.h"
-#include "support/units.h"
+#include "support/test.h"
 
 #include "baseline/comparison.h"
 #include "baseline/comparison_report.h"
+#include "support/units.h"
 #include <bole/cylinder.h>
 #include <bole/vpMbTrunkTracker.h>
-
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-
 #include <opencv2/videoio.hpp>
 
 namespace
@@ -80,7 +77,7 @@ TEST(TestFlightOdometry, PredictsTheStepOnTheGivenPoseAndItsOwnHeightAndTilt)
   EXPECT_NEAR(flight.predicted(2, low.inverse()).inverse().t.z(), 1.2, 1e-9);
 }
 
-TEST(TestFlightOdometry, TurnsTheStepWithTheYawOfTheGivenPose)
+TEST(TestFlightOdometry, TurnsTheStepWithTheYawOfTheGivenPoseAndTheCovarianceGrowsByTheStep)
 {
   const TestFlight flight = drawnFlight(3);
   const Pose turned =
@@ -89,11 +86,6 @@ TEST(TestFlightOdometry, TurnsTheStepWithTheYawOfTheGivenPose)
   const Eigen::Vector3d predicted = flight.predicted(2, turned).inverse().t - turned.inverse().t;
   EXPECT_NEAR(predicted.x(), -step.y(), 1e-9);
   EXPECT_NEAR(predicted.y(), step.x(), 1e-9);
-}
-
-TEST(TestFlightOdometry, CovarianceGrowsByTheStepAndIsHeldWhereOdometryKnows)
-{
-  const TestFlight flight = drawnFlight(3);
   const Pose cMo = flight.frames[1].cMo;
   const Matrix6d before = Matrix6d::Identity() * 1e-4;
   const Matrix6d covariance = flight.predictedCovariance(cMo, cMo, before);

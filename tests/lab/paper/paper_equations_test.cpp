@@ -2,18 +2,12 @@
 // The equations of the paper, each against what it says, worked out by brute force: whole images, sums and integrals,
 // no short cuts.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "paper/joint_optimum.h"
 #include "paper/paper_mapper.h"
 #include "support/units.h"
 #include <bole/smoother.h>
-
-#include <Eigen/Geometry>
-#include <gmock/gmock.h>
-
-#include <array>
-#include <cmath>
-#include <random>
 
 namespace
 {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The paper's method on drawn trees: what the paper says, and nothing else.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "paper/paper_mapper.h"
 #include "support/units.h"
 #include <bole/smoother.h>
-
-#include <Eigen/Cholesky>
-#include <gmock/gmock.h>
 
 namespace
 {
@@ -90,17 +88,9 @@ TEST(PaperMapper, ATreeWhoseEnergyIsNotConvexEndsAndStaysInTheMap)
   EXPECT_STREQ(seen[0].outcome, "negative curvature");
   EXPECT_THAT(mapping.seeNothing(), IsEmpty()) << "it is looked for no more";
   EXPECT_THAT(mapping.mapper.map(), SizeIs(1));
-}
-
-TEST(PaperMapper, WhatIsFoundAgainIsAnotherTree)
-{
-  Mapping mapping;
   mapping.see(kOneTree);
   mapping.see(kOneTree);
-  mapping.seeNothing();
-  mapping.see(kOneTree);
-  mapping.see(kOneTree);
-  EXPECT_THAT(mapping.mapper.map(), SizeIs(2));
+  EXPECT_THAT(mapping.mapper.map(), SizeIs(2)) << "what is found again is another tree";
   EXPECT_EQ(mapping.observed(), 1u);
 }
 

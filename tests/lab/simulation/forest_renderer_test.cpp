@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/units.h"
+#include "support/test.h"
 
 #include "simulation/forest.h"
 #include "simulation/forest_renderer.h"
 #include "simulation/h264_link.h"
 #include "simulation/random.h"
 #include "simulation/simulated_flight.h"
+#include "support/units.h"
 
-#include <gtest/gtest.h>
+using namespace bole;
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 /// A single straight pole 4 m ahead on flat ground, and scenery without a tree.
@@ -50,15 +44,25 @@ std::pair<int, int> columnsOfTrunk(const RenderedFrame &frame, int row)
   return {first, last};
 }
 
-TEST(ForestRenderer, BordersOfAStraightTrunkAreThoseOfTheRelativeTrunk)
+class SeenPole : public testing::Test
 {
-  const Forest forest = singlePole();
-  ForestRenderer renderer(forest, {});
-  RenderedFrame frame;
-  const Pose wMc = cameraAt({0, 0, 1.2}, {0.05, 0.03, 0.04});
-  renderer.render(wMc, frame, true);
+protected:
+  /// The trunk as the camera sees it from \p wMc.
+  RelativeTrunk relativeFrom(const Pose &wMc) const
+  {
+    return relativeTrunk(wMc, Pose(), m_forest.trunks.front().cylinder());
+  }
+  const Forest m_forest = singlePole();
+  RenderedFrame m_frame;
+};
 
-  const RelativeTrunk relative = relativeTrunk(wMc, Pose(), forest.trunks.front().cylinder());
+TEST_F(SeenPole, ItsBordersAreThoseOfTheRelativeTrunk)
+{
+  ForestRenderer renderer(m_forest, {});
+  const Pose wMc = cameraAt({0, 0, 1.2}, {0.05, 0.03, 0.04});
+  renderer.render(wMc, m_frame, true);
+
+  const RelativeTrunk relative = relativeFrom(wMc);
   const PinholeCamera camera = renderer.camera().pinhole;
   double left_error = 0, right_error = 0;
   int rows = 0;
@@ -71,46 +75,43 @@ TEST(ForestRenderer, BordersOfAStraightTrunkAreThoseOfTheRelativeTrunk)
     };
     const int row =
         static_cast<int>(std::lround(camera.project(relative.borderDirection(Border::left, elevation)).y()));
-    const auto [first, last] = columnsOfTrunk(frame, row);
-    left_error += first - 0.5 - columnAt(Border::left, row);
-    right_error += last + 0.5 - columnAt(Border::right, row);
-    EXPECT_NEAR(first - 0.5, columnAt(Border::left, row), 0.7);
-    EXPECT_NEAR(last + 0.5, columnAt(Border::right, row), 0.7);
+    const auto [first, last] = columnsOfTrunk(m_frame, row);
+    const double left = first - 0.5 - columnAt(Border::left, row), right = last + 0.5 - columnAt(Border::right, row);
+    left_error += left;
+    right_error += right;
+    EXPECT_NEAR(left, 0, 0.7);
+    EXPECT_NEAR(right, 0, 0.7);
   }
   EXPECT_NEAR(left_error / rows, 0, 0.1);
   EXPECT_NEAR(right_error / rows, 0, 0.1);
 }
 
-TEST(ForestRenderer, DepthIsAlongTheOpticalAxis)
+TEST_F(SeenPole, DepthIsAlongTheOpticalAxis)
 {
-  const Forest forest = singlePole();
-  ForestRenderer renderer(forest, {});
-  RenderedFrame frame;
-  renderer.render(cameraAt({0, 0, 1.2}), frame, true);
+  ForestRenderer renderer(m_forest, {});
+  renderer.render(cameraAt({0, 0, 1.2}), m_frame, true);
   const int column = static_cast<int>(std::lround(159.5 - 200 * 0.3 / 4));
-  EXPECT_EQ(frame.trunk_id[120][column], 0);
-  EXPECT_NEAR(frame.depth[120][column], 3800, 10);
+  EXPECT_EQ(m_frame.trunk_id[120][column], 0);
+  EXPECT_NEAR(m_frame.depth[120][column], 3800, 10);
   // Ground: 1.2 m below the camera, seen (v - cy) / f below the horizon.
-  EXPECT_NEAR(frame.depth[219][20], 1200 * 200 / 99.5, 10);
-  EXPECT_EQ(frame.trunk_id[219][20], 65535);
-  EXPECT_EQ(frame.depth[5][20], 65535);
+  EXPECT_NEAR(m_frame.depth[219][20], 1200 * 200 / 99.5, 10);
+  EXPECT_EQ(m_frame.trunk_id[219][20], 65535);
+  EXPECT_EQ(m_frame.depth[5][20], 65535);
 }
 
-TEST(ForestRenderer, MotionBlursWhatAStillCameraSeesSharp)
+TEST_F(SeenPole, MotionBlursWhatAStillCameraSeesSharp)
 {
   RendererOptions options;
   options.read_noise = options.shot_noise = 0;
   options.samples_per_pixel = 16;
-  const Forest forest = singlePole();
-  ForestRenderer renderer(forest, options);
+  ForestRenderer renderer(m_forest, options);
   RenderedFrame still, moving;
   renderer.render(cameraAt({0, 0, 1.2}), still);
   renderer.render(cameraAt({0, 0, 1.2}, {0, 0, -0.03}), cameraAt({0, 0, 1.2}, {0, 0, 0.03}), moving);
   const auto steepest = [](const vpImage<unsigned char> &image) {
     int most = 0;
-    for (unsigned column = 90; column < 230; ++column) {
+    for (unsigned column = 90; column < 230; ++column)
       most = std::max(most, std::abs(int(image[60][column + 1]) - int(image[60][column])));
-    }
     return most;
   };
   EXPECT_LT(2 * steepest(moving.image), steepest(still.image));
@@ -134,11 +135,9 @@ TEST(ForestRenderer, SunCastsTheShadowOfATrunk)
     const Eigen::Vector3d p = down.transpose() * (offset - Eigen::Vector3d(0, 0, 1.2));
     const Eigen::Vector2d u = renderer.camera().pinhole.project(p);
     double sum = 0;
-    for (int dy = -12; dy <= 12; ++dy) {
-      for (int dx = -12; dx <= 12; ++dx) {
+    for (int dy = -12; dy <= 12; ++dy)
+      for (int dx = -12; dx <= 12; ++dx)
         sum += frame.image[static_cast<int>(u.y()) + dy][static_cast<int>(u.x()) + dx];
-      }
-    }
     return sum / 625;
   };
   const Eigen::Vector3d none = Eigen::Vector3d::Zero();
@@ -146,40 +145,33 @@ TEST(ForestRenderer, SunCastsTheShadowOfATrunk)
   EXPECT_LT(1.2 * grey(none), grey(-0.45 * side));
 }
 
-TEST(ForestRenderer, AutomaticExposureReachesItsTargetInSteps)
+TEST_F(SeenPole, AutomaticExposureReachesItsTargetInSteps)
 {
   RendererOptions options;
   options.exposure_target = 100;
-  const Forest forest = singlePole();
-  ForestRenderer renderer(forest, options);
-  RenderedFrame frame;
-  renderer.render(cameraAt({0, 0, 1.2}), frame);
-  double sum = 0;
-  for (unsigned k = 0; k < frame.image.getSize(); ++k) {
-    sum += frame.image.bitmap[k];
-  }
-  EXPECT_NEAR(sum / frame.image.getSize(), 100, 6);
-  const double steps = std::log(frame.gain) / std::log1p(options.gain_step);
+  ForestRenderer renderer(m_forest, options);
+  renderer.render(cameraAt({0, 0, 1.2}), m_frame);
+  const unsigned size = m_frame.image.getSize();
+  EXPECT_NEAR(std::accumulate(m_frame.image.bitmap, m_frame.image.bitmap + size, 0.0) / size, 100, 6);
+  const double steps = std::log(m_frame.gain) / std::log1p(options.gain_step);
   EXPECT_NEAR(steps, std::round(steps), 1e-9);
 }
 
-TEST(ForestRenderer, LensBendsThePicture)
+TEST_F(SeenPole, LensBendsThePicture)
 {
   RendererOptions options;
   options.camera = {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
-  const Forest forest = singlePole();
-  ForestRenderer renderer(forest, options);
-  RenderedFrame frame;
+  ForestRenderer renderer(m_forest, options);
   const Pose wMc = cameraAt({0, 0, 1.2}, {0, 0, 0.6}); // the trunk near the right border
-  renderer.render(wMc, frame, true);
-  const RelativeTrunk relative = relativeTrunk(wMc, Pose(), forest.trunks.front().cylinder());
+  renderer.render(wMc, m_frame, true);
+  const RelativeTrunk relative = relativeFrom(wMc);
   const auto bent = [&](Border border) {
     const Eigen::Vector3d d = relative.borderDirection(border, 0);
     return options.camera.distort(d.head<2>() / d.z());
   };
   const Eigen::Vector2d left = bent(Border::left), right = bent(Border::right);
   ASSERT_LT(right.x(), 318);
-  const auto [first, last] = columnsOfTrunk(frame, static_cast<int>(std::lround(left.y())));
+  const auto [first, last] = columnsOfTrunk(m_frame, static_cast<int>(std::lround(left.y())));
   EXPECT_NEAR(first, left.x(), 1.0);
   EXPECT_NEAR(last, right.x(), 1.0);
 }
@@ -197,9 +189,8 @@ TEST(H264Link, LowerBitRateLosesMore)
       const vpImage<unsigned char> sent = frame.image;
       link.pass(frame.image);
       *bytes += link.lastBytes();
-      for (unsigned n = 0; n < sent.getSize(); ++n) {
+      for (unsigned n = 0; n < sent.getSize(); ++n)
         loss += std::abs(int(sent.bitmap[n]) - int(frame.image.bitmap[n]));
-      }
     }
     return loss / (10.0 * 320 * 240);
   };
@@ -215,9 +206,8 @@ TEST(H264Link, RefusesOddSizes) { EXPECT_THROW(H264Link(321, 240, 15, 1000), vpE
 std::vector<Eigen::Vector3d> straightPath(double length)
 {
   std::vector<Eigen::Vector3d> path;
-  for (double x = 0; x <= length; x += 0.1) {
+  for (double x = 0; x <= length; x += 0.1)
     path.push_back({x, 0, 1.2});
-  }
   return path;
 }
 
@@ -279,9 +269,7 @@ TEST(Terrain, IsFlatAtTheOriginAndSmooth)
 {
   const Terrain terrain(5, 0.1);
   EXPECT_NEAR(terrain.height(0, 0), 0, 1e-12);
-  for (double x = -20; x < 20; x += 0.37) {
+  for (double x = -20; x < 20; x += 0.37)
     EXPECT_LT(std::abs(terrain.height(x + 0.01, 2) - terrain.height(x, 2)), 0.01);
-  }
 }
 } // namespace
-} // namespace bole

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "simulation/quadrotor.h"
 
-#include <cmath>
-#include <gtest/gtest.h>
-#include <limits>
-#include <visp3/core/vpException.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 QuadrotorOptions calm()
@@ -38,12 +35,19 @@ QuadrotorCommand tilted(double forward, double left)
   return command;
 }
 
+/// One that has hovered since it took off.
+Quadrotor flying(const QuadrotorOptions &options, double heading = 0)
+{
+  Quadrotor body(options, {0, 0}, heading, 0);
+  body.command(hovering());
+  fly(body, 6);
+  return body;
+}
+
 TEST(Quadrotor, TiltedForLongTheSpeedIsWhereDragBalancesThrust)
 {
   const QuadrotorOptions options = calm();
-  Quadrotor body(options, {0, 0}, 0.5, 0);
-  body.command(hovering());
-  fly(body, 5);
+  Quadrotor body = flying(options, 0.5);
   body.command(tilted(0.3, 0));
   fly(body, 40);
   const double speed = 9.81 * std::tan(0.3 * options.largest_tilt) / options.drag;
@@ -55,9 +59,7 @@ TEST(Quadrotor, HalfTheTiltGivesTheAccelerationMeasuredOnARealDrone)
 {
   QuadrotorOptions options = calm();
   options.drag = 0;
-  Quadrotor body(options, {0, 0}, 0, 0);
-  body.command(hovering());
-  fly(body, 5);
+  Quadrotor body = flying(options);
   body.command(tilted(0.5, 0));
   fly(body, 2);
   EXPECT_NEAR(body.acceleration().x(), 1.4, 0.05);
@@ -66,9 +68,7 @@ TEST(Quadrotor, HalfTheTiltGivesTheAccelerationMeasuredOnARealDrone)
 TEST(Quadrotor, TheTiltKeepsItsLimitButForTheOvershootOfItsDamping)
 {
   const QuadrotorOptions options = calm();
-  Quadrotor body(options, {0, 0}, 0, 0);
-  body.command(hovering());
-  fly(body, 5);
+  Quadrotor body = flying(options);
   const double overshoot =
       std::exp(-M_PI * options.tilt_damping / std::sqrt(1 - options.tilt_damping * options.tilt_damping));
   double most = 0;
@@ -87,9 +87,7 @@ TEST(Quadrotor, CommandsComeLate)
 {
   QuadrotorOptions options = calm();
   options.command_delay = 0.2;
-  Quadrotor body(options, {0, 0}, 0, 0);
-  body.command(hovering());
-  fly(body, 6);
+  Quadrotor body = flying(options);
   QuadrotorCommand turn = tilted(0, 0);
   turn.turn = 1;
   const double before = body.pose().R(1, 0);
@@ -131,4 +129,3 @@ TEST(Quadrotor, RefusesOptionsOutOfRange)
   EXPECT_THROW(Quadrotor(options, {0, 0}, 0, 0), vpException);
 }
 } // namespace
-} // namespace bole

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "simulation/vpSimulatorArDrone.h"
 #include "support/units.h"
-
-#include <cmath>
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
 
 using namespace bole;
 
@@ -167,45 +165,30 @@ TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
   EXPECT_NEAR(robot.body().pose().t.z(), 0.05, 0.01);
 }
 
-TEST(SimulatorArDrone, FramesComeAtTheirRateAndLate)
-{
-  vpSimulatorArDrone robot(clearing(), calm());
-  takeOff(robot);
-  std::int64_t last = 0;
-  for (int k = 0; k < 4; ++k) {
-    Frame frame;
-    robot.setVelocity(vpRobot::REFERENCE_FRAME, velocity(1, 0, 0, 0.5));
-    ASSERT_TRUE(robot.next(frame));
-    EXPECT_NEAR(robot.time() - 1e-9 * static_cast<double>(frame.stamp_ns), calm().video_delay_s, 0.006);
-    EXPECT_EQ(frame.index, static_cast<std::size_t>(k));
-    EXPECT_EQ(frame.image.getWidth(), 80u);
-    if (k > 0) {
-      EXPECT_EQ(frame.stamp_ns - last, 100000000);
-    }
-    last = frame.stamp_ns;
-  }
-}
-
-TEST(SimulatorArDrone, TheGyroIntegratesToTheTurnBetweenFrames)
+TEST(SimulatorArDrone, FramesComeAtTheirRateAndLateWithAGyroThatIntegratesToTheirTurn)
 {
   auto options = calm();
   options.sensors.gyro_noise = options.sensors.gyro_bias = 0;
   vpSimulatorArDrone robot(clearing(), options);
   takeOff(robot);
-  std::optional<Pose> last;
+  Frame last;
   for (int k = 0; k < 10; ++k) {
     Frame frame;
     robot.setVelocity(vpRobot::REFERENCE_FRAME, velocity(1, 0.5, 0, 1));
     ASSERT_TRUE(robot.next(frame));
+    EXPECT_NEAR(robot.time() - 1e-9 * static_cast<double>(frame.stamp_ns), options.video_delay_s, 0.006);
+    EXPECT_EQ(frame.index, static_cast<std::size_t>(k));
+    EXPECT_EQ(frame.image.getWidth(), 80u);
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
     for (const GyroSample &sample : frame.gyro)
       turn = turn * expSo3(0.005 * sample.rate);
-    if (last) {
+    if (k > 0) {
+      EXPECT_EQ(frame.stamp_ns - last.stamp_ns, 100000000);
       ASSERT_EQ(frame.gyro.size(), 20u);
-      EXPECT_LT(logSo3(turn.transpose() * last->R.transpose() * frame.wMb_truth->R).norm(), 1e-3);
+      EXPECT_LT(logSo3(turn.transpose() * last.wMb_truth->R.transpose() * frame.wMb_truth->R).norm(), 1e-3);
       EXPECT_GT(k < 3 ? 1 : logSo3(turn).norm(), 0.05);
     }
-    last = frame.wMb_truth;
+    last = frame;
   }
 }
 
@@ -229,20 +212,14 @@ TEST(SimulatorArDrone, SameSeedAndCommandsSameFlight)
   EXPECT_EQ(frames[0].wMb_odometry->t, frames[1].wMb_odometry->t);
 }
 
-TEST(SimulatorArDrone, ReportsTheNearestBarkItPassed)
+TEST(SimulatorArDrone, ReportsTheNearestBarkItPassedAndItsPoseFilter)
 {
   const Forest forest = clearing();
   vpSimulatorArDrone robot(forest, calm());
-  takeOff(robot);
-  EXPECT_NEAR(robot.leastClearance(), forest.distanceToBark({0, 0, 1}), 0.2);
-}
-
-TEST(SimulatorArDrone, ThePoseFilterIsWhatGetPositionSays)
-{
-  vpSimulatorArDrone robot(clearing(), calm());
   vpColVector q;
   EXPECT_THROW(robot.getPosition(vpRobot::REFERENCE_FRAME, q), vpException);
   takeOff(robot);
+  EXPECT_NEAR(robot.leastClearance(), forest.distanceToBark({0, 0, 1}), 0.2);
   Frame frame;
   robot.next(frame);
   robot.getPosition(vpRobot::REFERENCE_FRAME, q);

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "tasks/servo_task.h"
 #include <bole/open_source.h>
 
-#include <Eigen/Geometry>
+using namespace bole;
 
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 /// Flies ahead while it sees what it is told that it sees.
@@ -51,16 +48,21 @@ TEST_F(Safety, HoversAtOnceWhereAFrameIsNotOk)
   }
 }
 
-TEST_F(Safety, HoversAfterTheTargetWasNotSeenForLostFrames)
+/// What is done in frames that are good (o), not ok (x) or without the target (-): flies (f) or hovers (h).
+TEST_F(Safety, HoversWhereATargetWasNotSeenForLongAndUntilFramesAreSureInARow)
 {
   SafetyOptions options;
   options.lost_frames = 4;
-  Ahead task(options);
-  ASSERT_FALSE(hovers(task));
-  task.is_in_view = false;
-  for (int k = 0; k < 3; ++k)
-    EXPECT_FALSE(hovers(task)) << k;
-  EXPECT_TRUE(hovers(task));
+  options.sure_frames = 3;
+  for (const auto &[seen, done] : {std::pair<std::string, std::string>{"o----", "ffffh"}, {"xooxooo", "hhhhhhf"}}) {
+    Ahead task(options);
+    std::string does;
+    for (const char frame : seen) {
+      task.is_in_view = frame != '-';
+      does += hovers(task, frame == 'x' ? FrameStatus::corrupt : FrameStatus::ok) ? 'h' : 'f';
+    }
+    EXPECT_EQ(does, done) << seen;
+  }
 }
 
 TEST_F(Safety, GivesATargetUpAfterGoodFramesWithoutItAndNotForBadOnes)
@@ -81,20 +83,6 @@ TEST_F(Safety, GivesATargetUpAfterGoodFramesWithoutItAndNotForBadOnes)
   EXPECT_EQ(task.given_up, 0);
   EXPECT_TRUE(hovers(task)) << "hovers until it has found another";
   EXPECT_EQ(task.given_up, 1);
-}
-
-TEST_F(Safety, GoesOnOnlyAfterSureFramesInARow)
-{
-  SafetyOptions options;
-  options.sure_frames = 3;
-  Ahead task(options);
-  EXPECT_TRUE(hovers(task, FrameStatus::corrupt));
-  EXPECT_TRUE(hovers(task));
-  EXPECT_TRUE(hovers(task));
-  EXPECT_TRUE(hovers(task, FrameStatus::corrupt)); // not in a row
-  EXPECT_TRUE(hovers(task));
-  EXPECT_TRUE(hovers(task));
-  EXPECT_FALSE(hovers(task));
 }
 
 TEST_F(Safety, AnOdometryThatIsContradictedEndsTheTaskAndAGyroDoesNot)
@@ -158,4 +146,3 @@ TEST(Towards, TurnsTheShortWayAndSpeaksInTheBody)
   EXPECT_GT(v(3), 0.2); // over pi, not back through zero
 }
 } // namespace
-} // namespace bole

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "obstacles.h"
+#include "support/test.h"
 
-#include <cmath>
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using test::obstacleAt;
@@ -125,4 +122,3 @@ TEST(Surroundings, WhereTheDroneHasBeenIsFree)
   EXPECT_EQ(around.roomAt({0, 1.7}), 0);
 }
 } // namespace
-} // namespace bole

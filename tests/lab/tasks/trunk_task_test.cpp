@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The control law on exact features: a camera that moves as it is told, before a trunk.
 #include "support/drawn_trunks.h"
+#include "support/test.h"
 
 #include "support/units.h"
 #include "tasks/trunk_task.h"
 #include <bole/open_source.h>
 #include <bole/pipeline.h>
 
-#include <Eigen/Geometry>
+using namespace bole;
 
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
-
-namespace bole
-{
 namespace
 {
 constexpr double kStep = 0.02;
@@ -34,14 +30,21 @@ struct Flight
   {
     wMb = {wMb.R * expSo3({0, 0, kStep * v(3)}), wMb.t + wMb.R * Eigen::Vector3d(kStep * v.head<3>())};
   }
+  /// Obeys \p task for \p steps; \p push is added to what it asks.
+  void follow(TrunkTask &task, double believed_radius, int steps, const Eigen::Vector4d &push = Eigen::Vector4d::Zero())
+  {
+    for (int k = 0; k < steps; ++k)
+      move(task.velocityFor(feature(), believed_radius, k * kStep, 0) + push);
+  }
   double distance() const { return feature().distance(); }
 };
 
-/// Asks \p task as one that believes the drone to obey at once, as this one does.
-TrunkTaskOptions atOnce()
+/// Of a task that believes the drone to obey at once, as this one does.
+TrunkTaskOptions atOnce(double ratio)
 {
   TrunkTaskOptions options;
   options.response = {0, 0, 0};
+  options.ratio = ratio;
   return options;
 }
 
@@ -55,49 +58,41 @@ Flight before(double x, double y, double radius)
 TEST(TrunkTask, TheErrorDecaysAtTheGain)
 {
   Flight flight = before(3.3, 0.4, 0.2);
-  TrunkTaskOptions options = atOnce();
+  TrunkTaskOptions options = atOnce(TrunkTaskOptions().ratio);
   options.distance = 3;
   options.gain = 0.5;
   TrunkTask task(flight.bMc, options);
   const double bearing = flight.feature().bearing(), ratio = std::log(flight.distance() / 3);
-  for (int k = 0; k < 100; ++k) // 2 s
-    flight.move(task.velocityFor(flight.feature(), 0.2, k * kStep, 0));
+  flight.follow(task, 0.2, 100); // 2 s
   const double left = std::exp(-0.5 * 2);
   EXPECT_NEAR(flight.feature().bearing() / bearing, left, 0.03);
   EXPECT_NEAR(std::log(flight.distance() / 3) / ratio, left, 0.03);
 }
 
-TEST(TrunkTask, HoldsTheBearingAskedForAndNotOnlyStraightAhead)
+TEST(TrunkTask, HoldsTheBearingAndRatioAskedForAlsoWithAWrongRadiusAndUnderASteadyPush)
 {
-  Flight flight = before(4, -0.5, 0.15);
-  TrunkTaskOptions options = atOnce();
-  options.bearing = 0.2;
-  options.ratio = 0.06;
-  TrunkTask task(flight.bMc, options);
-  for (int k = 0; k < 2000; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0));
-  EXPECT_NEAR(flight.feature().bearing(), 0.2, 1e-3);
-  EXPECT_NEAR(flight.distance(), 0.15 / 0.06, 1e-2);
-}
-
-TEST(TrunkTask, AWrongRadiusSlowsButDoesNotMoveTheRatioItKeeps)
-{
-  Flight flight = before(4, 0, 0.15);
-  TrunkTaskOptions options = atOnce();
-  options.ratio = 0.06;
-  TrunkTask task(flight.bMc, options);
-  for (int k = 0; k < 2500; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.25, k * kStep, 0)); // believes 0.25 m
-  EXPECT_NEAR(std::exp(flight.feature().logRatio()), 0.06, 1e-3);
+  struct Case
+  {
+    Flight flight;
+    double bearing, ratio, believed_radius, distance_within;
+    Eigen::Vector4d push = Eigen::Vector4d::Zero();
+  };
+  for (Case c : {Case{before(4, -0.5, 0.15), 0.2, 0.06, 0.15, 1e-2}, Case{before(4, 0, 0.15), 0, 0.06, 0.25, 0.04},
+                 Case{before(3, 0, 0.15), 0, 0.05, 0.15, 0.005, {-0.05, 0.1, 0, 0.02}}}) {
+    TrunkTaskOptions options = atOnce(c.ratio);
+    options.bearing = c.bearing;
+    TrunkTask task(c.flight.bMc, options);
+    c.flight.follow(task, c.believed_radius, 2500, c.push);
+    EXPECT_NEAR(c.flight.feature().bearing(), c.bearing, 1e-3);
+    EXPECT_NEAR(c.flight.distance(), 0.15 / c.ratio, c.distance_within);
+  }
 }
 
 TEST(TrunkTask, WindThatOdometryShowsMovesItLess)
 {
   const auto mostOff = [](bool is_told) {
     Flight flight = before(3, 0, 0.15);
-    TrunkTaskOptions options = atOnce();
-    options.ratio = 0.05;
-    TrunkTask task(flight.bMc, options);
+    TrunkTask task(flight.bMc, atOnce(0.05));
     double most = 0;
     Pose last = flight.wMb;
     for (int k = 0; k < 60; ++k) {
@@ -134,8 +129,7 @@ TEST(TrunkTask, BacksOffWhereItsPredictionReachesTheBark)
 TEST(TrunkTask, CirclesAtTheRatioAndTheSpeedAskedFor)
 {
   Flight flight = before(2.5, 0, 0.15);
-  TrunkTaskOptions options = atOnce();
-  options.ratio = 0.06;
+  TrunkTaskOptions options = atOnce(0.06);
   options.speed = 0.5;
   TrunkTask task(flight.bMc, options);
   double turned = 0;
@@ -148,18 +142,6 @@ TEST(TrunkTask, CirclesAtTheRatioAndTheSpeedAskedFor)
     ASSERT_NEAR(flight.distance(), 2.5, 0.05);
   }
   EXPECT_NEAR(std::abs(turned), 32 * 0.5 / 2.5, 0.1);
-}
-
-TEST(TrunkTask, ASteadyPushMovesNothing)
-{
-  Flight flight = before(3, 0, 0.15);
-  TrunkTaskOptions options = atOnce();
-  options.ratio = 0.05;
-  TrunkTask task(flight.bMc, options);
-  for (int k = 0; k < 1000; ++k)
-    flight.move(task.velocityFor(flight.feature(), 0.15, k * kStep, 0) + Eigen::Vector4d(-0.05, 0.1, 0, 0.02));
-  EXPECT_NEAR(flight.distance(), 3, 0.005);
-  EXPECT_NEAR(flight.feature().bearing(), 0, 0.001);
 }
 
 /// A drone that hears a command \p delay after the frame it answers and takes its time to obey.
@@ -321,6 +303,12 @@ protected:
         return value;
     return 1e3;
   }
+  void find()
+  {
+    while (m_task.target() < 0 && m_frame < 400)
+      see(0.2, true);
+    ASSERT_EQ(m_task.target(), 7);
+  }
   /// By how much the task believes itself too far from the trunk [%].
   double distanceError() const { return error("distance [%]"); }
   /// By how much a pose that is turned for one frame moves the bearing that is believed [degrees].
@@ -339,9 +327,7 @@ protected:
 
 TEST_F(OneTrunk, IsAtItsDistanceAlsoWhereTheFirstImageMissedIt)
 {
-  while (m_task.target() < 0 && m_frame < 400)
-    see(0.2, true);
-  ASSERT_EQ(m_task.target(), 7);
+  find();
   see(0.2, false);
   for (int k = 0; k < 30; ++k) {
     see(0.2, true);
@@ -352,9 +338,7 @@ TEST_F(OneTrunk, IsAtItsDistanceAlsoWhereTheFirstImageMissedIt)
 /// By map and pose a bearing scatters by several times what it does in the image.
 TEST_F(OneTrunk, ThatIsMissedInAnImageMovesItsBearingByLess)
 {
-  while (m_task.target() < 0 && m_frame < 400)
-    see(0.2, true);
-  ASSERT_EQ(m_task.target(), 7);
+  find();
   const double tracked = movedByOneTurn(true), missed = movedByOneTurn(false);
   EXPECT_GT(tracked, 0.1);
   EXPECT_LT(missed, 0.5 * tracked);
@@ -380,4 +364,3 @@ TEST(TrunkTask, KeepsItsLargestSpeed)
   EXPECT_LE(task.velocityFor(flight.feature(), 0.2, 0, 0).head<2>().norm(), 0.4 + 1e-9);
 }
 } // namespace
-} // namespace bole

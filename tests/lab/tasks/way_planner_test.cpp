@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "obstacles.h"
+#include "support/test.h"
 
 #include "tasks/plane_response.h"
 #include "tasks/way_planner.h"
 
-#include <algorithm>
-#include <cmath>
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using test::obstacleAt;
@@ -54,44 +50,27 @@ Flown fly(const std::vector<Obstacle> &trunks, double length, double obeyed = 1)
   return flown;
 }
 
-TEST(WayPlanner, FliesStraightAndAtItsSpeedWhereNothingStands)
+TEST(WayPlanner, PassesWhatStandsInItsWayAtTheSpeedItMeansAlsoWhereTheDroneObeysByASharePart)
 {
-  const Flown flown = fly({}, 20);
-  EXPECT_NEAR(flown.seconds, 20, 2);
-}
-
-TEST(WayPlanner, FliesTheSpeedItMeansThoughTheDroneObeysByASharePart)
-{
-  const Flown flown = fly({}, 30, 0.85);
-  EXPECT_NEAR(flown.seconds, 30, 2.5);
-}
-
-TEST(WayPlanner, PassesTrunksThatStandOnTheLine)
-{
-  std::vector<Obstacle> trunks;
+  std::vector<Obstacle> line, wall; // the wall has an opening
   for (int k = 0; k < 8; ++k)
-    trunks.push_back(obstacleAt(5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
-  const Flown flown = fly(trunks, 38);
-  EXPECT_GT(flown.least, 0.08);
-  EXPECT_LT(flown.seconds, 50); // at 1 m/s, not by creeping
-}
-
-TEST(WayPlanner, ATrunkStraightAheadIsPassedOnOneSideAndNotPonderedOn)
-{
-  const Flown flown = fly({obstacleAt(4, 0, 0.2)}, 8);
-  EXPECT_GT(flown.least, 0.08);
-  EXPECT_LT(flown.seconds, 11);
-}
-
-TEST(WayPlanner, FindsTheOpeningInAWall)
-{
-  std::vector<Obstacle> trunks;
+    line.push_back(obstacleAt(5 + 4 * k, 0.3 * std::sin(2.0 * k), 0.2));
   for (int k = -12; k <= 12; ++k)
     if (k != 5 && k != 6 && k != 7)
-      trunks.push_back(obstacleAt(6, 0.5 * k, 0.15));
-  const Flown flown = fly(trunks, 9);
-  EXPECT_GT(flown.least, 0.05);
-  EXPECT_GE(flown.x, 9);
+      wall.push_back(obstacleAt(6, 0.5 * k, 0.15));
+  struct Case
+  {
+    std::vector<Obstacle> trunks;
+    double length, obeyed, most_s, least;
+  };
+  for (const Case &c : {Case{{}, 20, 1, 22, 0}, Case{{}, 30, 0.85, 32.5, 0}, Case{line, 38, 1, 50, 0.08},
+                        Case{{obstacleAt(4, 0, 0.2)}, 8, 1, 11, 0.08}, Case{wall, 9, 1, 120, 0.05}}) {
+    const Flown flown = fly(c.trunks, c.length, c.obeyed);
+    EXPECT_GE(flown.x, c.length);
+    EXPECT_GT(flown.seconds, c.length - 2) << c.length << " m";
+    EXPECT_LT(flown.seconds, c.most_s) << c.length << " m: not by creeping, nor by pondering";
+    EXPECT_GT(flown.least, c.least) << c.length << " m";
+  }
 }
 
 TEST(WayPlanner, StopsBeforeAWallWithoutOpening)
@@ -199,4 +178,3 @@ TEST(WayPlanner, AWallIsNeverCrossed)
   EXPECT_FALSE(planWay({}, {0, -1}, goal, {}, {}).is_open);
 }
 } // namespace
-} // namespace bole

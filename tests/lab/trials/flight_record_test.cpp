@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "simulation/vpSimulatorArDrone.h"
 #include "tasks/trunk_task.h"
 #include "trials/flight_record.h"
 #include "trials/servo_trial.h"
-
-#include <gtest/gtest.h>
+#include <complex>
 #include <nlohmann/json.hpp>
 
-#include <cmath>
-#include <complex>
-#include <fmt/format.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 using Complex = std::complex<double>;
@@ -108,16 +105,11 @@ TEST(FlightRecord, NamesATrunkNearAheadThatTheMapDoesNotHold)
   EXPECT_FALSE(findParting(flight.record, flight.trunks));
 }
 
-TEST(FlightRecord, TellsWhichSensorsContradictedTheOthers)
+TEST(FlightRecord, HoldsTheMapAtThePartingAndAtTheEndAndTheSensorsThatContradictedOthers)
 {
   Resting flight;
   flight.record.verdicts.push_back({"gyro", "rotation", 1.5, "gyro: contradicts the points since 1.5 s"});
   EXPECT_EQ(flight.failure()["sensors"], nlohmann::json({"gyro: contradicts the points since 1.5 s"}));
-}
-
-TEST(FlightRecord, HoldsTheMapAtThePartingAndAtTheEnd)
-{
-  Resting flight;
   EXPECT_EQ(flight.failure()["maps"].size(), 1u);
   flight.trunks.push_back(standing(1.5, 0.4));
   const nlohmann::json maps = flight.failure()["maps"];
@@ -229,4 +221,3 @@ TEST(LoopMargins, APredictorThatKnowsNoDelayLeavesLess)
     EXPECT_LT(marginsOf(axis, options).modulus, 0.45);
 }
 } // namespace
-} // namespace bole

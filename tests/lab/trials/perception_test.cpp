@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "support/test.h"
+
 #include "trials/perception.h"
 #include "trials/servo_trial.h"
 #include <bole/open_source.h>
 #include <bole/vpFeatureTrunk.h>
 
-#include <algorithm>
-#include <cmath>
-#include <gtest/gtest.h>
-#include <visp3/core/vpException.h>
+using namespace bole;
 
-namespace bole
-{
 namespace
 {
 SimulatedTrunk standing(double x, double y, double radius)
@@ -33,51 +30,47 @@ Forest wood()
 
 const Pose kHere{Eigen::Matrix3d::Identity(), {0, 0, 1.2}};
 
-TEST(TrueSight, KnowsWhatIsInViewAndNeitherWhatIsHiddenNorFarNorBehind)
+struct Looking
 {
-  const Forest forest = wood();
-  TrueSight sight({}, forwardCamera(), forest);
+  Forest forest = wood();
+  TrueSight sight;
   FrameReport report;
-  sight.look(kHere, kHere, true, report);
+  explicit Looking(const std::vector<int> &only = {}) : sight({}, forwardCamera(), forest, only.empty() ? 0 : 1, only)
+  {
+  }
+  void look(const Pose &wMb = kHere) { sight.look(wMb, wMb, true, report = {}); }
+};
+
+TEST(TrueSight, KnowsWhatIsInViewAndNeitherWhatIsHiddenNorFarNorBehindAndKeepsIt)
+{
+  Looking looking;
+  for (int k = 0; k < 3; ++k)
+    looking.look();
+  const FrameReport &report = looking.report;
   ASSERT_EQ(report.map.size(), 2u);
   EXPECT_EQ(report.map[0].id, 0);
   EXPECT_EQ(report.map[1].id, 2);
   EXPECT_NEAR(trackedTrunk(report, 0)->relative.ratio(), 0.2 / 3, 1e-9);
   EXPECT_NEAR(knownTrunk(report, 2)->trunk.radius(), 0.15, 1e-9);
-}
-
-TEST(TrueSight, KeepsWhatHasBeenInViewAndCountsItsViews)
-{
-  const Forest forest = wood();
-  TrueSight sight({}, forwardCamera(), forest);
-  FrameReport report;
-  for (int k = 0; k < 3; ++k)
-    sight.look(kHere, kHere, true, report = {});
-  const Pose aside{kHere.R, {0, 5, 1.2}};
-  sight.look(aside, aside, true, report = {});
+  looking.look({kHere.R, {0, 5, 1.2}});
   ASSERT_TRUE(knownTrunk(report, 0));
   EXPECT_EQ(knownTrunk(report, 0)->observations, 3);
-  EXPECT_FALSE(trackedTrunk(report, 0));
 }
 
 TEST(TrueSight, MissesAllTrunksButThoseAskedFor)
 {
-  const Forest forest = wood();
-  TrueSight sight({}, forwardCamera(), forest, 1, {2});
-  FrameReport report;
-  sight.look(kHere, kHere, true, report);
-  ASSERT_EQ(report.map.size(), 1u);
-  EXPECT_EQ(report.map[0].id, 2);
+  Looking looking({2});
+  looking.look();
+  ASSERT_EQ(looking.report.map.size(), 1u);
+  EXPECT_EQ(looking.report.map[0].id, 2);
 }
 
 TEST(TrueSight, RaysEndAtBarkAndPassBesideIt)
 {
-  const Forest forest = wood();
-  TrueSight sight({}, forwardCamera(), forest);
-  FrameReport report;
-  sight.look(kHere, kHere, true, report);
+  Looking looking;
+  looking.look();
   int on_bark = 0;
-  for (const TriangulatedRay &ray : report.points) {
+  for (const TriangulatedRay &ray : looking.report.points) {
     const double range = ray.ray.head<2>().norm() / ray.inverse_distance;
     const double bearing = std::abs(std::atan2(ray.ray.y(), ray.ray.x()));
     if (std::abs(ray.ray.z()) > 0.2)
@@ -212,4 +205,3 @@ TEST(Perception, ViSPsEdgesSayInWhichDirectionTheTrunkIs)
   EXPECT_GT(moved, 0.01); // by the image, not by the odometry alone
 }
 } // namespace
-} // namespace bole
