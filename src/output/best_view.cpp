@@ -10,12 +10,44 @@
 
 namespace bole
 {
+namespace
+{
+/// Share of the pixels from \p low to \p high that is in a picture of which the last pixel is \p last.
+double shareInside(double low, double high, double last)
+{
+  const double length = high - low;
+  return length > 0 ? std::max(0.0, std::min(high, last) - std::max(low, 0.0)) / length : 0;
+}
+
+/// How steep the border from \p high to \p low [px] is in \p image: the step over two pixels as a share of the step
+/// over eight, 1 where the picture is sharp and a quarter where it is blurred by three pixels.
+double steepnessAlong(const vpImage<unsigned char> &image, const Eigen::Vector2d &high, const Eigen::Vector2d &low)
+{
+  constexpr int kNear = 1, kFar = 4;                // [px]
+  constexpr double kNoise = 4, kFeatureless = 0.05; // a step that noise makes, in grey levels; the least steepness
+  double near_sum = 0, far_sum = 0;
+  const int last_u = static_cast<int>(image.getWidth()) - 1, last_v = static_cast<int>(image.getHeight()) - 1;
+  const int top = std::max(0, static_cast<int>(std::ceil(high.y())));
+  const int bottom = std::min(last_v, static_cast<int>(std::floor(low.y())));
+  for (int v = top; v <= bottom; ++v) {
+    const double along = (v - high.y()) / std::max(1e-6, low.y() - high.y());
+    const int u = static_cast<int>(std::lround(high.x() + along * (low.x() - high.x())));
+    if (u < kFar || u > last_u - kFar)
+      continue;
+    const unsigned char *row = image[static_cast<unsigned>(v)] + u;
+    near_sum += std::abs(row[kNear] - row[-kNear]);
+    far_sum += kNoise + std::abs(row[kFar] - row[-kFar]);
+  }
+  return far_sum > 0 ? std::clamp(near_sum / far_sum, kFeatureless, 1.0) : kFeatureless;
+}
+} // namespace
+
 void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCamera &camera,
                     const RelativeTrunk &trunk, double tan_low, double tan_high)
 {
-  constexpr double kBetter = 1.2, kMargin = 0.6; // a view is copied when it is larger by this; margin in widths
+  constexpr double kBetter = 1.2, kMargin = 0.6; // a view is copied when its score is higher by this; margin in widths
   const Eigen::Vector2d last(camera.width - 1, camera.height - 1);
-  Eigen::Matrix<double, 2, 4> ends;
+  Eigen::Matrix<double, 2, 4> ends; // of the left border, low and high, then of the right one
   int column = 0;
   for (const Border border : {Border::left, Border::right}) {
     for (const double tan_elevation : {tan_low, tan_high}) {
@@ -24,22 +56,29 @@ void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCa
         return;
       ends.col(column++) = camera.project(ray);
     }
-    if (const Eigen::Vector2d middle = 0.5 * (ends.col(column - 2) + ends.col(column - 1));
-        middle.x() < 0 || middle.x() > last.x())
+    if (const double middle = 0.5 * (ends(0, column - 2) + ends(0, column - 1)); middle < 0 || middle > last.x())
       return;
   }
   const double width = 0.5 * std::abs((ends.col(2) + ends.col(3) - ends.col(0) - ends.col(1)).x());
-  const double high = std::clamp(ends.row(1).minCoeff(), 0.0, last.y());
-  const double low = std::clamp(ends.row(1).maxCoeff(), 0.0, last.y());
-  const double area = width * (low - high);
+  const double left_u = ends.row(0).minCoeff(), right_u = ends.row(0).maxCoeff();
+  const double high_v = ends.row(1).minCoeff(), low_v = ends.row(1).maxCoeff();
+  const double high = std::clamp(high_v, 0.0, last.y()), low = std::clamp(low_v, 0.0, last.y());
+  if (!(width > 1) || !(low - high > 1))
+    return;
+  const double inside = shareInside(left_u, right_u, last.x()) * shareInside(high_v, low_v, last.y());
   View &best = m_views[id];
-  if (!(area > kBetter * best.area_px) || !(width > 1) || !(low - high > 1))
+  const double most = width * (low - high) * std::pow(inside, 4); // half outside counts as a sixteenth of the size
+  if (!(most > kBetter * best.score))                             // also a sharp one would be no better
+    return;
+  const double score =
+      most * std::min(steepnessAlong(image, ends.col(1), ends.col(0)), steepnessAlong(image, ends.col(3), ends.col(2)));
+  if (!(score > kBetter * best.score))
     return;
   const double margin = std::max(8.0, kMargin * width);
-  const Eigen::Vector2d from(std::max(0.0, std::floor(ends.row(0).minCoeff() - margin)), std::floor(high));
-  const Eigen::Vector2d to(std::min(last.x(), std::ceil(ends.row(0).maxCoeff() + margin)), std::ceil(low));
+  const Eigen::Vector2d from(std::max(0.0, std::floor(left_u - margin)), std::floor(high));
+  const Eigen::Vector2d to(std::min(last.x(), std::ceil(right_u + margin)), std::ceil(low));
   const auto left = static_cast<unsigned>(from.x()), top = static_cast<unsigned>(from.y());
-  best.area_px = area;
+  best.score = score;
   best.crop.resize(static_cast<unsigned>(to.y()) - top + 1, static_cast<unsigned>(to.x()) - left + 1);
   for (unsigned v = 0; v < best.crop.getHeight(); ++v)
     std::copy_n(image[top + v] + left, best.crop.getWidth(), best.crop[v]);
@@ -49,7 +88,7 @@ void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCa
 std::string BestViews::jpeg(int id) const
 {
   const auto found = m_views.find(id);
-  if (found == m_views.end() || found->second.area_px == 0)
+  if (found == m_views.end() || found->second.score == 0)
     return {};
   const View &view = found->second;
   constexpr int kHeight = 240, kShift = 4; // [px]; fraction of OpenCV's coordinates

@@ -59,6 +59,8 @@ void readSummaryInto(RunRecord &run, const std::string &path)
     run.versions = json.value("versions", run.versions);
     run.is_trusted = json.value("trusted", true);
     run.has_ranges = json.value("ranges", true);
+    run.scale_sigma =
+        json.contains("scale_sigma") && json["scale_sigma"].is_number() ? json["scale_sigma"].get<double>() : 0;
     for (const Json &sensor : json.value("sensors", Json::array()))
       run.sensors.push_back(
           {textOf(sensor, "sensor"), textOf(sensor, "kind"), sensor.value("since_s", 0.0), textOf(sensor, "text")});
@@ -297,6 +299,7 @@ std::string reportJson(const RunRecord &run)
                {"versions", run.versions},
                {"trusted", run.is_trusted},
                {"ranges", run.has_ranges},
+               {"scale_sigma", run.scale_sigma},
                {"videos", run.videos},
                {"sensors", Json::array()},
                {"trunks", Json::array()},

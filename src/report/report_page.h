@@ -24,6 +24,7 @@ struct RunRecord
   std::map<std::string, std::string> versions;
   std::vector<SensorVerdict> sensors;
   bool is_trusted = true, has_ranges = true;
+  double scale_sigma = 0;          ///< of the logarithm of the scale; 0 where odometry gives it
   std::vector<std::string> videos; ///< names of those beside the page
   std::vector<TrunkRecord> trunks; ///< and hypotheses
   std::map<int, std::string> views_jpeg;
