@@ -211,7 +211,7 @@ def frames(arguments):
 
 
 def processor_ms(command, times):
-    """Of all threads of a command, the least of some runs: other work on the machine only adds."""
+    """Milliseconds that all threads of a command take, the least of some runs: other work on the machine only adds."""
     spent = []
     for _ in range(times):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -223,8 +223,8 @@ def processor_ms(command, times):
 
 
 def things_that_grow():
-    """Of each curve its label and its points: name, place on the axis (None: trunks in view), scene, settings, frames
-    from and to which is counted."""
+    """Lists the curves, each with its label and its points: name, place on the axis (None: trunks in view), scene,
+    settings, and the frames from and to which the time is counted."""
     sizes = [(320, 240), (640, 480), (960, 540), (1280, 720), (1920, 1080)]
     camera = "camera: {{width: {0}, height: {1}, fx: {2}, fy: {2}, cx: {3}, cy: {4}}}\n".format
     yield "megapixels", [(f"{w} x {h}", 1e-6 * w * h, camera(w, h, 0.625 * w, (w - 1) / 2, (h - 1) / 2), [], 20, 50)
@@ -243,8 +243,8 @@ def trunks_in_view(run, first):
 
 
 def growth(arguments):
-    """What a frame costs against the resolution, the trunks in view, the window and the length of the flight: processor
-    time of all threads, reading the frame included, the final pass not; the least of some runs."""
+    """Draws what a frame costs against the resolution, the trunks in view, the window and the length of the flight. The
+    cost is the processor time of all threads, the least of some runs; it includes reading the frame, but no final pass."""
     figure, axes = plt.subplots(1, 4, figsize=(13, 3.2))
     with tempfile.TemporaryDirectory() as folder:
         for axis, (label, points) in zip(axes, things_that_grow()):

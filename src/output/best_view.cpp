@@ -12,19 +12,19 @@ namespace bole
 {
 namespace
 {
-/// Share of the pixels from \p low to \p high that is in a picture of which the last pixel is \p last.
+/// Returns the share of the pixels from \p low to \p high that lies in a picture whose last pixel is \p last.
 double shareInside(double low, double high, double last)
 {
   const double length = high - low;
   return length > 0 ? std::max(0.0, std::min(high, last) - std::max(low, 0.0)) / length : 0;
 }
 
-/// How steep the border from \p high to \p low [px] is in \p image: the step over two pixels as a share of the step
-/// over eight, 1 where the picture is sharp and a quarter where it is blurred by three pixels.
+/// Returns how steep the border from \p high to \p low [px] is in \p image: the step over two pixels as a share of the
+/// step over eight. It is near 1 in a sharp picture and a quarter in one that is blurred by three pixels.
 double steepnessAlong(const vpImage<unsigned char> &image, const Eigen::Vector2d &high, const Eigen::Vector2d &low)
 {
   constexpr int kNear = 1, kFar = 4;                // [px]
-  constexpr double kNoise = 4, kFeatureless = 0.05; // a step that noise makes, in grey levels; the least steepness
+  constexpr double kNoise = 4, kFeatureless = 0.05; // grey levels that noise makes; the least steepness
   double near_sum = 0, far_sum = 0;
   const int last_u = static_cast<int>(image.getWidth()) - 1, last_v = static_cast<int>(image.getHeight()) - 1;
   const int top = std::max(0, static_cast<int>(std::ceil(high.y())));
@@ -67,8 +67,9 @@ void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCa
     return;
   const double inside = shareInside(left_u, right_u, last.x()) * shareInside(high_v, low_v, last.y());
   View &best = m_views[id];
-  const double most = width * (low - high) * std::pow(inside, 4); // half outside counts as a sixteenth of the size
-  if (!(most > kBetter * best.score))                             // also a sharp one would be no better
+  const double most =
+      width * (low - high) * std::pow(inside, 4); // what is half outside counts as a sixteenth of its size
+  if (!(most > kBetter * best.score))             // it would be no better if it were sharp
     return;
   const double score =
       most * std::min(steepnessAlong(image, ends.col(1), ends.col(0)), steepnessAlong(image, ends.col(3), ends.col(2)));

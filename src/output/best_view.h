@@ -17,11 +17,12 @@ namespace bole
 class BestViews
 {
 public:
-  /// The trunk \p id as measured in \p image; its borders from \p tan_low to \p tan_high (tangents of elevation).
+  /// Looks at the trunk \p id as \p image shows it; its borders are followed from \p tan_low to \p tan_high (tangents
+  /// of elevation).
   void add(int id, const vpImage<unsigned char> &image, const PinholeCamera &camera, const RelativeTrunk &trunk,
            double tan_low, double tan_high);
   void forget(int id) { m_views.erase(id); }
-  /// JPEG with the borders drawn; empty for an id whose two borders were never in one picture.
+  /// Returns a JPEG with the borders drawn, empty for an id whose two borders were never in one picture.
   std::string jpeg(int id) const;
 
 private:
