@@ -4,6 +4,7 @@
 
   cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
+  src/doc/figures.py beside RUN/overlay.mp4 data/figures/success-and-failure.png FRAME...
   src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse
 import csv
@@ -52,6 +53,14 @@ def gif(arguments):
     frames = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in small]
     frames[0].save(arguments.out, save_all=True, append_images=frames[1:], duration=100 * arguments.every, loop=0,
                    optimize=True)
+
+
+def beside(arguments):
+    """Some frames of a video beside one another, small enough for a page."""
+    pictures = pictures_of(arguments.video)
+    shown = [cv2.resize(pictures[i], None, fx=arguments.width / pictures[i].shape[1], fy=arguments.width / pictures[i].shape[1],
+                        interpolation=cv2.INTER_AREA) for i in arguments.frames]
+    Image.fromarray(np.hstack(shown)).quantize(arguments.colours, dither=Image.Dither.NONE).save(arguments.out, optimize=True)
 
 
 def intrinsics_of(flight):
@@ -286,6 +295,11 @@ def main():
     part.add_argument("--every", type=int, default=3, help="shows one picture in so many")
     part.add_argument("--width", type=int, default=400), part.add_argument("--colours", type=int, default=48)
     part.set_defaults(draw=gif)
+    part = what.add_parser("beside", help="frames of a video beside one another")
+    part.add_argument("video"), part.add_argument("out"), part.add_argument("frames", type=int, nargs="+")
+    part.add_argument("--width", type=int, default=480, help="of each frame [px]")
+    part.add_argument("--colours", type=int, default=128)
+    part.set_defaults(draw=beside)
     part = what.add_parser("frames", help="the coordinate frames")
     part.add_argument("out")
     part.set_defaults(draw=frames)
