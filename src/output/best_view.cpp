@@ -45,7 +45,7 @@ double steepnessAlong(const vpImage<unsigned char> &image, const Eigen::Vector2d
 void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCamera &camera,
                     const RelativeTrunk &trunk, double tan_low, double tan_high)
 {
-  constexpr double kBetter = 1.2, kMargin = 0.6; // a view is copied when its score is higher by this; margin in widths
+  constexpr double kBetter = 1.2, kMargin = 0.8; // a view is copied when its score is higher by this; margin in widths
   const Eigen::Vector2d last(camera.width - 1, camera.height - 1);
   Eigen::Matrix<double, 2, 4> ends; // of the left border, low and high, then of the right one
   int column = 0;
@@ -67,17 +67,17 @@ void BestViews::add(int id, const vpImage<unsigned char> &image, const PinholeCa
     return;
   const double inside = shareInside(left_u, right_u, last.x()) * shareInside(high_v, low_v, last.y());
   View &best = m_views[id];
-  const double most =
-      width * (low - high) * std::pow(inside, 4); // what is half outside counts as a sixteenth of its size
-  if (!(most > kBetter * best.score))             // it would be no better if it were sharp
+  const double size = width * (low - high) * std::pow(inside, 4); // half outside makes it a sixteenth
+  if (!(size > kBetter * best.score))                             // no sharpness would make it better
     return;
   const double score =
-      most * std::min(steepnessAlong(image, ends.col(1), ends.col(0)), steepnessAlong(image, ends.col(3), ends.col(2)));
+      size * std::min(steepnessAlong(image, ends.col(1), ends.col(0)), steepnessAlong(image, ends.col(3), ends.col(2)));
   if (!(score > kBetter * best.score))
     return;
-  const double margin = std::max(8.0, kMargin * width);
-  const Eigen::Vector2d from(std::max(0.0, std::floor(left_u - margin)), std::floor(high));
-  const Eigen::Vector2d to(std::min(last.x(), std::ceil(right_u + margin)), std::ceil(low));
+  const double beside = std::max(8.0, kMargin * width), above = 0.12 * (low - high); // of what is shown around [px]
+  const Eigen::Vector2d from(std::max(0.0, std::floor(left_u - beside)), std::max(0.0, std::floor(high_v - above)));
+  const Eigen::Vector2d to(std::min(last.x(), std::ceil(right_u + beside)),
+                           std::min(last.y(), std::ceil(low_v + above)));
   const auto left = static_cast<unsigned>(from.x()), top = static_cast<unsigned>(from.y());
   best.score = score;
   best.crop.resize(static_cast<unsigned>(to.y()) - top + 1, static_cast<unsigned>(to.x()) - left + 1);
