@@ -4,7 +4,7 @@
 
   cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
-  src/doc/figures.py beside RUN/overlay.mp4 data/figures/success-and-failure.png FRAME...
+  src/doc/figures.py beside run/overlay.mp4 data/figures/success-and-failure.png 112 45   (run of data/park-forward)
   src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse
 import csv
@@ -41,15 +41,23 @@ def pictures_of(path):
         pictures.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
 
 
+def palette_of(pictures, colours):
+    """A palette of which half is for what is drawn, and half for the wood."""
+    pixels = np.vstack(pictures).reshape(-1, 3)
+    coloured = pixels[np.ptp(pixels.astype(int), axis=1) > 50]
+    greys = pixels[:: max(1, 2 * len(pixels) // max(1, len(coloured)))]
+    return Image.fromarray(np.vstack([coloured, greys])[None]).quantize(colours)
+
+
+def shrunk(picture, width):
+    scale = width / picture.shape[1]
+    return cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+
+
 def gif(arguments):
     """A moving picture at the speed of the video (10 frames a second), small enough for a page."""
-    pictures = pictures_of(arguments.video)[::arguments.every]
-    small = [cv2.resize(p, None, fx=arguments.width / p.shape[1], fy=arguments.width / p.shape[1],
-                        interpolation=cv2.INTER_AREA) for p in pictures]
-    pixels = np.vstack(small[:: max(1, len(small) // 8)]).reshape(-1, 3)
-    coloured = pixels[np.ptp(pixels.astype(int), axis=1) > 50]  # the palette is for what is drawn, not for the wood
-    greys = pixels[:: max(1, 2 * len(pixels) // max(1, len(coloured)))]
-    palette = Image.fromarray(np.vstack([coloured, greys])[None]).quantize(arguments.colours)
+    small = [shrunk(p, arguments.width) for p in pictures_of(arguments.video)[::arguments.every]]
+    palette = palette_of(small[:: max(1, len(small) // 8)], arguments.colours)
     frames = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in small]
     frames[0].save(arguments.out, save_all=True, append_images=frames[1:], duration=100 * arguments.every, loop=0,
                    optimize=True)
@@ -58,9 +66,9 @@ def gif(arguments):
 def beside(arguments):
     """Some frames of a video beside one another, small enough for a page."""
     pictures = pictures_of(arguments.video)
-    shown = [cv2.resize(pictures[i], None, fx=arguments.width / pictures[i].shape[1], fy=arguments.width / pictures[i].shape[1],
-                        interpolation=cv2.INTER_AREA) for i in arguments.frames]
-    Image.fromarray(np.hstack(shown)).quantize(arguments.colours, dither=Image.Dither.NONE).save(arguments.out, optimize=True)
+    shown = np.hstack([shrunk(pictures[i], arguments.width) for i in arguments.frames])
+    palette = palette_of([shown], arguments.colours)
+    Image.fromarray(shown).quantize(palette=palette, dither=Image.Dither.NONE).save(arguments.out, optimize=True)
 
 
 def intrinsics_of(flight):

@@ -23,7 +23,7 @@ double shareInside(double low, double high, double last)
 /// step over eight. It is near 1 in a sharp picture and a quarter in one that is blurred by three pixels.
 double steepnessAlong(const vpImage<unsigned char> &image, const Eigen::Vector2d &high, const Eigen::Vector2d &low)
 {
-  constexpr int kNear = 1, kFar = 4;                // [px]
+  constexpr int kNear = 1, kFar = 4, kBeside = 2;   // [px]
   constexpr double kNoise = 4, kFeatureless = 0.05; // grey levels that noise makes; the least steepness
   double near_sum = 0, far_sum = 0;
   const int last_u = static_cast<int>(image.getWidth()) - 1, last_v = static_cast<int>(image.getHeight()) - 1;
@@ -35,7 +35,10 @@ double steepnessAlong(const vpImage<unsigned char> &image, const Eigen::Vector2d
     if (u < kFar || u > last_u - kFar)
       continue;
     const unsigned char *row = image[static_cast<unsigned>(v)] + u;
-    near_sum += std::abs(row[kNear] - row[-kNear]);
+    int steepest = 0; // the border may stand some pixels beside where it was measured
+    for (int off = -kBeside; off <= kBeside; ++off)
+      steepest = std::max(steepest, std::abs(row[off + kNear] - row[off - kNear]));
+    near_sum += steepest;
     far_sum += kNoise + std::abs(row[kFar] - row[-kFar]);
   }
   return far_sum > 0 ? std::clamp(near_sum / far_sum, kFeatureless, 1.0) : kFeatureless;
