@@ -84,6 +84,16 @@ def commands_of(text):
                 yield words.group(1), (words.group(2) or "").split()
 
 
+def options_of(command, source, environment):
+    """The exit status of a command's help, and the options that it and the commands below it name."""
+    status, text = run(["bole", *command, "--help"], source, environment)
+    known = set(re.findall(r"(?<![\w-])-{1,2}[a-z][\w-]*", text))
+    below = re.findall(r"^  ([a-z]\S*) ", text.partition("\nSubcommands:\n")[2], re.M)
+    for name in below:
+        known |= options_of([*command, name], source, environment)[1]
+    return status, known
+
+
 def check_commands(source, environment):
     """Every command of bole that any page prints exists, and so do its options."""
     helps, failed = {}, 0
@@ -91,9 +101,8 @@ def check_commands(source, environment):
     for page in pages + sorted(glob.glob(os.path.join(source, "src/doc/*.md"))):
         for name, words in commands_of(text_of(page)):
             if name not in helps:
-                helps[name] = run(["bole", name, "--help"], source, environment)
-            status, text = helps[name]
-            known = set(re.findall(r"(?<![\w-])-{1,2}[a-z][\w-]*", text))
+                helps[name] = options_of([name], source, environment)
+            status, known = helps[name]
             for word in [name, *words]:
                 option = word.split("=")[0]
                 if status != 0 or (re.match(r"-{1,2}[a-z]", option) and option not in known):
