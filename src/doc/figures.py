@@ -4,6 +4,7 @@
 
   cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
+  src/doc/figures.py beside run/overlay.mp4 data/figures/success-and-failure.png 112 45   (run of data/park-forward)
   src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse
 import csv
@@ -40,18 +41,34 @@ def pictures_of(path):
         pictures.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
 
 
+def palette_of(pictures, colours):
+    """A palette of which half is for what is drawn, and half for the wood."""
+    pixels = np.vstack(pictures).reshape(-1, 3)
+    coloured = pixels[np.ptp(pixels.astype(int), axis=1) > 50]
+    greys = pixels[:: max(1, 2 * len(pixels) // max(1, len(coloured)))]
+    return Image.fromarray(np.vstack([coloured, greys])[None]).quantize(colours)
+
+
+def shrunk(picture, width):
+    scale = width / picture.shape[1]
+    return cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+
+
 def gif(arguments):
     """A moving picture at the speed of the video (10 frames a second), small enough for a page."""
-    pictures = pictures_of(arguments.video)[::arguments.every]
-    small = [cv2.resize(p, None, fx=arguments.width / p.shape[1], fy=arguments.width / p.shape[1],
-                        interpolation=cv2.INTER_AREA) for p in pictures]
-    pixels = np.vstack(small[:: max(1, len(small) // 8)]).reshape(-1, 3)
-    coloured = pixels[np.ptp(pixels.astype(int), axis=1) > 50]  # the palette is for what is drawn, not for the wood
-    greys = pixels[:: max(1, 2 * len(pixels) // max(1, len(coloured)))]
-    palette = Image.fromarray(np.vstack([coloured, greys])[None]).quantize(arguments.colours)
+    small = [shrunk(p, arguments.width) for p in pictures_of(arguments.video)[::arguments.every]]
+    palette = palette_of(small[:: max(1, len(small) // 8)], arguments.colours)
     frames = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in small]
     frames[0].save(arguments.out, save_all=True, append_images=frames[1:], duration=100 * arguments.every, loop=0,
                    optimize=True)
+
+
+def beside(arguments):
+    """Some frames of a video beside one another, small enough for a page."""
+    pictures = pictures_of(arguments.video)
+    shown = np.hstack([shrunk(pictures[i], arguments.width) for i in arguments.frames])
+    palette = palette_of([shown], arguments.colours)
+    Image.fromarray(shown).quantize(palette=palette, dither=Image.Dither.NONE).save(arguments.out, optimize=True)
 
 
 def intrinsics_of(flight):
@@ -211,7 +228,7 @@ def frames(arguments):
 
 
 def processor_ms(command, times):
-    """Of all threads of a command, the least of some runs: other work on the machine only adds."""
+    """Milliseconds that all threads of a command take, the least of some runs: other work on the machine only adds."""
     spent = []
     for _ in range(times):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -223,8 +240,8 @@ def processor_ms(command, times):
 
 
 def things_that_grow():
-    """Of each curve its label and its points: name, place on the axis (None: trunks in view), scene, settings, frames
-    from and to which is counted."""
+    """Lists the curves, each with its label and its points: name, place on the axis (None: trunks in view), scene,
+    settings, and the frames from and to which the time is counted."""
     sizes = [(320, 240), (640, 480), (960, 540), (1280, 720), (1920, 1080)]
     camera = "camera: {{width: {0}, height: {1}, fx: {2}, fy: {2}, cx: {3}, cy: {4}}}\n".format
     yield "megapixels", [(f"{w} x {h}", 1e-6 * w * h, camera(w, h, 0.625 * w, (w - 1) / 2, (h - 1) / 2), [], 20, 50)
@@ -243,8 +260,8 @@ def trunks_in_view(run, first):
 
 
 def growth(arguments):
-    """What a frame costs against the resolution, the trunks in view, the window and the length of the flight: processor
-    time of all threads, reading the frame included, the final pass not; the least of some runs."""
+    """Draws what a frame costs against the resolution, the trunks in view, the window and the length of the flight. The
+    cost is the processor time of all threads, the least of some runs; it includes reading the frame, but no final pass."""
     figure, axes = plt.subplots(1, 4, figsize=(13, 3.2))
     with tempfile.TemporaryDirectory() as folder:
         for axis, (label, points) in zip(axes, things_that_grow()):
@@ -286,6 +303,11 @@ def main():
     part.add_argument("--every", type=int, default=3, help="shows one picture in so many")
     part.add_argument("--width", type=int, default=400), part.add_argument("--colours", type=int, default=48)
     part.set_defaults(draw=gif)
+    part = what.add_parser("beside", help="frames of a video beside one another")
+    part.add_argument("video"), part.add_argument("out"), part.add_argument("frames", type=int, nargs="+")
+    part.add_argument("--width", type=int, default=480, help="of each frame [px]")
+    part.add_argument("--colours", type=int, default=128)
+    part.set_defaults(draw=beside)
     part = what.add_parser("frames", help="the coordinate frames")
     part.add_argument("out")
     part.set_defaults(draw=frames)

@@ -99,11 +99,17 @@ class SequenceSource : public ImageFilesSource
 {
 public:
   explicit SequenceSource(const std::string &pattern, const SourceOptions &options = {});
+  std::string note() const override;
+  /// What is assumed about the rate of the images, and how to tell another; empty where it was told.
+  const std::string &rateNote() const { return m_rate_note; }
 
   /// The pattern of a folder of numbered images, or empty.
   static std::string patternOf(const std::string &folder);
   /// Whether \p path has the name of a picture.
   static bool isImage(const std::string &path);
+
+private:
+  std::string m_rate_note;
 };
 
 /// Reads a video file (any container and codec of libavformat and libavcodec) frame by frame.

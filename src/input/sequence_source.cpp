@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <regex>
 
 namespace bole
@@ -114,8 +115,13 @@ SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &
         "{}: the numbers go in steps of {}: frame_rate_hz (--rate) must tell how many of them pass in a second", m_name,
         step);
   constexpr double kUsual_hz = 25;
-  const double rate_hz =
-      options.frame_rate_hz ? *options.frame_rate_hz : readFrameRate(options.camera_path).value_or(kUsual_hz);
+  const std::optional<double> told_hz =
+      options.frame_rate_hz ? options.frame_rate_hz : readFrameRate(options.camera_path);
+  const double rate_hz = told_hz.value_or(kUsual_hz);
+  if (!told_hz)
+    m_rate_note = fmt::format("numbered images without a rate: {:g} frames a second assumed, by which all times are "
+                              "counted; frame_rate_hz (--rate) tells another",
+                              kUsual_hz);
   for (long number = first_number; number <= numbers.back(); number += step)
     m_rows.push_back(
         {std::llround(static_cast<double>(number - first_number) * 1e9 / rate_hz), imagePath(m_name, number)});
@@ -128,6 +134,11 @@ SequenceSource::SequenceSource(const std::string &pattern, const SourceOptions &
   recording.odometry = readOdometry(options);
   requireOverlap(recording.odometry, 0, m_rows.back().stamp_ns, options.odometry_path, m_name);
   m_builder = std::make_unique<FrameBuilder>(camera, options, std::move(recording));
+}
+
+std::string SequenceSource::note() const
+{
+  return m_note + (m_note.empty() || m_rate_note.empty() ? "" : "; ") + m_rate_note;
 }
 
 std::string SequenceSource::patternOf(const std::string &folder)

@@ -9,25 +9,25 @@
 
 namespace bole
 {
-/// \p value with \p decimals, right-aligned in \p width columns.
+/// Prints \p value with \p decimals, right-aligned in \p width columns.
 inline std::string figure(double value, int width, int decimals)
 {
   return std::isnan(value) ? fmt::format("{:>{}}", "-", width) : fmt::format("{:{}.{}f}", value, width, decimals);
 }
 
-/// The same with its sign.
+/// Prints the same with its sign.
 inline std::string signedFigure(double value, int width, int decimals)
 {
   return std::isnan(value) ? fmt::format("{:>{}}", "-", width) : fmt::format("{:+{}.{}f}", value, width, decimals);
 }
 
-/// "74.1 %" of the share 0.741, or "-".
+/// Prints the share 0.741 as "74.1 %", or "-".
 inline std::string percent(double share, int decimals = 1)
 {
   return std::isnan(share) ? "-" : fmt::format("{:.{}f} %", 100 * share, decimals);
 }
 
-/// "0.123 m", or "-".
+/// Prints "0.123 m", or "-".
 inline std::string withUnit(double value, int decimals, const char *unit)
 {
   return std::isnan(value) ? "-" : fmt::format("{:.{}f} {}", value, decimals, unit);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// What was known frame by frame, each line as of right after its frame, and what each frame cost: for pictures and for
-/// those who ask how a figure came about. Second line of each table but timing.csv: units, as in trunks.csv.
+/// Tables of what was known frame by frame, right after each frame, and of what each frame cost: for pictures and for
+/// those who ask how a figure came about. The second line of each table but timing.csv holds units, as in trunks.csv.
 
 #include <bole/frame.h>
 
@@ -38,14 +38,14 @@ struct TrunkTrace
   Eigen::Vector2d xy_sigma = Eigen::Vector2d::Zero();
 };
 
-/// Points with a parallax, counted in squares of the ground plane.
+/// Counts the points that have a parallax in squares of the ground plane.
 class GroundEvidence
 {
 public:
   static constexpr double kSide = 0.1; ///< of a square [m]
 
   void add(const Eigen::Vector3d &point, int count = 1);
-  /// Middle of each square [m] and its points.
+  /// Returns the middle of each square [m] and the number of its points.
   std::vector<std::pair<Eigen::Vector2d, int>> squares() const;
 
 private:
@@ -61,19 +61,19 @@ struct FlightTrace
 
 /// Writes frames.csv, views.csv and evidence.csv into \p folder, atomically.
 void writeTrace(const std::string &folder, const FlightTrace &trace);
-/// Reads them. Errors: vpException with file:line.
+/// Reads what writeTrace() wrote. Errors: vpException with file:line.
 FlightTrace readTrace(const std::string &folder);
-/// frames.csv alone.
+/// Reads frames.csv alone.
 std::vector<FrameTrace> readFrames(const std::string &folder);
 
-/// What a frame cost, by stage.
+/// A frame and what each stage cost in it.
 struct FrameTiming
 {
   std::size_t index = 0;
   std::int64_t stamp_ns = 0;
   std::vector<double> stages_ms; ///< in the order of TimingTable::stages
   double total_ms = 0;           ///< of the whole frame, without input and output
-  /// Live: from the arrival of the frame's last byte until the map knew of it.
+  /// In a live run, the time from the arrival of the frame's last byte until the map knew of it.
   std::optional<double> age_ms;
 };
 
@@ -82,22 +82,21 @@ struct TimingTable
   std::vector<std::string> stages;
   std::vector<FrameTiming> frames;
 
-  /// Median over the frames; NaN without frames.
+  /// Returns the median over the frames, NaN without frames.
   double medianTotal_ms() const;
   double medianStage_ms(std::size_t stage) const;
-  /// The cost that 95 % of the frames stay below.
+  /// Returns the cost that 95 % of the frames stay below.
   double percentile95_ms() const;
-  /// The age of the frames that have one, below which a part \p quantile of them stays; nothing
-  /// where none has.
+  /// Returns the age below which the share \p quantile of the frames that have an age stays; nothing where none has.
   std::optional<double> age_ms(double quantile) const;
 };
 
-/// A line a stage, and one for the whole frame: median, 95th and 99th percentile, most.
+/// Prints a line a stage and one for the whole frame: median, 95th and 99th percentile, most.
 std::string toText(const TimingTable &timing);
 
-/// Header "frame,timestamp [s],<stage> [ms],...,total [ms]", and "age [ms]" for a live run; one line
-/// a frame, atomically.
+/// Writes a line a frame under the header "frame,timestamp [s],<stage> [ms],...,total [ms]", to which a live run adds
+/// "age [ms]", atomically.
 void writeTiming(const std::string &path, const TimingTable &timing);
-/// Reads it.
+/// Reads what writeTiming() wrote.
 TimingTable readTiming(const std::string &path);
 } // namespace bole

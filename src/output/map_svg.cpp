@@ -26,7 +26,7 @@ std::string pointsText(const SvgPoints &points)
   return text;
 }
 
-/// \p text as it may stand in XML.
+/// Replaces the characters of \p text that mean something in XML.
 std::string escaped(const std::string &text)
 {
   std::string xml;
@@ -35,7 +35,8 @@ std::string escaped(const std::string &text)
   return xml;
 }
 
-/// Shapes on a white sheet. Coordinates [px], y down. \p style: further attributes, such as `fill-opacity=".5"`.
+/// Draws shapes on a white sheet, whose coordinates are pixels with y down. \p style holds further attributes, such as
+/// `fill-opacity=".5"`.
 class SvgDrawing
 {
 public:
@@ -88,8 +89,8 @@ private:
   std::string m_text;
 };
 
-/// Two sigma of \p covariance round the point (\p x, \p y) of the drawing, \p scale px for one of its units; its second
-/// axis points up.
+/// Draws the ellipse of two sigma of \p covariance round the point (\p x, \p y) of the drawing. A unit of the
+/// covariance is \p scale px, and its second axis points up.
 std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, double scale, const char *colour)
 {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance);
@@ -100,7 +101,7 @@ std::string sigmaEllipse(double x, double y, const Eigen::Matrix2d &covariance, 
                      axes(1), axes(0), x, y, -std::atan2(major.y(), major.x()) * 180 / M_PI, colour);
 }
 
-/// Values of ticks between \p low and \p high, about five.
+/// Returns about five round values between \p low and \p high, for the ticks of an axis.
 std::vector<double> ticksBetween(double low, double high)
 {
   const double raw = std::max(high - low, 1e-9) / 5, base = std::pow(10, std::floor(std::log10(raw)));
@@ -113,7 +114,7 @@ std::vector<double> ticksBetween(double low, double high)
   return ticks;
 }
 
-/// Every metre between \p low and \p high; of a map of more than 300 m those of ticksBetween().
+/// Returns every metre between \p low and \p high, or ticksBetween() where the map is longer than 300 m.
 std::vector<double> gridBetween(double low, double high)
 {
   constexpr double kMostLines = 300;
@@ -127,7 +128,7 @@ std::vector<double> gridBetween(double low, double high)
 
 constexpr double kPixelsPerMetre = 40, kMargin = 1.5; // [m]
 
-/// x to the right is the world's x, up is the world's y; the legend stands above.
+/// The sheet shows the world's x to the right and its y upwards; the legend stands above the map.
 struct Sheet
 {
   Eigen::AlignedBox2d box;
@@ -138,7 +139,7 @@ struct Sheet
   double height() const { return top + box.sizes().y() * kPixelsPerMetre; }
 };
 
-/// Labels beside their trunks, at the first of some places that no other label and no trunk takes.
+/// Places each label beside its trunk, at the first of some places that no other label and no trunk takes.
 class Labels
 {
 public:
@@ -228,7 +229,7 @@ void drawTrunk(SvgDrawing &drawing, const Sheet &sheet, const TrunkRecord &recor
   drawing.circle(x, y, r, kVermilion, "fill-opacity=\".75\"");
 }
 
-/// Returns where it ends [px].
+/// Draws the legend and returns where it ends [px].
 double drawLegend(SvgDrawing &drawing, const MapPicture &picture)
 {
   drawing.text(10, 20, picture.title, "font-size=\"15\"");
@@ -261,7 +262,7 @@ double drawLegend(SvgDrawing &drawing, const MapPicture &picture)
   return y;
 }
 
-/// What a camera that only rotated knows: a wedge for each trunk, from bearing to bearing of its borders.
+/// Draws what a camera that only rotated knows: a wedge for each trunk, from bearing to bearing of its borders.
 std::string bearingsSvg(const MapPicture &picture)
 {
   constexpr double kSide = 520, kRadius = 200, kX = kSide / 2, kY = kX + 40;

@@ -12,7 +12,7 @@
 
 namespace bole
 {
-/// What is drawn; empty parts are left out. World frame, [m].
+/// A map to be drawn, in the world frame [m]; empty parts are left out.
 struct MapPicture
 {
   std::string title;
@@ -24,7 +24,7 @@ struct MapPicture
   Eigen::Vector2d camera = Eigen::Vector2d::Zero(); ///< from which these are seen
 };
 
-/// One metre is 40 px; the picture holds the trajectories and the confirmed trunks.
+/// Draws a metre as 40 px; the picture holds the trajectories and the confirmed trunks.
 std::string toSvg(const MapPicture &picture);
 
 /// Writes toSvg() atomically.

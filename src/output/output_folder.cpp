@@ -35,7 +35,7 @@ bool isOneOf(const FileNames &names, const std::string &path)
   return std::any_of(names.begin(), names.end(), [&](const std::string &name) { return matches(name, path); });
 }
 
-/// The folders that \p names stand in, the innermost first.
+/// Returns the folders that \p names stand in, the innermost first.
 std::vector<std::string> foldersOf(const FileNames &names)
 {
   std::set<std::string, std::greater<>> folders;
@@ -45,7 +45,7 @@ std::vector<std::string> foldersOf(const FileNames &names)
   return {folders.begin(), folders.end()};
 }
 
-/// Those of \p names that are in \p folder, whatever they are; links are not followed.
+/// Returns those of \p names that exist in \p folder, whatever they are; it follows no links.
 std::vector<std::string> presentOf(const std::string &folder, const FileNames &names)
 {
   std::vector<std::string> folders = foldersOf(names), present;
@@ -61,7 +61,7 @@ std::vector<std::string> presentOf(const std::string &folder, const FileNames &n
   return present;
 }
 
-/// Whether \p path is what a command of bole writes about itself.
+/// Tells whether \p path is what a command of bole writes about itself.
 bool isRecord(const std::string &path)
 {
   constexpr std::size_t kMostBytes = 16'000'000;

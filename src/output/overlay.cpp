@@ -19,7 +19,7 @@ int enlargement(const PinholeCamera &camera) { return std::max(1, (640 + camera.
 
 cv::Scalar scalarOf(const vpRGBa &colour) { return {double(colour.R), double(colour.G), double(colour.B), 255}; }
 
-/// The image in colour (RGBA), enlarged; grey where there is none.
+/// Returns the image enlarged and in colour (RGBA); a frame without an image becomes grey.
 cv::Mat canvasOf(const vpImage<unsigned char> &image, const PinholeCamera &camera)
 {
   const int factor = enlargement(camera);
@@ -39,7 +39,7 @@ void drawText(cv::Mat &canvas, const std::string &text, cv::Point at, double siz
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, colour, 1, cv::LINE_AA);
 }
 
-/// Where the saliency is shown; empty where there is none or no room for it.
+/// Returns the box in which the saliency is shown; it is empty where there is none or no room for it.
 cv::Rect insetBox(const cv::Mat &canvas, const vpImage<float> &foreground)
 {
   if (foreground.getSize() == 0)
@@ -50,7 +50,7 @@ cv::Rect insetBox(const cv::Mat &canvas, const vpImage<float> &foreground)
   return height <= 0 || box.br().y > canvas.rows ? cv::Rect() : box;
 }
 
-/// A border as points on the canvas, from low to high; empty where it is behind the camera.
+/// Returns a border as points on the canvas, from low to high; none where it is behind the camera.
 std::vector<cv::Point2f> borderPoints(const TrunkInView &trunk, Border border, const PinholeCamera &camera, int factor)
 {
   constexpr int kSteps = 24;
@@ -117,7 +117,7 @@ std::string labelOf(const TrunkInView &trunk)
   return trunk.distance > 0 ? fmt::format("{}  {:.1f} m", trunk.id, trunk.distance) : fmt::format("{}", trunk.id);
 }
 
-/// The box of \p text with its lower left corner near \p at, moved until it lies within \p canvas.
+/// Returns the box of \p text with its lower left corner near \p at, moved until it lies within \p canvas.
 cv::Rect labelBox(const std::string &text, double size, cv::Point at, const cv::Rect &canvas)
 {
   const cv::Size extent = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, nullptr) + cv::Size(6, 8);
@@ -155,7 +155,7 @@ void drawLabels(cv::Mat &canvas, const Overlay &overlay, const PinholeCamera &ca
     }
 }
 
-/// 0 dark blue, 0.5 grey, 1 orange; where the field is not a number, black.
+/// Colours the field: 0 is dark blue, 0.5 grey, 1 orange, and what is not a number is black.
 cv::Mat coloured(const vpImage<float> &field, const cv::Size &size)
 {
   const cv::Mat values(static_cast<int>(field.getHeight()), static_cast<int>(field.getWidth()), CV_32FC1, field.bitmap);
@@ -186,7 +186,7 @@ void drawInset(cv::Mat &canvas, const vpImage<float> &foreground)
   drawText(canvas, "near", {box.x + 5, box.y + 15}, 0.4, kTextColour);
 }
 
-/// What the lines mean, at the right end of the bar.
+/// Writes at the right end of the bar what the lines mean.
 void drawLegend(cv::Mat &bar)
 {
   struct Entry

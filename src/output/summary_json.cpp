@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 Json median(std::vector<double> values) { return values.empty() ? Json() : Json(medianOf(std::move(values))); }
 
-/// \p has_ranges: false leaves out all lengths.
+/// Counts the trunks by status and tells their medians; without \p has_ranges it leaves out all lengths.
 Json trunksJson(const std::vector<TrunkRecord> &trunks, bool has_ranges)
 {
   Json json;
@@ -151,7 +151,7 @@ namespace
 {
 template <typename Source> Source sourceOf(const std::string &path, const Json &json, const char *key, Source last)
 {
-  if (!json.contains(key)) // of an earlier version
+  if (!json.contains(key)) // an earlier version wrote none
     return static_cast<Source>(0);
   if (const auto source = valueNamed(json.value(key, ""), last))
     return *source;

@@ -25,9 +25,9 @@ struct InputDigest
   std::string sha256; ///< 64 hexadecimal digits
 };
 
-/// Of a file: its bytes. Of a folder: the name and the bytes of every file in it, in the order of their names. Of a
-/// pattern such as `frames/%05d.png`: the same of its folder. Nothing where \p input is none of these, cannot be read,
-/// or \p is_cancelled becomes true. Cost: reading it once.
+/// Hashes the bytes of a file, or the name and the bytes of every file in a folder in the order of their names; a
+/// pattern such as `frames/%05d.png` stands for its folder. Returns nothing where \p input is none of these, cannot be
+/// read, or \p is_cancelled becomes true. It reads the input once.
 std::optional<InputDigest> digestOf(const std::string &input, const std::atomic<bool> &is_cancelled);
 
 /// A time without a picture.
@@ -70,28 +70,30 @@ struct RunSummary
   std::map<std::string, double> figures; ///< anything else a stage counts, by name
 };
 
-/// Command, options, input with its hash, versions; camera, frames by status, trunks by status with the medians of
-/// their radius, standard deviation and observations, sources of scale and gravity, what is doubtful (judge()), median
-/// cost by stage. null: there was nothing to measure.
+/// Prints command, options, input with its hash, versions; camera, frames by status, trunks by status with the medians
+/// of their radius, standard deviation and observations, sources of scale and gravity, what is doubtful (judge()) and
+/// the median cost by stage. A null says that there was nothing to measure.
 std::string toJson(const RunSummary &summary);
-/// A summary.json. \throw vpException naming the file when it is none, or of a run that ended before its first frame.
+/// Reads a summary.json. \throw vpException naming the file when it is none, or of a run that ended before its first
+/// frame.
 nlohmann::ordered_json readSummary(const std::string &path);
-/// \p error of the file \p path in one line.
+/// Tells \p error of the file \p path in one line.
 std::string faultOf(const std::string &path, const std::exception &error);
-/// Sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
+/// Reads the sources of scale and gravity of a summary.json. Throws vpException naming the file when it is none.
 WorldReference readReference(const std::string &path);
-/// The camera of a summary.json, likewise.
+/// Reads the camera of a summary.json, and throws likewise.
 PinholeCamera readCameraOfRun(const std::string &path);
-/// Where the input of a run lay, and its camera file, empty where none was given. Likewise.
+/// The place of a run's input, and of its camera file, which is empty where none was given.
 struct RunInput
 {
   std::string path, camera_path;
 };
+/// Reads them of a summary.json, and throws likewise.
 RunInput readInputOfRun(const std::string &path);
-/// toJson(), written atomically.
+/// Writes toJson() atomically.
 void writeSummary(const std::string &path, const RunSummary &summary);
 
-/// What a run is worth, in words: what is known, what is doubtful, and which option would help.
+/// The worth of a run in words: what is known, what is doubtful, and which option would help.
 struct Verdict
 {
   bool is_trusted = true;          ///< false: the camera never moved, only rotated, or saw nothing
@@ -101,9 +103,9 @@ struct Verdict
 
 Verdict judge(const RunSummary &summary);
 
-/// The last lines of `bole track`.
+/// Prints the last lines of `bole track`.
 std::string toText(const Verdict &verdict);
 
-/// Of bole, its commit ("unknown" outside a repository), ViSP, OpenCV and libav.
+/// Returns the versions of bole, its commit ("unknown" outside a repository), ViSP, OpenCV and libav.
 std::map<std::string, std::string> versions();
 } // namespace bole

@@ -23,7 +23,7 @@ namespace
 const char *const kUnits = "# units,,m,m,m,1,1,m,1,s,s,1,m^2,m^2,m^2,m^2,1,1,1,m^2,m^2,m,m,m,m,m,m";
 const char *const kFateColumn = ",fate";
 
-/// Rows and columns of TrunkRecord::covariance in the order of the header, from column 12.
+/// The header names the entries of TrunkRecord::covariance from column 12 on, in these rows and columns of the matrix.
 constexpr std::size_t kFirstCovariance = 12, kColumns = 27;
 constexpr std::array<int, 15> kRowOf = {0, 0, 1, 2, 3, 3, 4, 0, 1, 0, 0, 1, 1, 2, 2};
 constexpr std::array<int, 15> kColumnOf = {0, 1, 1, 2, 3, 4, 4, 2, 2, 3, 4, 3, 4, 3, 4};
@@ -114,7 +114,7 @@ void writeBearings(const std::string &path, const std::vector<TrunkRecord> &map,
       continue;
     const Eigen::Vector2d across = Eigen::Vector2d(-to.y(), to.x()) / range, along = to / range;
     const double across_sigma = std::sqrt(std::max(0.0, across.dot(trunk.covarianceXy() * across)));
-    // the ratio r/d is known far better than r and d, whose errors go together
+    // An image tells the ratio r/d far better than r and d, whose errors go together.
     Eigen::Vector3d J(-along.x() * ratio / range, -along.y() * ratio / range, 1 / range);
     const double ratio_variance = J.dot(trunk.covariance.topLeftCorner<3, 3>() * J);
     fmt::format_to(std::back_inserter(text), "{},{},{:.4f},{:.4f},{:.4f},{:.4f},{}\n", trunk.id, toString(trunk.status),

@@ -55,7 +55,7 @@ std::string framesText(const RunSummary &summary)
   return text + gapsText(summary.gaps);
 }
 
-/// Without the common error of the scale, which is told beside it.
+/// Takes the common error of the scale, which the verdict tells beside it, out of the covariance of \p trunk.
 TrunkRecord amongThemselves(TrunkRecord trunk, const RunSummary &summary)
 {
   Eigen::Matrix<double, 5, 1> by_scale;
@@ -120,7 +120,7 @@ void addFacts(Verdict &verdict, const RunSummary &summary)
   verdict.facts.push_back(fmt::format("median {} a frame", withUnit(summary.timing.medianTotal_ms(), 1, "ms")));
 }
 
-/// What makes the result worthless, and what would help.
+/// Adds what makes the result worthless, and what would help.
 void judgeMotion(Verdict &verdict, const RunSummary &summary)
 {
   const auto distrust = [&verdict](std::string why) {

@@ -51,7 +51,7 @@ struct VideoWriter::Libav
   std::size_t pictures = 0;
 };
 
-/// H.264 in constant quality, or MPEG-4 where libavcodec has no encoder of it.
+/// Opens an encoder of H.264 in constant quality, or of MPEG-4 where libavcodec has none of H.264.
 void VideoWriter::Libav::openEncoder(int w, int h)
 {
   constexpr int kKeyInterval = 50; // pictures from a key frame to the next
@@ -102,7 +102,7 @@ void VideoWriter::Libav::open(int w, int h, const std::string &name)
   check(scaler ? 0 : AVERROR(EINVAL), "no conversion to YUV");
 }
 
-/// Writes what comes out for \p picture; nothing at the end of the video.
+/// Encodes \p picture and writes the packets that come out; a null pointer ends the video.
 void VideoWriter::Libav::encode(const AVFrame *picture)
 {
   checkLibav(avcodec_send_frame(encoder.get(), picture), "a picture cannot be encoded");
@@ -111,7 +111,7 @@ void VideoWriter::Libav::encode(const AVFrame *picture)
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF)
       return;
     checkLibav(code, "a picture cannot be encoded");
-    packet->duration = step; // of no duration, the last picture would end before it begins and never be shown
+    packet->duration = step; // a last picture without a duration would never be shown
     av_packet_rescale_ts(packet.get(), kTimeBase, format->streams[0]->time_base);
     check(av_interleaved_write_frame(format.get(), packet.get()), "cannot be written");
     av_packet_unref(packet.get());

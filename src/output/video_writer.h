@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Colour pictures to an mp4 file that browsers play.
+/// Writes colour pictures into an mp4 file that browsers play.
 
 #include <bole/visp.h>
 #include <cstdint>
@@ -34,7 +34,7 @@ public:
 
   /// The size of the first picture is that of the video; stamps must rise (one that does not is dropped).
   void write(const vpImage<vpRGBa> &picture, std::int64_t stamp_ns);
-  /// Completes the file and puts it in its place; nothing when no picture was written.
+  /// Completes the file and puts it in its place; without a picture it leaves no file.
   void finish();
   std::size_t pictures() const;
 

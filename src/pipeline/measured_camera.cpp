@@ -2,6 +2,7 @@
 #include "pipeline/measured_camera.h"
 
 #include "input/live_video.h"
+#include "input/recorded_source.h"
 #include "motion/focal_length.h"
 
 #include <algorithm>
@@ -59,6 +60,9 @@ MeasuredSource openMeasured(const std::string &input, const SourceOptions &optio
   opened.note = fmt::format(
       "no camera file: the camera moves as one with a field of view of {:.1f} +- {:.1f} degrees (f = {:.0f} px)",
       view.degrees, view.sigma_degrees, opened.source->camera().fx);
+  if (const auto *images = dynamic_cast<const SequenceSource *>(opened.source.get());
+      images && !images->rateNote().empty())
+    opened.note += "; " + images->rateNote();
   return opened;
 }
 

@@ -15,7 +15,7 @@ struct MeasuredSource
 {
   std::unique_ptr<FrameSource> source;
   SourceOptions options;              ///< that open the same once more
-  std::string note;                   ///< what is assumed about the camera; empty where nothing is
+  std::string note;                   ///< what is assumed about camera and rate; empty where nothing is
   bool is_camera_known = true;        ///< false: the field of view is a guess
   double field_of_view_sigma_deg = 0; ///< of one that was measured; 0: of a calibration, or given
 };

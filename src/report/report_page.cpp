@@ -27,7 +27,8 @@ namespace
 using Json = nlohmann::json;
 
 namespace fs = std::filesystem;
-/// The picture views/ID.jpg of \p run; empty where there is none, or something else: a link may lead out of the folder.
+/// Reads the picture views/ID.jpg of \p run. It is empty where there is none, and where a link stands in its place,
+/// which may lead out of the folder.
 std::string viewOf(const fs::path &run, int id)
 {
   constexpr std::size_t kMostBytes = 16'000'000;
@@ -59,6 +60,8 @@ void readSummaryInto(RunRecord &run, const std::string &path)
     run.versions = json.value("versions", run.versions);
     run.is_trusted = json.value("trusted", true);
     run.has_ranges = json.value("ranges", true);
+    run.scale_sigma =
+        json.contains("scale_sigma") && json["scale_sigma"].is_number() ? json["scale_sigma"].get<double>() : 0;
     for (const Json &sensor : json.value("sensors", Json::array()))
       run.sensors.push_back(
           {textOf(sensor, "sensor"), textOf(sensor, "kind"), sensor.value("since_s", 0.0), textOf(sensor, "text")});
@@ -68,7 +71,7 @@ void readSummaryInto(RunRecord &run, const std::string &path)
   }
 }
 
-/// Moves the truth into the world of the run, as pictures of both want it.
+/// Moves the truth into the world of the run, so that both can be drawn in one picture.
 void readTruthInto(RunRecord &run, const std::string &sequence)
 {
   const AslSource source(sequence);
@@ -116,11 +119,11 @@ RunRecord readRun(const std::string &folder, const std::string &sequence)
 
 namespace
 {
-constexpr std::size_t kMostPoints = 400; // of a curve: more are not seen
+constexpr std::size_t kMostPoints = 400; // of a curve: a reader sees no more
 constexpr std::size_t kMostSteps = 4000; // of a line on the map
 constexpr std::size_t kEllipses = 30;    // of the trajectory
 
-/// \p jpeg in one text, as a page holds it.
+/// Returns \p jpeg as an address that holds the picture itself.
 std::string asText(const std::string &jpeg)
 {
   std::string text(AV_BASE64_SIZE(jpeg.size()), '\0'); // with a zero at its end
@@ -134,7 +137,7 @@ double secondsSince(const RunRecord &run, std::int64_t stamp_ns)
   return run.trace.frames.empty() ? 0 : 1e-9 * static_cast<double>(stamp_ns - run.trace.frames.front().stamp_ns);
 }
 
-/// \p jsonOf each of \p values, or of every so many where they are more than \p most.
+/// Lists \p jsonOf of each of \p values, or of every n-th where there are more than \p most.
 template <class Values, class JsonOf> Json thinned(const Values &values, std::size_t most, const JsonOf &jsonOf)
 {
   Json list = Json::array();
@@ -148,7 +151,7 @@ Json lineOf(const Trajectory &path)
   return thinned(path, kMostSteps, [](const StampedPose &pose) { return Json{pose.wMb.t.x(), pose.wMb.t.y()}; });
 }
 
-/// Runs of frames of which \p kindOf is the same: [from s, to s, kind].
+/// Lists the runs of frames for which \p kindOf is the same: [from s, to s, kind].
 template <class KindOf> Json runsOf(const RunRecord &run, const KindOf &kindOf)
 {
   const std::vector<FrameTrace> &frames = run.trace.frames;
@@ -235,7 +238,7 @@ Json evaluationJson(const Evaluation &evaluation)
   return json;
 }
 
-/// Distance in the plane between the smoothed path and the truth: [s, m].
+/// Lists the distance in the plane between the smoothed path and the truth: [s, m].
 Json errorsOf(const RunRecord &run)
 {
   if (run.smoothed.empty())
@@ -248,7 +251,7 @@ Json errorsOf(const RunRecord &run)
   });
 }
 
-/// What was known frame by frame.
+/// Adds what was known frame by frame.
 void addFrames(Json &json, const RunRecord &run)
 {
   const std::vector<FrameTrace> &frames = run.trace.frames;
@@ -297,6 +300,7 @@ std::string reportJson(const RunRecord &run)
                {"versions", run.versions},
                {"trusted", run.is_trusted},
                {"ranges", run.has_ranges},
+               {"scale_sigma", run.scale_sigma},
                {"videos", run.videos},
                {"sensors", Json::array()},
                {"trunks", Json::array()},
@@ -322,7 +326,7 @@ std::string reportJson(const RunRecord &run)
 std::string reportHtml(const RunRecord &run)
 {
   std::string json = reportJson(run), page = kReportTemplate;
-  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) // nothing in it ends the script
+  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) // no word of the run may end the script
     json.replace(at, 1, "\\u003c");
   const std::string place = "/*RUN*/";
   return page.replace(page.find(place), place.size(), json);

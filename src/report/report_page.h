@@ -24,6 +24,7 @@ struct RunRecord
   std::map<std::string, std::string> versions;
   std::vector<SensorVerdict> sensors;
   bool is_trusted = true, has_ranges = true;
+  double scale_sigma = 0;          ///< of the logarithm of the scale; 0 where odometry gives it
   std::vector<std::string> videos; ///< names of those beside the page
   std::vector<TrunkRecord> trunks; ///< and hypotheses
   std::map<int, std::string> views_jpeg;
@@ -41,11 +42,11 @@ struct RunRecord
 /// \throw vpException naming the file that is missing or faulty.
 RunRecord readRun(const std::string &run, const std::string &sequence);
 
-/// What the page shows, as JSON: the script in page.html draws it.
+/// Returns what the page shows as JSON; the script in page.html draws it.
 std::string reportJson(const RunRecord &run);
 
-/// page.html with reportJson() in it: what the run is worth, map, trunks, time line, trajectory, cost, how to repeat
-/// it, what to do next.
+/// Puts reportJson() into page.html: the page tells what the run is worth, its map, trunks, time line, trajectory and
+/// cost, what to do next and how to repeat it.
 std::string reportHtml(const RunRecord &run);
 
 /// Writes RUN/report.html from what the folder \p run holds; \p sequence: ASL folder with the truth, or empty.

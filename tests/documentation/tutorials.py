@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Runs the tutorials as they are printed, and compares the page of options and the README with what the command prints.
+Every other command that a page prints is held against the help of the command: its name and its options must exist.
 Each page's `sh` blocks run in one shell, in a folder that has data/ as the sources
 have; a `cpp` block before them is built against the build tree as ./tutorial. `py` blocks run in one
 Python (skipped without the module). Blocks without a language are not run.
@@ -51,26 +52,70 @@ def timeless(text):
     return re.sub(r"[0-9.]+ ms", "some ms", text)
 
 
-def check_demonstration(build, source, environment):
-    """The README's first block without a language is what the commands of `./setup.sh demo` print, but for the time."""
+def check_readme(build, source, environment):
+    """The README's first block without a language is what the commands of `./setup.sh demo` print, but for the time. Its
+    second one, which maps a video walk.mp4, is run on the overlay of that flight."""
     commands = re.findall(r"^  (\./bole .*)$", text_of(os.path.join(source, "setup.sh")), re.M)
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text_of(os.path.join(source, "README.md")), re.S | re.M)
-    block = next(text for language, text in blocks if not language)
+    block, own_video = [text for language, text in blocks if not language][:2]
     with tempfile.TemporaryDirectory(prefix="bole-demo-") as folder:
         os.symlink(os.path.join(source, "data"), os.path.join(folder, "data"))
         os.symlink(os.path.join(build, "bole"), os.path.join(folder, "bole"))
         status, printed = run(["sh", "-e", "-c", "\n".join(commands)], folder, environment)
-    if status == 0 and timeless(printed) == timeless(block):
+        if status != 0 or timeless(printed) != timeless(block):
+            print(f"README.md: FAILED, `./setup.sh demo` prints\n{printed}")
+            return 1
+        os.rename(os.path.join(folder, "run/overlay.mp4"), os.path.join(folder, "walk.mp4"))
+        status, printed = run(["sh", "-e", "-c", own_video], folder, environment)
+    if status in (0, 3) and "report.html" in printed:  # 3: the overlay is a video of lines too, and need not be trusted
         return 0
-    print(f"README.md: FAILED, `./setup.sh demo` prints\n{printed}")
+    print(f"README.md: FAILED, `{own_video.strip()}` ends with {status} and prints\n{printed}")
     return 1
+
+
+def commands_of(text):
+    """The commands of bole that a page prints, in its blocks and between backticks: name and arguments."""
+    blocks = re.findall(r"^```\w*\n(.*?)^```$|^((?: {4}\S.*\n)+)", text, re.S | re.M)
+    spans = re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.S | re.M))
+    for line in [line for pair in blocks for part in pair for line in part.split("\n")] + spans:
+        for command in re.split(r" && | \|\|? | *; *|\$ ", line.split(" # ")[0].replace(" |", " | ")):
+            words = re.match(r"(?:\S*/)?bole ([a-z][a-z-]+)( .*)?$", command.strip())
+            if words:
+                yield words.group(1), (words.group(2) or "").split()
+
+
+def options_of(command, source, environment):
+    """The exit status of a command's help, and the options that it and the commands below it name."""
+    status, text = run(["bole", *command, "--help"], source, environment)
+    known = set(re.findall(r"(?<![\w-])-{1,2}[a-z][\w-]*", text))
+    below = re.findall(r"^  ([a-z]\S*) ", text.partition("\nSubcommands:\n")[2], re.M)
+    for name in below:
+        known |= options_of([*command, name], source, environment)[1]
+    return status, known
+
+
+def check_commands(source, environment):
+    """Every command of bole that any page prints exists, and so do its options."""
+    helps, failed = {}, 0
+    pages = [os.path.join(source, p) for p in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "models/README.md")]
+    for page in pages + sorted(glob.glob(os.path.join(source, "src/doc/*.md"))):
+        for name, words in commands_of(text_of(page)):
+            if name not in helps:
+                helps[name] = options_of([name], source, environment)
+            status, known = helps[name]
+            for word in [name, *words]:
+                option = word.split("=")[0]
+                if status != 0 or (re.match(r"-{1,2}[a-z]", option) and option not in known):
+                    print(f"{os.path.basename(page)}: FAILED, `bole {name}` knows no `{option}`")
+                    failed += 1
+    return failed
 
 
 def main():
     build, source = (os.path.abspath(p) for p in sys.argv[1:3])
     pages = sys.argv[3:] or sorted(glob.glob(os.path.join(source, "src/doc/tutorial-*.md")))
     environment = dict(os.environ, PATH=build + ":" + os.environ["PATH"], PYTHONPATH=build + "/python")
-    failed = check_demonstration(build, source, environment)
+    failed = check_readme(build, source, environment) + check_commands(source, environment)
     if run(["bole", "options", "--markdown"], source, environment)[1] not in text_of(os.path.join(source, "src/doc/options.md")):
         print("options.md: FAILED, it is not what `bole options --markdown` prints")
         failed += 1

@@ -49,6 +49,7 @@ struct Result
   std::size_t frames = 0; ///< that were not used
   double named_s = -1;    ///< stamp of the first of these [s]; < 0: none
   std::string names;      ///< how they and the sensors are named
+  std::string commit;     ///< of the program that made the run
 };
 
 /// \p text without what is in brackets, and without since when, against what, how exactly and what must be.
@@ -103,6 +104,7 @@ void readSummary(const fs::path &run, Result &result)
       result.names += (result.names.empty() ? "" : ", ") + text;
   };
   const auto summary = nlohmann::json::parse(test::textOf(run / "summary.json"));
+  result.commit = summary.at("versions").value("commit", "unknown");
   for (const auto &gap : summary.at("gaps"))
     add(gap.at("begin_s"), fmt::format("no picture for {:.1f} s", gap.at("length_s").get<double>()));
   for (const auto &sensor : summary.at("sensors"))
@@ -251,7 +253,8 @@ std::string rowOf(const Line &line, bool has_figures)
 /// A table for each group.
 std::string tableOf(const std::vector<Line> &lines, const Result &clean)
 {
-  std::string text = fmt::format("No fault: {:.3f}, {:.2f}, {:.2f}.\n", clean.ate, clean.recall, clean.precision);
+  std::string text = fmt::format("Commit {:.7}; no fault: {:.3f}, {:.2f}, {:.2f}.\n", clean.commit, clean.ate,
+                                 clean.recall, clean.precision);
   for (auto begin = lines.begin(); begin != lines.end();) {
     const std::string &group = begin->fault->group;
     const auto end = std::find_if(begin, lines.end(), [&](const Line &line) { return line.fault->group != group; });

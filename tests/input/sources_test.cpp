@@ -13,7 +13,9 @@ using bole::test::FlightFolder;
 using bole::test::messageOf;
 using bole::test::readAll;
 using bole::test::textOf;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 namespace
 {
@@ -385,6 +387,17 @@ TEST_F(Sources, SaysThatTheCameraIsAssumed)
   const auto source = openSource(path("i%02d.png"), options);
   EXPECT_THAT(source->note(), HasSubstr("assuming a field of view of 90 degrees"));
   EXPECT_NEAR(source->camera().fx, 48, 1e-9);
+}
+
+TEST_F(Sources, SaysThatTheRateOfNumberedImagesIsAssumedAndWhatTellsAnother)
+{
+  writeImages("i%02d.png", {0, 1});
+  SourceOptions options;
+  EXPECT_THAT(openSource(path("i%02d.png"), options)->note(),
+              AllOf(HasSubstr("25 frames a second"), HasSubstr("(--rate)")));
+  EXPECT_FALSE(openSource(path("i%02d.png"), options)->isCameraKnown());
+  options.frame_rate_hz = 10;
+  EXPECT_THAT(openSource(path("i%02d.png"), options)->note(), Not(HasSubstr("a second")));
 }
 
 TEST(SourceOptions, NameTheValueThatIsOutOfRange)

@@ -6,6 +6,7 @@
 #include "report/report_page.h"
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace
 {
@@ -129,22 +130,46 @@ TEST(Report, OfLongFlightsDrawsWhatIsSeen)
   EXPECT_LE(json["places"].size(), 400u);
 }
 
-/// The page as a browser has it once its script has run.
-std::string rendered(const RunRecord &run)
+class ReportInABrowser : public testing::Test
 {
-  const test::TemporaryFolder folder;
-  const std::string page = folder.write("report.html", reportHtml(run));
-  const std::string dom =
-      test::runShell("chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + folder / "profile" +
-                     " --virtual-time-budget=3000 --dump-dom file://" + page + " 2>/dev/null")
-          .text;
-  return dom.substr(0, dom.find("<script type"));
-}
+protected:
+  void SetUp() override
+  {
+    if (test::runShell("command -v chromium").status != 0)
+      GTEST_SKIP() << "needs chromium";
+  }
 
-TEST(ReportInABrowser, ShowsTrunksTimeLineAndDoubts)
+  /// The page as a browser has it once its script has run.
+  static std::string rendered(const RunRecord &run)
+  {
+    const test::TemporaryFolder folder;
+    const std::string dom = domOf(folder, folder.write("report.html", reportHtml(run)));
+    return dom.substr(0, dom.find("<script type"));
+  }
+
+  /// What \p expression of JavaScript is in the page of \p run, in a frame that is 400 px wide.
+  static std::string narrow(const RunRecord &run, const std::string &expression)
+  {
+    const test::TemporaryFolder folder;
+    folder.write("report.html", reportHtml(run) + "<script>parent.postMessage(" + expression + ", '*')</script>");
+    const std::string outer = "<title></title><script>onmessage = e => document.title = e.data</script>"
+                              "<iframe src=\"report.html\" style=\"width:400px;height:800px;border:0\"></iframe>";
+    const std::string dom = domOf(folder, folder.write("outer.html", outer));
+    const std::size_t from = dom.find("<title>") + 7;
+    return dom.substr(from, dom.find("</title>") - from);
+  }
+
+private:
+  static std::string domOf(const test::TemporaryFolder &folder, const std::string &page)
+  {
+    return test::runShell("chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + folder / "profile" +
+                          " --virtual-time-budget=3000 --dump-dom file://" + page + " 2>/dev/null")
+        .text;
+  }
+};
+
+TEST_F(ReportInABrowser, ShowsTrunksTimeLineAndDoubts)
 {
-  if (test::runShell("command -v chromium").status != 0)
-    GTEST_SKIP() << "needs chromium";
   RunRecord run = smallRun();
   std::string dom = rendered(run);
   EXPECT_EQ(countOf(dom, "class=\"trunk"), 2u);
@@ -158,6 +183,41 @@ TEST(ReportInABrowser, ShowsTrunksTimeLineAndDoubts)
   EXPECT_THAT(dom, AllOf(HasSubstr("Not to be trusted"), HasSubstr("Bearings"), HasSubstr("How it was made")));
   EXPECT_THAT(dom, AllOf(Not(HasSubstr("[m]")), Not(HasSubstr("bole export"))));
   EXPECT_THAT(rendered(RunRecord()), HasSubstr("How it was made"));
+}
+
+TEST_F(ReportInABrowser, OpensWithTheLikeliestTrunkAndOfEqualOnesWithTheNearest)
+{
+  RunRecord run = smallRun();
+  run.trunks = {trunkOf(1), trunkOf(2), trunkOf(3), trunkOf(4)};
+  run.trunks[0].probability = 0.7; // the nearest
+  run.trunks[1].probability = 0.954;
+  run.trunks[2].probability = 0.951;
+  run.trunks[2].xy.y() = 0.6; // nearer than the second, and as likely in whole per cent
+  run.trunks[3].probability = 0.94;
+  const std::string dom = rendered(run);
+  EXPECT_THAT(dom, HasSubstr("<h3>Trunk 3</h3>"));
+  EXPECT_EQ(countOf(dom, "class=\"chosen\""), 1u);
+}
+
+TEST_F(ReportInABrowser, TellsTheTwoKindsOfSigmaApart)
+{
+  RunRecord run = smallRun();
+  EXPECT_THAT(rendered(run), AllOf(HasSubstr("<dt>σ in the world</dt>"), HasSubstr("<dt>σ to the camera</dt>"),
+                                   Not(HasSubstr("and the scale"))));
+  run.scale_sigma = 0.14;
+  EXPECT_THAT(rendered(run), HasSubstr("the scale, which is known to ± 14 %"));
+}
+
+TEST_F(ReportInABrowser, KeepsATableInItsBoxWithTheFirstColumnInANarrowWindow)
+{
+  const std::string text = narrow(smallRun(), R"((() => {
+    const box = [...document.querySelectorAll('.wide')].find(e => e.querySelector('tr[data-id]'));
+    box.scrollLeft = 60;
+    const left = e => Math.round(e.getBoundingClientRect().left);
+    return ['width', innerWidth, 'fits', document.documentElement.scrollWidth <= innerWidth, 'scrolled', box.scrollLeft > 20, 'kept',
+            left(box.querySelector('td')) - left(box)].join(' ');
+  })())");
+  EXPECT_EQ(text, "width 400 fits true scrolled true kept 0");
 }
 
 TEST(Trace, ReadsBackWhatItWrote)
@@ -177,26 +237,74 @@ TEST(Trace, ReadsBackWhatItWrote)
   EXPECT_EQ(back.evidence.squares()[0].second, 5);
 }
 
-TEST(BestViews, KeepTheLargestViewOfATrunkThatIsWhole)
+/// A trunk of 0.2 m at places ahead of a camera that stands 1 m over the ground, and pictures of it.
+class BestViewsOfATrunk : public testing::Test
 {
-  const PinholeCamera camera;
-  const Eigen::Matrix3d ahead = (Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();
-  Trunk trunk;
-  trunk.log_radius = std::log(0.2);
-  const vpImage<unsigned char> dark(240, 320, 10), bright(240, 320, 200);
-  const auto seenFrom = [&](double x, double y) {
+protected:
+  RelativeTrunk seenFrom(double x, double y)
+  {
+    Trunk trunk;
+    trunk.log_radius = std::log(0.2);
     trunk.xy = {x, y};
+    const Eigen::Matrix3d ahead = (Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();
     return relativeTrunk(Pose(ahead, {0, 0, 1}), Pose(), trunk);
-  };
+  }
+
+  /// A picture of grey 100 in which \p trunk has the grey level \p bark, blurred by \p sigma_px.
+  vpImage<unsigned char> pictureOf(const RelativeTrunk &trunk, unsigned char bark, double sigma_px = 0)
+  {
+    vpImage<unsigned char> image(240, 320, 100);
+    const double left = camera.project(trunk.borderDirection(Border::left, 0)).x();
+    const double right = camera.project(trunk.borderDirection(Border::right, 0)).x();
+    cv::Mat pixels(240, 320, CV_8UC1, image.bitmap);
+    pixels.colRange(std::max(0, static_cast<int>(left)), std::min(320, static_cast<int>(right))) = bark;
+    if (sigma_px > 0)
+      cv::GaussianBlur(pixels, pixels, {}, sigma_px);
+    return image;
+  }
+
+  void add(const RelativeTrunk &trunk, unsigned char bark, double tan_high = 0.3, double sigma_px = 0)
+  {
+    views.add(4, pictureOf(trunk, bark, sigma_px), camera, trunk, -0.3, tan_high);
+  }
+
+  /// Grey level of the bark in the view that was kept.
+  int kept()
+  {
+    const std::string jpeg = views.jpeg(4);
+    const cv::Mat picture = cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_GRAYSCALE);
+    return picture.empty() ? -1 : picture.at<unsigned char>(picture.rows / 2, picture.cols / 2);
+  }
+
+  const PinholeCamera camera;
   BestViews views;
+};
+
+TEST_F(BestViewsOfATrunk, AreTheLargestWithBothBordersInThePicture)
+{
   EXPECT_EQ(views.jpeg(4), "");
-  views.add(4, bright, camera, seenFrom(2, 0), -0.3, 0.3);
-  views.add(4, dark, camera, seenFrom(5, 0), -0.3, 0.3);     // smaller
-  views.add(4, dark, camera, seenFrom(1.5, 1.2), -0.3, 0.3); // only one border in the image
-  const std::string jpeg = views.jpeg(4);
-  const cv::Mat picture = cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_GRAYSCALE);
-  ASSERT_FALSE(picture.empty());
-  EXPECT_NEAR(picture.at<unsigned char>(picture.rows / 2, picture.cols / 2), 200, 12);
-  EXPECT_GT(picture.rows, 100);
+  add(seenFrom(2, 0), 200);
+  add(seenFrom(5, 0), 20);     // smaller
+  add(seenFrom(1.5, 1.2), 20); // only one border in the picture
+  EXPECT_NEAR(kept(), 200, 12);
+}
+
+TEST_F(BestViewsOfATrunk, HoldTheTrackedPartRatherThanALargerOneThatLeavesThePicture)
+{
+  add(seenFrom(2, 0), 200);
+  add(seenFrom(1.5, 0), 20, 2.5); // larger, but two thirds are above the picture
+  EXPECT_NEAR(kept(), 200, 12);
+  views.forget(4);
+  add(seenFrom(1.5, 0), 20, 2.5); // better than nothing
+  EXPECT_NEAR(kept(), 20, 12);
+}
+
+TEST_F(BestViewsOfATrunk, AreSharpRatherThanALittleLarger)
+{
+  add(seenFrom(2, 0), 20, 0.3, 4);
+  add(seenFrom(2.2, 0), 200); // smaller and sharp
+  EXPECT_NEAR(kept(), 200, 12);
+  add(seenFrom(1.8, 0), 20, 0.3, 4);
+  EXPECT_NEAR(kept(), 200, 12);
 }
 } // namespace
