@@ -6,7 +6,6 @@
 #include "paper/paper_mapper.h"
 #include "progress.h"
 #include "simulation/simulated_flight.h"
-#include "support/statistics.h"
 #include "support/text.h"
 #include "support/units.h"
 #include <bole/evaluation.h>

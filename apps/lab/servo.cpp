@@ -6,7 +6,7 @@
 #include "support/text.h"
 
 #include "progress.h"
-#include "support/statistics.h"
+#include "support/units.h"
 #include "support/video.h"
 #include "trials/flight_record.h"
 #include "trials/servo_trial.h"

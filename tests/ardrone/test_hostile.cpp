@@ -3,8 +3,8 @@
 // flight command. On loopback; every loop is bounded, nothing measures time.
 #include "ardrone/pave.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/server_socket.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/emulator_wire.h"
+#include "emulator/wire_format.h"
 
 #include "files.h"
 #include "flight.h"

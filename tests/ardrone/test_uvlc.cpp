@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "ardrone/uvlc.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

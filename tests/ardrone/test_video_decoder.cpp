@@ -3,7 +3,7 @@
 #include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 #include "flight.h"
 

@@ -9,7 +9,7 @@
 #include "ardrone/pave.h"
 #include "ardrone/uvlc.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 #include "output/video_writer.h"
 #include <bole/graph.h>
 

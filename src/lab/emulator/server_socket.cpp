@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "emulator/server_socket.h"
+#include "emulator/emulator_wire.h"
 
 #include "support/text.h"
 

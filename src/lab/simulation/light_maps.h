@@ -3,7 +3,7 @@
 /// \file
 /// Light that does not depend on the camera, computed once: irradiance over pi of ground, bark and leaves.
 
-#include "simulation/ray_scene.h"
+#include "simulation/forest_mesh.h"
 
 namespace bole
 {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "trials/closed_loop.h"
 
-#include "support/statistics.h"
 #include "support/text.h"
+#include "support/units.h"
 
 #include <algorithm>
 #include <ctime>

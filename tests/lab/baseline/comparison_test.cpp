@@ -4,7 +4,6 @@
 #include "support/units.h"
 
 #include "baseline/comparison.h"
-#include "baseline/comparison_report.h"
 #include <bole/cylinder.h>
 #include <bole/vpMbTrunkTracker.h>
 

@@ -3,8 +3,8 @@
 // no short cuts.
 #include "support/drawn_trunks.h"
 
-#include "paper/joint_optimum.h"
 #include "paper/paper_mapper.h"
+#include "paper/tree_energy.h"
 #include "support/units.h"
 #include <bole/smoother.h>
 

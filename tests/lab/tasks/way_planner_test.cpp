@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "obstacles.h"
 
-#include "tasks/plane_response.h"
+#include "tasks/drone_response.h"
 #include "tasks/way_planner.h"
 
 #include <algorithm>

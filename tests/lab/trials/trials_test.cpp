@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "faults/fault.h"
 #include "simulation/random.h"
-#include "support/statistics.h"
+#include "support/units.h"
 #include "trials/closed_loop.h"
 #include "trials/flight_record.h"
 #include "trials/scenario.h"
