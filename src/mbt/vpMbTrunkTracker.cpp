@@ -3,9 +3,8 @@
 #include "geometry/names.h"
 #include "geometry/visp_matrix.h"
 #include "input/image_health.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "mbt/pose_estimator.h"
-#include "mbt/trunk_settings.h"
 
 #include <Eigen/Cholesky>
 

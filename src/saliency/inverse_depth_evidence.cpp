@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "saliency/inverse_depth_evidence.h"
 
 #include "geometry/median.h"
-#include "saliency/image_pyramid.h"
+#include "saliency/saliency.h"
 #include "saliency/saliency_loops.h"
 
 #include <algorithm>

@@ -17,7 +17,7 @@ void halvedRow(const float *upper, const float *lower, int width, float *out);
 void gradientsOfRow(const float *above, const float *row, const float *below, int width, float scale, float *gx,
                     float *gy);
 
-// The loop of rotation_em.h over one row of pixels.
+// The loop of estimateRotation() over one row of pixels.
 
 /// Noise of one level: variances of the flow [px^2 of the level] and of intensity.
 struct LevelNoise

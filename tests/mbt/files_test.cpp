@@ -3,8 +3,7 @@
 #include "support/files.h"
 #include "support/messages.h"
 
-#include "mbt/cao_reader.h"
-#include "mbt/trunk_settings.h"
+#include "mbt/model_files.h"
 #include <bole/vpMbTrunkTracker.h>
 
 #include <gmock/gmock.h>

@@ -4,7 +4,7 @@
 #include "support/files.h"
 #include "support/messages.h"
 
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "mbt/model_trunk.h"
 #include <bole/vpMbTrunkTracker.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/drawn_trunks.h"
 
-#include "mbt/border_vote.h"
 #include "mbt/model_trunk.h"
+#include "mbt/pose_estimator.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

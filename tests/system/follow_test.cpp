@@ -3,7 +3,7 @@
 #include "run_bole.h"
 
 #include "input/recorded_source.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include <bole/open_source.h>
 
 #include <gmock/gmock.h>
