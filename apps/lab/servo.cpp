@@ -8,7 +8,7 @@
 #include "progress.h"
 #include "support/units.h"
 #include "support/video.h"
-#include "trials/flight_record.h"
+#include "trials/closed_loop.h"
 #include "trials/servo_trial.h"
 #include <bole/config.h>
 #include <bole/output_folder.h>

@@ -4,7 +4,6 @@
 
 #include "progress.h"
 #include "simulation/simulated_flight.h"
-#include "simulation/words.h"
 
 #include <fmt/format.h>
 #include <memory>

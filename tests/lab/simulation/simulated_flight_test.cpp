@@ -3,7 +3,6 @@
 #include "support/messages.h"
 
 #include "simulation/simulated_flight.h"
-#include "simulation/words.h"
 #include "support/units.h"
 #include <bole/open_source.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "simulation/vpSimulatorArDrone.h"
 #include "tasks/trunk_task.h"
-#include "trials/flight_record.h"
+#include "trials/closed_loop.h"
 #include "trials/servo_trial.h"
 
 #include <gtest/gtest.h>

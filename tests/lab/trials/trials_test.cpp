@@ -3,8 +3,6 @@
 #include "simulation/random.h"
 #include "support/units.h"
 #include "trials/closed_loop.h"
-#include "trials/flight_record.h"
-#include "trials/scenario.h"
 #include "trials/servo_trial.h"
 
 #include <algorithm>
