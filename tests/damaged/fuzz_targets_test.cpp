@@ -3,7 +3,7 @@
 // finds something aborts.
 #include "ardrone/files.h"
 
-#include "ardrone/at_command.h"
+#include "ardrone/drone_link.h"
 #include "ardrone/flight_folder.h"
 #include "ardrone/navdata_odometry.h"
 #include "ardrone/pave.h"

@@ -2,7 +2,7 @@
 #include "support/files.h"
 #include "support/messages.h"
 
-#include "input/rectifier.h"
+#include "input/frame_builder.h"
 #include "input/yaml_file.h"
 #include <bole/open_source.h>
 
