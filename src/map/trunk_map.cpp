@@ -19,9 +19,7 @@ TrunkMap::TrunkMap(const MapOptions &options) : TrunkMap(options, {}) {}
 TrunkMap::TrunkMap(const MapOptions &options, std::vector<MapTrunk> trunks)
     : m_options(options), m_trunks(std::move(trunks)), m_next_id(static_cast<int>(m_trunks.size()))
 {
-  for (std::size_t i = 0; i < m_trunks.size(); ++i)
-    if (!m_trunks[i].removed && !m_trunks[i].inactive)
-      m_active.push_back(i);
+  indexActive();
   estimateRadii();
 }
 
