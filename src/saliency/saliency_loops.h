@@ -81,14 +81,13 @@ void meansDownColumns(const float *in, int rows, int columns, int window, float 
 /// Squares of the gradient of a row.
 void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, float *out);
 
-/// What the likelihood of a window's residual is made of.
+/// What the likelihood of a window's residual, against that of an unrelated window, is made of.
 struct LikelihoodTerms
 {
   float intensity;            ///< variance
   float unrelated;            ///< variance of the flow between unrelated windows [px^2]
   const float *flow_variance; ///< of each step [px^2]
   float weight;
-  bool is_relative;
 };
 
 /// Adds the log-likelihood of \p r2 to \p evidence of \p pixels pixels; \p g2: mean square gradients.

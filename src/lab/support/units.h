@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Constants, units, turns and quantiles.
+/// Constants, units, turns, quantiles and processor time.
 #include <bole/pose.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <ctime>
 #include <limits>
 #include <vector>
 
@@ -46,5 +47,13 @@ inline double quantileOf(std::vector<double> values, double share)
 
 /// The upper one of the two in the middle where the count is even; NaN of none.
 inline double medianOf(const std::vector<double> &values) { return quantileOf(values, 0.5); }
+
+/// What this process has computed, on all its threads: what other programs take does not count.
+inline double processTime_ms()
+{
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
 } // namespace lab
 } // namespace bole

@@ -36,11 +36,8 @@ struct LoopSample
 
 struct LoopOptions
 {
-  double duration_s = 40;       ///< of servoing, at most, 1 to 3600
-  double search_most_s = 60;    ///< before it, at most, 1 to 3600
-  double contact = 0.28;        ///< body's origin to bark that is a contact: ends the flight [m], 0.05 to 2
-  double translation_max = 1.5; ///< given to the robot [m/s], 0.05 to 5
-  double rotation_max = 1;      ///< [rad/s], 0.05 to 5
+  double duration_s = 40;    ///< of servoing, at most, 1 to 3600
+  double search_most_s = 60; ///< before it, at most, 1 to 3600
   FaultOptions fault;
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
