@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Whoever speaks on the drone's ports: the client neither believes it, nor fills its memory, nor ever answers with a
 // flight command. On loopback; every loop is bounded, nothing measures time.
-#include "ardrone/pave.h"
+#include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
 #include "emulator/emulator_wire.h"
 #include "emulator/wire_format.h"

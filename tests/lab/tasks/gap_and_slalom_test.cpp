@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "obstacles.h"
 
-#include "tasks/gap_task.h"
-#include "tasks/slalom_task.h"
+#include "tasks/gap_and_slalom.h"
 
 #include <algorithm>
 #include <cmath>
