@@ -98,6 +98,5 @@ std::string toText(const TimingTable &timing);
 /// Header "frame,timestamp [s],<stage> [ms],...,total [ms]", and "age [ms]" for a live run; one line
 /// a frame, atomically.
 void writeTiming(const std::string &path, const TimingTable &timing);
-/// Reads it.
 TimingTable readTiming(const std::string &path);
 } // namespace bole

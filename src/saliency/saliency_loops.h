@@ -25,7 +25,6 @@ struct LevelNoise
   float background, foreground, intensity, prior_logit;
 };
 
-/// One image of a level with its gradient: pixels, row by row.
 struct LevelImages
 {
   const float *grey, *gradient_x, *gradient_y;
@@ -78,7 +77,6 @@ void slidingMeans(const float *in, int n, int lag, int window, float *out);
 /// Running means of \p columns numbers a row over \p window rows; the ends repeat. \p sum: memory for \p columns.
 void meansDownColumns(const float *in, int rows, int columns, int window, float *sum, float *out);
 
-/// Squares of the gradient of a row.
 void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, float *out);
 
 /// What the likelihood of a window's residual, against that of an unrelated window, is made of.
