@@ -15,7 +15,7 @@
 #include "input/live_video.h"
 #include "input/trajectory.h"
 #include "input/user_text.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "output/summary_json.h"
 #include "output/video_writer.h"
 #include "progress.h"

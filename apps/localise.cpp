@@ -8,7 +8,7 @@
 #include "geometry/failure.h"
 #include "input/atomic_file.h"
 #include "input/trajectory.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "output/trunks_csv.h"
 #include "progress.h"
 #include <bole/cylinder.h>

@@ -3,7 +3,7 @@
 #include "lab_commands.h"
 #include "support/text.h"
 
-#include "baseline/comparison_report.h"
+#include "baseline/comparison.h"
 #include "progress.h"
 #include <bole/cylinder.h>
 #include <bole/output_folder.h>

@@ -2,8 +2,8 @@
 #include "detector_statistics.h"
 
 #include "paper/paper_mapper.h"
-#include "support/statistics.h"
 #include "support/text.h"
+#include "support/units.h"
 #include <bole/open_source.h>
 
 #include <algorithm>

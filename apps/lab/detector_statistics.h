@@ -5,7 +5,7 @@
 /// of the statistics of the data" (Section 6). And how far its energy (Eq. 3) has its minima from true trunks: alpha is
 /// calibrated where those errors are what the curvature says.
 
-#include "paper/line_detector.h"
+#include "paper/paper_mapper.h"
 #include <bole/open_source.h>
 
 #include <string>

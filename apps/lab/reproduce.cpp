@@ -6,14 +6,13 @@
 #include "paper/paper_mapper.h"
 #include "progress.h"
 #include "simulation/simulated_flight.h"
-#include "support/statistics.h"
 #include "support/text.h"
 #include "support/units.h"
+#include <bole/ardrone_source.h>
 #include <bole/evaluation.h>
 #include <bole/pipeline.h>
 
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
@@ -54,7 +53,7 @@ void simulate(const std::string &folder)
 {
   SceneOptions scene;
   scene.setSeed(320);
-  scene.renderer.camera = {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
+  scene.renderer.camera = publishedArDroneCamera(1, 320, 240).model;
   scene.renderer.samples_per_pixel = 8;
   RecordOptions record;
   record.folder = folder;
@@ -68,14 +67,6 @@ struct Result
   Evaluation evaluation;
   double ms = 0; ///< of processor time a frame, median
 };
-
-/// What this process has computed, on all its threads: what other programs take does not count.
-double processTime_ms()
-{
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 
 /// Place and heading of a camera [m], [rad].
 Json placeOf(const Pose &wMc) { return {wMc.t.x(), wMc.t.y(), std::atan2(wMc.R(1, 2), wMc.R(0, 2))}; }

@@ -6,9 +6,9 @@
 #include "support/text.h"
 
 #include "progress.h"
-#include "support/statistics.h"
+#include "support/units.h"
 #include "support/video.h"
-#include "trials/flight_record.h"
+#include "trials/closed_loop.h"
 #include "trials/servo_trial.h"
 #include <bole/config.h>
 #include <bole/output_folder.h>

@@ -4,7 +4,7 @@
 
 #include "progress.h"
 #include "simulation/simulated_flight.h"
-#include "simulation/words.h"
+#include <bole/ardrone_source.h>
 
 #include <fmt/format.h>
 #include <memory>
@@ -45,13 +45,10 @@ void run(const CLI::App &command, const SimulateArguments &arguments)
   take("--exposure", scene.exposure_ms, given.exposure_ms);
   take("--h264", scene.h264_kbps, given.h264_kbps);
   take("--samples", scene.renderer.samples_per_pixel, given.renderer.samples_per_pixel);
-  if (arguments.lens == "ardrone1") { // published calibration of its front camera
-    scene.renderer.camera = {{215.1, 215.8, 160.7, 123.3, 320, 240}, Distortion::fov, {{0.272, 0, 0, 0}}};
-  }
-  else if (arguments.lens == "ardrone2") {
-    scene.renderer.camera = {
-        {569.9, 568.0, 331.4, 135.9, 640, 360}, Distortion::radial_tangential, {{-0.527, 0.274, 0.0211, -0.0064}}};
-  }
+  if (arguments.lens == "ardrone1")
+    scene.renderer.camera = publishedArDroneCamera(1, 320, 240).model;
+  else if (arguments.lens == "ardrone2")
+    scene.renderer.camera = publishedArDroneCamera(2, 640, 360).model;
   Progress progress(static_cast<std::size_t>(arguments.record.frames), stderr);
   recordFlight(scene, arguments.record, [&](int done) {
     if (!arguments.quiet)

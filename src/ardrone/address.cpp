@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/address.h"
+#include "ardrone/drone_link.h"
 #include "geometry/failure.h"
 #include "geometry/parse_number.h"
 #include "input/user_text.h"

@@ -3,7 +3,7 @@
 
 #include "ardrone/drone_link.h"
 #include "geometry/failure.h"
-#include "input/rectifier.h"
+#include "input/frame_builder.h"
 #include "input/steady_clock.h"
 
 #include <atomic>

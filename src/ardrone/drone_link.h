@@ -2,18 +2,70 @@
 #pragma once
 /// \file
 /// The live connection to a drone: video and navdata threads, newest frame only.
-
-#include "ardrone/address.h"
-#include "ardrone/at_command.h"
 #include "ardrone/drone_clock.h"
 #include "ardrone/navdata_odometry.h"
+#include "ardrone/socket.h"
 #include "ardrone/video_decoder.h"
 #include <bole/vpArDroneGrabber.h>
 
+#include <cstdint>
 #include <memory>
+#include <mutex>
+#include <string>
 
 namespace bole
 {
+// Commands to the drone: lines of text, `AT*NAME=sequence,arguments\r`.
+
+/// A float as the drone wants it: its 32 bits read as a signed integer, in decimals (-0.8 is -1085485875).
+std::string atFloat(float value);
+
+/// Sends commands with rising sequence numbers. Thread-safe: the drone refuses numbers that go
+/// back, so a program must have one channel to a drone.
+class AtChannel
+{
+public:
+  AtChannel(const std::string &host, std::uint16_t port);
+
+  // Housekeeping: moves nothing.
+  void config(const std::string &key, const std::string &value);
+  void acknowledgeConfig();
+  void resetWatchdog();
+
+  // Flight: only vpRobotArDrone calls these.
+  void trimFlat();
+  void reference(bool take_off, bool emergency);
+  /// \param roll, pitch share of the largest tilt, in [-1, 1]: left and nose down are negative.
+  /// \param gaz, yaw share of the largest climb and turn rate: up and clockwise seen from above are
+  /// positive. \param progressive false hovers whatever the other arguments are.
+  void move(bool progressive, float roll, float pitch, float gaz, float yaw);
+
+private:
+  void send(const std::string &name, const std::string &arguments);
+
+  Socket m_socket;
+  std::mutex m_mutex;
+  std::int64_t m_sequence = 0;
+};
+
+/// Where a drone is: `ardrone://HOST[?key=value&...]`.
+///
+/// Its keys are told of at vpArDroneGrabber.
+struct ArDroneAddress
+{
+  std::string host = "192.168.1.1";
+  std::uint16_t navdata_port = 5554, video_port = 5555, at_port = 5556;
+  int generation = 0; ///< 1, 2, or 0 to find out
+  std::string camera_path;
+  double video_delay_s = 0.06;
+
+  /// Throws vpException "address: key = value, must be ...".
+  static ArDroneAddress parse(const std::string &address);
+  /// Whether \p text is such an address, right or wrong.
+  static bool accepts(const std::string &text);
+  std::string toString() const;
+};
+
 /// A frame as it came off the air.
 struct LiveFrame
 {

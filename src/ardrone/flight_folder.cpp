@@ -100,13 +100,9 @@ std::uint32_t crc32(const std::uint8_t *data, std::size_t size)
 RecordingWriter::RecordingWriter(const std::string &folder)
 {
   std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  m_path = (std::filesystem::path(folder) / "raw.bin").string();
-  m_descriptor = ::open(m_path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-  if (m_descriptor < 0)
-    throw ioError("{}: {}", m_path, std::strerror(errno));
-  if (::write(m_descriptor, kTitle.data(), kTitle.size()) != static_cast<ssize_t>(kTitle.size()))
-    throw ioError("{}: {}", m_path, std::strerror(errno));
+  fs::create_directories(folder, error);
+  m_path = (fs::path(folder) / "raw.bin").string();
+  m_descriptor = create(m_path, kTitle);
   m_bytes = kTitle.size();
 }
 

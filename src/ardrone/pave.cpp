@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "ardrone/pave.h"
+#include "ardrone/video_decoder.h"
 
 #include "ardrone/bytes.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "detection/column_image.h"
+#include "detection/photo_consistency.h"
 
 #include <Eigen/Geometry>
 

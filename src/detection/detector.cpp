@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "detection/detector.h"
 
-#include "detection/window_loops.h"
+#include "detection/detection_loops.h"
 #include "geometry/solve_definite.h"
 
 #include <Eigen/LU>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "detection/level_profile.h"
+#include "detection/detector.h"
 
 #include "geometry/median.h"
 

@@ -13,7 +13,6 @@ using Eigen::Vector2d;
 
 namespace
 {
-/// Ranges that are tried, over that of the trunk.
 constexpr std::array<double, kTriedRanges> kScales = {0.5, 0.65, 0.8, 0.9, 1, 1.11, 1.25, 1.5, 2, 3, 1000};
 constexpr std::size_t kOwn = 4, kBeyond = 6, kBackground = 8;
 constexpr std::size_t kPartners = 3; // a view is compared with
@@ -210,7 +209,6 @@ std::optional<ConsistencyCurves> curvesOf(const Trunk &trunk, const Seen &seen, 
   return here.count[kInside][kOwn] > 0 ? std::optional(here) : std::nullopt;
 }
 
-/// The views in which \p trunk is in sight.
 std::vector<Seen> locateAll(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
 {
   std::vector<Seen> all;

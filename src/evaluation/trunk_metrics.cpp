@@ -101,7 +101,6 @@ std::vector<TrunkBin> binned(const TrunkMetrics &metrics, const std::vector<doub
   return bins;
 }
 
-/// Nearest of \p count points to \p point.
 template <typename Position>
 void findNearest(Unmatched &entry, const Eigen::Vector2d &point, std::size_t count, const Position &position,
                  std::size_t &index)

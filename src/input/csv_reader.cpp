@@ -169,22 +169,17 @@ bool CsvReader::next()
   return true;
 }
 
-double CsvReader::number(std::size_t column, std::string_view name) const
-{
-  const std::string &field = m_fields.at(column);
-  if (const auto value = parseNumber<double>(field))
-    return *value;
-  fail(fmt::format(
-      "{} = \"{}\", must be a finite number{}", name, shownField(field),
-      field.find_first_of(",;") == std::string::npos ? "" : " with a point, columns parted by commas or blanks"));
-}
-
 double CsvReader::number(std::size_t column, std::string_view name, double most) const
 {
-  const double value = number(column, name);
-  if (std::abs(value) > most)
-    fail(fmt::format("{} = {:g}, must be at most {:g} from zero", name, value, most));
-  return value;
+  const std::string &field = m_fields.at(column);
+  const auto value = parseNumber<double>(field);
+  if (!value)
+    fail(fmt::format(
+        "{} = \"{}\", must be a finite number{}", name, shownField(field),
+        field.find_first_of(",;") == std::string::npos ? "" : " with a point, columns parted by commas or blanks"));
+  if (std::abs(*value) > most)
+    fail(fmt::format("{} = {:g}, must be at most {:g} from zero", name, *value, most));
+  return *value;
 }
 
 int CsvReader::count(std::size_t column, std::string_view name) const

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <fmt/format.h>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,10 +46,8 @@ public:
   const std::vector<std::string> &header() const { return m_header; }
 
   const std::string &text(std::size_t column) const { return m_fields.at(column); }
-  /// A finite number; \p name is used in the error only.
-  double number(std::size_t column, std::string_view name) const;
-  /// At most \p most from zero.
-  double number(std::size_t column, std::string_view name, double most) const;
+  /// A finite number, at most \p most from zero; \p name is used in the error only.
+  double number(std::size_t column, std::string_view name, double most = std::numeric_limits<double>::max()) const;
   std::int64_t integer(std::size_t column, std::string_view name) const;
   /// From 0 on: an id, or how many there are.
   int count(std::size_t column, std::string_view name) const;

@@ -110,7 +110,6 @@ cv::Mat thumbOf(const cv::Mat &I)
   return thumb;
 }
 
-/// Shift s at which now(u) = before(u + s).
 namespace
 {
 /// Where what \p now shows in \p inner stood \p before, searched for as far as \p reach.

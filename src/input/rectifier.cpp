@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "input/rectifier.h"
 #include "geometry/failure.h"
+#include "input/frame_builder.h"
 
 #include <opencv2/imgproc.hpp>
 

@@ -10,7 +10,6 @@
 
 namespace bole
 {
-/// [ns] of the steady clock.
 inline std::int64_t steadyNowNs()
 {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();

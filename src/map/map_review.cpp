@@ -92,7 +92,6 @@ bool isWithinMergeGate(const MapTrunk &a, const MapTrunk &b)
   return apart.dot(S.inverse() * apart) < kGate;
 }
 
-/// Adds the history of \p gone to that of \p keep.
 void mergeHistory(MapTrunk &keep, const MapTrunk &gone)
 {
   keep.left.add(gone.left);
@@ -182,7 +181,6 @@ void change(MapUpdate &update, MapTrunk &trunk, TrunkStatus to, RejectReason rea
   trunk.reject_reason = reason;
 }
 
-/// Removes a trunk from the map and has the smoother remove it.
 void remove(MapUpdate &update, MapTrunk &trunk, RejectReason reason)
 {
   trunk.removed = true;

@@ -309,7 +309,7 @@ public:
   /// Log-odds that \p trunk is a trunk and not a chance pair of lines, from how well its predictions came true, how
   /// often it was missed, how it moved against the background, whether points behind it were seen through it, its
   /// contrast, its radius and how well its place is known. A logistic regression on simulated flights: see
-  /// trunk_evidence.cpp for its weights and what they rest on.
+  /// trunk_map.cpp for its weights and what they rest on.
   double evidence(const MapTrunk &trunk) const;
   /// Log-odds that decide: in flight by evidence() and by the columns, whichever says less, at the end by all frames.
   double logOdds(const MapTrunk &trunk) const;

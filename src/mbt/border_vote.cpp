@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "mbt/border_vote.h"
+#include "mbt/pose_estimator.h"
 
 #include <Eigen/Dense>
 

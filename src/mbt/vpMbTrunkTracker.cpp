@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The ViSP side of vpMbTrunkTracker. Its estimation is PoseEstimator.
+#include "geometry/failure.h"
 #include "geometry/names.h"
 #include "geometry/visp_matrix.h"
 #include "input/image_health.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "mbt/pose_estimator.h"
-#include "mbt/trunk_settings.h"
 
 #include <Eigen/Cholesky>
 
@@ -28,7 +28,7 @@ namespace
 {
 [[noreturn]] void refuse(const char *what)
 {
-  throw vpException(vpException::notImplementedError, fmt::format("{}: a model of trunks holds cylinders only", what));
+  throw bole::notImplementedError("{}: a model of trunks holds cylinders only", what);
 }
 
 template <class Image>
@@ -64,9 +64,9 @@ struct vpMbTrunkTracker::Impl
   void add(const bole::Cylinder &trunk)
   {
     if (!(trunk.radius > 0))
-      throw vpException(vpException::badValue, fmt::format("radius = {}, must be above 0", trunk.radius));
+      throw bole::badValue("radius = {}, must be above 0", trunk.radius);
     if (!((trunk.top - trunk.foot).norm() > 1e-6))
-      throw vpException(vpException::badValue, "the two points of the axis of a trunk must differ");
+      throw bole::badValue("the two points of the axis of a trunk must differ");
     estimator.trunks.emplace_back(trunk);
   }
   /// One number of each found piece of the last frame.
@@ -112,14 +112,13 @@ void vpMbTrunkTracker::setOptions(const Options &options)
 void vpMbTrunkTracker::setMotionPrior(const vpHomogeneousMatrix &cMo, const vpMatrix &covariance)
 {
   if (covariance.getRows() != 6 || covariance.getCols() != 6)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("covariance = {}x{}, must be 6x6", covariance.getRows(), covariance.getCols()));
+    throw bole::dimensionError("covariance = {}x{}, must be 6x6", covariance.getRows(), covariance.getCols());
   const Matrix6d given = toEigen(covariance), P = 0.5 * (given + given.transpose());
   if (!P.allFinite() || Eigen::LLT<Matrix6d>(P).info() != Eigen::Success)
-    throw vpException(vpException::badValue, "covariance: must be finite and positive definite");
+    throw bole::badValue("covariance: must be finite and positive definite");
   const Pose pose = Pose::fromVisp(cMo);
   if (!pose.isFinite())
-    throw vpException(vpException::badValue, "cMo: must be finite");
+    throw bole::badValue("cMo: must be finite");
   m_impl->estimator.prior = bole::ExpectedPose{pose, P};
 }
 
@@ -170,7 +169,7 @@ void vpMbTrunkTracker::loadConfigFile(const std::string &configFile, bool verbos
 void vpMbTrunkTracker::init(const vpImage<unsigned char> &I)
 {
   if (m_impl->estimator.trunks.empty())
-    throw vpException(vpException::notInitialized, "no trunks: load a model before the tracker is initialised");
+    throw bole::notInitialized("no trunks: load a model before the tracker is initialised");
   setPose(I, m_cMo);
   m_impl->estimator.start(I, PinholeCamera::fromVisp(m_cam, int(I.getWidth()), int(I.getHeight())),
                           Pose::fromVisp(m_cMo));
@@ -180,7 +179,7 @@ void vpMbTrunkTracker::setPose(const vpImage<unsigned char> &I, const vpHomogene
 {
   const Pose pose = Pose::fromVisp(cdMo);
   if (!pose.isFinite())
-    throw vpException(vpException::badValue, "cMo: must be finite");
+    throw bole::badValue("cMo: must be finite");
   m_cMo = cdMo;
   m_impl->health.start(I);
   m_impl->estimator.setPose(pose);
@@ -215,7 +214,7 @@ void vpMbTrunkTracker::reInitModel(const vpImage<unsigned char> &I, const std::s
 void vpMbTrunkTracker::track(const vpImage<unsigned char> &I)
 {
   if (m_impl->status == Status::not_initialised)
-    throw vpException(vpException::notInitialized, "the trunk tracker has no pose to start from");
+    throw bole::notInitialized("the trunk tracker has no pose to start from");
   bole::PoseEstimator &estimator = m_impl->estimator;
   estimator.gain = m_lambda;
   estimator.iterations = int(m_maxIter);

@@ -97,6 +97,5 @@ std::string toText(const TimingTable &timing);
 /// Writes a line a frame under the header "frame,timestamp [s],<stage> [ms],...,total [ms]", to which a live run adds
 /// "age [ms]", atomically.
 void writeTiming(const std::string &path, const TimingTable &timing);
-/// Reads what writeTiming() wrote.
 TimingTable readTiming(const std::string &path);
 } // namespace bole

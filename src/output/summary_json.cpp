@@ -69,10 +69,7 @@ Json framesJson(const std::map<FrameStatus, std::size_t> &frames)
 
 Json positiveOrNull(double value) { return value > 0 ? Json(value) : Json(); }
 Json textOrNull(const std::string &text) { return text.empty() ? Json() : Json(text); }
-} // namespace
 
-namespace
-{
 Json inputJson(const RunSummary &summary)
 {
   return {{"source", summary.input},
@@ -184,10 +181,24 @@ std::string faultOf(const std::string &path, const std::exception &error)
                      text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2));
 }
 
-WorldReference readReference(const std::string &path)
+namespace
+{
+/// What \p read makes of a summary. \throw vpException naming the file where it does not hold that.
+template <typename Read> auto partOf(const std::string &path, const Read &read)
 {
   const Json json = readSummary(path);
   try {
+    return read(json);
+  }
+  catch (const Json::exception &error) {
+    throw badValue("{}", faultOf(path, error));
+  }
+}
+} // namespace
+
+WorldReference readReference(const std::string &path)
+{
+  return partOf(path, [&path](const Json &json) {
     WorldReference reference;
     reference.scale = sourceOf(path, json, "scale", ScaleSource::prior);
     reference.scale_sigma = numberOrZero(json, "scale_sigma");
@@ -195,38 +206,27 @@ WorldReference readReference(const std::string &path)
     reference.gravity_sigma = numberOrZero(json, "gravity_sigma_rad");
     reference.has_ranges = json.value("ranges", true);
     return reference;
-  }
-  catch (const Json::exception &error) {
-    throw badValue("{}", faultOf(path, error));
-  }
+  });
 }
 
 PinholeCamera readCameraOfRun(const std::string &path)
 {
-  const Json json = readSummary(path);
-  try {
+  return partOf(path, [](const Json &json) -> PinholeCamera {
     const Json &camera = json.at("camera");
     return {camera.at("fx_px"), camera.at("fy_px"),    camera.at("cx_px"),
             camera.at("cy_px"), camera.at("width_px"), camera.at("height_px")};
-  }
-  catch (const Json::exception &error) {
-    throw badValue("{}", faultOf(path, error));
-  }
+  });
 }
 
 RunInput readInputOfRun(const std::string &path)
 {
-  const Json json = readSummary(path);
   const auto text = [](const Json &value) { return value.is_string() ? value.get<std::string>() : std::string(); };
-  try {
+  return partOf(path, [&text](const Json &json) -> RunInput {
     const Json &input = json.at("input");
     const std::filesystem::path folder = text(json.at("working_folder"));
     const std::string camera = text(input.at("camera_file"));
     return {(folder / text(input.at("source"))).string(), camera.empty() ? camera : (folder / camera).string()};
-  }
-  catch (const Json::exception &error) {
-    throw badValue("{}", faultOf(path, error));
-  }
+  });
 }
 
 void writeSummary(const std::string &path, const RunSummary &summary) { writeAtomically(path, toJson(summary)); }

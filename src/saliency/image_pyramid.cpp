@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "saliency/image_pyramid.h"
+#include "saliency/saliency.h"
 
 #include "saliency/saliency_loops.h"
 

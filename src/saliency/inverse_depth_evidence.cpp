@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "saliency/inverse_depth_evidence.h"
 
 #include "geometry/median.h"
-#include "saliency/image_pyramid.h"
+#include "saliency/saliency.h"
 #include "saliency/saliency_loops.h"
 
 #include <algorithm>
@@ -150,7 +149,7 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   // where no step matches (the place was hidden, or left the image) none is preferred.
   constexpr float kWeight = 2.5f;
   addLikelihoods({static_cast<float>(m_intensity_variance), static_cast<float>(kUnrelatedPx * kUnrelatedPx),
-                  flow_variance.data(), kWeight, m_options.relative_evidence},
+                  flow_variance.data(), kWeight},
                  g2, m_residuals.data(), pixels, m_evidence.data());
 }
 

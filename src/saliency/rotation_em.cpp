@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "saliency/rotation_em.h"
 
 #include "geometry/so3.h"
-#include "saliency/image_pyramid.h"
+#include "saliency/saliency.h"
 #include "saliency/saliency_loops.h"
 
 #include <Eigen/Cholesky>

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "saliency/saliency.h"
+#include "geometry/failure.h"
 #include "geometry/so3.h"
 #include "saliency/saliency_loops.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -100,10 +99,8 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
                                    const std::optional<TranslationPrior> &translation)
 {
   if (static_cast<int>(image.getWidth()) != m_camera.width || static_cast<int>(image.getHeight()) != m_camera.height)
-    throw vpException(vpException::dimensionError,
-                      fmt::format("saliency: image of {} x {} pixels, must be {} x {}", image.getWidth(),
-                                  image.getHeight(), m_camera.width, m_camera.height)
-                          .c_str());
+    throw dimensionError("saliency: image of {} x {} pixels, must be {} x {}", image.getWidth(), image.getHeight(),
+                         m_camera.width, m_camera.height);
   addMotion(gyro, translation);
   if (isStale(image)) {
     Saliency result = m_last;

@@ -318,14 +318,6 @@ void addLikelihoods(const LikelihoodTerms &terms, const float *g2, const float *
   const float intensity = terms.intensity, weight = terms.weight;
   for (std::size_t p = 0; p < pixels; ++p, r2 += kSteps, evidence += kSteps) {
     const float square = g2[p], unrelated = intensity + square * terms.unrelated, to_unrelated = 1 / unrelated;
-    if (!terms.is_relative) {
-#pragma omp simd
-      for (int k = 0; k < kSteps; ++k) {
-        const float variance = intensity + square * flow_variance[k];
-        evidence[k] += weight * fastLog(std::sqrt(variance) / (variance + r2[k]));
-      }
-      continue;
-    }
 #pragma omp simd
     for (int k = 0; k < kSteps; ++k) {
       const float variance = intensity + square * flow_variance[k];

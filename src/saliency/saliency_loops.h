@@ -17,7 +17,7 @@ void halvedRow(const float *upper, const float *lower, int width, float *out);
 void gradientsOfRow(const float *above, const float *row, const float *below, int width, float scale, float *gx,
                     float *gy);
 
-// The loop of rotation_em.h over one row of pixels.
+// The loop of estimateRotation() over one row of pixels.
 
 /// Noise of one level: variances of the flow [px^2 of the level] and of intensity.
 struct LevelNoise
@@ -25,7 +25,6 @@ struct LevelNoise
   float background, foreground, intensity, prior_logit;
 };
 
-/// One image of a level with its gradient: pixels, row by row.
 struct LevelImages
 {
   const float *grey, *gradient_x, *gradient_y;
@@ -78,17 +77,15 @@ void slidingMeans(const float *in, int n, int lag, int window, float *out);
 /// Running means of \p columns numbers a row over \p window rows; the ends repeat. \p sum: memory for \p columns.
 void meansDownColumns(const float *in, int rows, int columns, int window, float *sum, float *out);
 
-/// Squares of the gradient of a row.
 void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, float *out);
 
-/// What the likelihood of a window's residual is made of.
+/// What the likelihood of a window's residual, against that of an unrelated window, is made of.
 struct LikelihoodTerms
 {
   float intensity;            ///< variance
   float unrelated;            ///< variance of the flow between unrelated windows [px^2]
   const float *flow_variance; ///< of each step [px^2]
   float weight;
-  bool is_relative;
 };
 
 /// Adds the log-likelihood of \p r2 to \p evidence of \p pixels pixels; \p g2: mean square gradients.

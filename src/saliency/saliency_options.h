@@ -32,7 +32,5 @@ struct SaliencyOptions
   int window_height_px = 9;     ///< trunks are upright: taller than wide; odd, [1, 31]
   int max_frames_apart = 5;     ///< oldest frame that is tried; [1, 20]
   double evidence_decay = 0.8;  ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
-  bool relative_evidence =
-      true; ///< against an unrelated window, so that hidden places say nothing; off: plain likelihood
 };
 } // namespace bole

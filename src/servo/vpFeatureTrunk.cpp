@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include <bole/vpFeatureTrunk.h>
 
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <cstdio>
-#include <fmt/format.h>
 #include <visp3/core/vpDisplay.h>
-#include <visp3/core/vpException.h>
 
 namespace
 {
@@ -75,10 +74,8 @@ void vpFeatureTrunk::set(const bole::RelativeTrunk &relative)
 
 void vpFeatureTrunk::buildFrom(const bole::RelativeTrunk &relative, double radius)
 {
-  if (!relative.isFinite() || !(radius > 0)) {
-    throw vpException(vpException::badValue,
-                      fmt::format("r/d = {}, radius = {}, must be below 1 and above 0", relative.ratio(), radius));
-  }
+  if (!relative.isFinite() || !(radius > 0))
+    throw bole::badValue("r/d = {}, radius = {}, must be below 1 and above 0", relative.ratio(), radius);
   m_radius = radius;
   set(relative);
 }
@@ -100,7 +97,7 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
   Vector3d one = planeOf(border), other = planeOf(other_border);
   Vector3d axis = one.cross(other); // in both planes
   if (axis.norm() < 1e-9)
-    throw vpException(vpException::badValue, "border lines = one line twice, must be two");
+    throw bole::badValue("border lines = one line twice, must be two");
   axis.normalize();
   axis = axis.y() > 0 ? Vector3d(-axis) : axis;
   // Directions in the planes, across the axis, in front of the camera; the trunk is between them.
@@ -110,7 +107,7 @@ void vpFeatureTrunk::buildFrom(const vpFeatureLine &border, const vpFeatureLine 
   const Vector3d m = (to_one + to_other).normalized();
   const double ratio = 0.5 * (to_one - to_other).norm(); // sine of half the angle between the borders
   if (!(ratio < 1) || !m.allFinite())
-    throw vpException(vpException::badValue, fmt::format("r/d = {}, must be below 1", ratio));
+    throw bole::badValue("r/d = {}, must be below 1", ratio);
   bole::RelativeTrunk relative;
   relative.cRt << m, axis.cross(m), axis;
   relative.log_ratio = std::log(ratio);
@@ -139,7 +136,7 @@ bole::RelativeTrunk vpFeatureTrunk::relativeTrunk() const
 vpMatrix vpFeatureTrunk::interaction(unsigned int select)
 {
   if (!flags[0])
-    throw vpException(vpException::notInitialized, "vpFeatureTrunk: buildFrom() must come before interaction()");
+    throw bole::notInitialized("vpFeatureTrunk: buildFrom() must come before interaction()");
   const Eigen::Matrix3d cRt = frameOf(s[0], s[1], s[2]);
   const Vector3d m = cRt.col(0), n = cRt.col(1), a = cRt.col(2);
   const double across = m.z() * m.z() + n.z() * n.z(), flat = a.x() * a.x() + a.y() * a.y();

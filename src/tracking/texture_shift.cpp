@@ -150,7 +150,6 @@ double differenceAt(const Patch &patch, const vpImage<unsigned char> &image, int
   return patch.squares + sums.square - sums.sum * sums.sum / n - 2 * sums.product;
 }
 
-/// A minimum over shifts across the trunk.
 struct AcrossMinimum
 {
   double shift_px = 0, sigma_px = 0;

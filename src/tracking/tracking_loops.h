@@ -14,7 +14,6 @@ struct PatchSums
   double product = 0; ///< of them and those of the patch
 };
 
-/// Adds the \p n pixels of a row.
 void addPatchRow(const unsigned char *pixels, const float *patch, int n, PatchSums &sums);
 
 /// Adds, for each row from \p row on, the \p n pixels from x - \p half on, and those from half a pixel farther on,

@@ -5,10 +5,10 @@
 #include "flight.h"
 #include "support/test.h"
 
-#include "ardrone/pave.h"
+#include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/server_socket.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/emulator_wire.h"
+#include "emulator/wire_format.h"
 #include <netinet/in.h>
 
 using namespace bole;

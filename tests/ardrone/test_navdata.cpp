@@ -2,8 +2,7 @@
 #include "files.h"
 #include "support/test.h"
 
-#include "ardrone/address.h"
-#include "ardrone/at_command.h"
+#include "ardrone/drone_link.h"
 #include "ardrone/navdata_odometry.h"
 #include "emulator/wire_format.h"
 #include "geometry/so3.h"

@@ -2,7 +2,7 @@
 #include "support/test.h"
 
 #include "ardrone/uvlc.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 using namespace bole;
 

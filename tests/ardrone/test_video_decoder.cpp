@@ -6,7 +6,7 @@
 #include "ardrone/uvlc.h"
 #include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 using namespace bole;
 

@@ -5,13 +5,13 @@
 #include "support/flight.h"
 #include "support/test.h"
 
-#include "ardrone/at_command.h"
+#include "ardrone/drone_link.h"
 #include "ardrone/flight_folder.h"
 #include "ardrone/navdata_odometry.h"
-#include "ardrone/pave.h"
 #include "ardrone/uvlc.h"
+#include "ardrone/video_decoder.h"
 #include "emulator/emulator_packets.h"
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 #include "output/video_writer.h"
 #include <bole/graph.h>
 #include <opencv2/imgcodecs.hpp>

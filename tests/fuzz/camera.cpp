@@ -3,7 +3,7 @@
 #include "file_of.h"
 
 #include "input/camera_plausibility.h"
-#include "input/rectifier.h"
+#include "input/frame_builder.h"
 
 #include <visp3/core/vpException.h>
 

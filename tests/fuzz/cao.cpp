@@ -2,7 +2,7 @@
 // Any bytes as a model of trunks: refused with its name, or cylinders that can be drawn.
 #include "file_of.h"
 
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 
 #include <visp3/core/vpException.h>
 

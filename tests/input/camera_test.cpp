@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/test.h"
 
-#include "input/rectifier.h"
+#include "input/frame_builder.h"
 #include "input/yaml_file.h"
 #include <bole/open_source.h>
 

@@ -4,7 +4,7 @@
 
 #include "input/recorded_source.h"
 #include "map/trunk_map.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include <bole/options.h>
 #include <bole/vpMbTrunkTracker.h>
 #include <bole/vpTrunkMapper.h>

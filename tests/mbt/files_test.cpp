@@ -2,8 +2,7 @@
 #include "support/drawn_trunks.h"
 #include "support/test.h"
 
-#include "mbt/cao_reader.h"
-#include "mbt/trunk_settings.h"
+#include "mbt/model_files.h"
 #include <bole/vpMbTrunkTracker.h>
 #include <cstring>
 #include <visp3/mbt/vpMbGenericTracker.h>

@@ -3,7 +3,7 @@
 #include "support/drawn_trunks.h"
 #include "support/test.h"
 
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include "mbt/model_trunk.h"
 #include <bole/vpMbTrunkTracker.h>
 #include <visp3/core/vpDisplay.h>

@@ -2,8 +2,8 @@
 #include "support/drawn_trunks.h"
 #include "support/test.h"
 
-#include "mbt/border_vote.h"
 #include "mbt/model_trunk.h"
+#include "mbt/pose_estimator.h"
 #include <visp3/core/vpCylinder.h>
 #include <visp3/core/vpExponentialMap.h>
 

@@ -4,7 +4,7 @@
 #include "support/test.h"
 
 #include "input/recorded_source.h"
-#include "mbt/cao_reader.h"
+#include "mbt/model_files.h"
 #include <bole/open_source.h>
 
 namespace

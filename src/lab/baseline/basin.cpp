@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "baseline/basin.h"
+#include "baseline/comparison.h"
 #include "support/units.h"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "baseline/comparison.h"
 
-#include "support/statistics.h"
 #include "support/units.h"
 
 #include <algorithm>

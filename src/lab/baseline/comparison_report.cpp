@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "baseline/comparison_report.h"
+#include "baseline/comparison.h"
 #include "support/text.h"
 
 #include <fmt/format.h>

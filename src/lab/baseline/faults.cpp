@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "baseline/faults.h"
+#include "baseline/comparison.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "baseline/test_flight.h"
+#include "baseline/contender.h"
 
 #include "support/text.h"
 #include "support/units.h"

@@ -26,7 +26,6 @@ constexpr std::uint32_t kEmergencyBit = 1u << 8, kTakeOffBit = 1u << 9;
 
 std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(s * 1e9); }
 
-/// [ns] of the steady clock.
 std::int64_t steadyNowNs()
 {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())

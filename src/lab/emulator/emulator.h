@@ -46,7 +46,6 @@ struct SequenceFeedOptions
 {
   int generation = 2;                           ///< 1 or 2
   bool loop = false;                            ///< there and back for ever: the motion stays continuous
-  double navdata_rate_hz = 200;                 ///< (1, 1000); as the drone's full navdata
   double video_delay_s = 0.06;                  ///< [s], [0, 0.5]: exposure to sending; 50 to 75 ms on the drone
   std::size_t max_frames = 0;                   ///< 0: all
   std::size_t max_bytes = std::size_t{2} << 30; ///< of images in memory: a longer sequence is refused

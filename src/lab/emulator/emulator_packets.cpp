@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "emulator/emulator_packets.h"
 
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 #include <fmt/format.h>
 

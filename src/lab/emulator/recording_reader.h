@@ -12,7 +12,6 @@
 
 namespace bole
 {
-/// One received piece.
 struct RecordedPiece
 {
   LinkChannel channel = LinkChannel::video; ///< that it came by

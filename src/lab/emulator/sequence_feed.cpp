@@ -14,6 +14,7 @@ namespace bole
 namespace
 {
 constexpr float kGravity_mg = 1000;
+constexpr double kNavdataRate_hz = 200; ///< as the drone's full navdata
 
 /// A vector in the drone's axes (y right, z down).
 Eigen::Vector3d flipped(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
@@ -56,7 +57,7 @@ public:
     if (!m_options.loop && m_next_frame >= m_frames.size())
       return false;
     const double frame_s = frameTime(m_next_frame);
-    const double navdata_s = static_cast<double>(m_next_navdata) / m_options.navdata_rate_hz;
+    const double navdata_s = static_cast<double>(m_next_navdata) / kNavdataRate_hz;
     packet = {};
     if (navdata_s <= frame_s + m_options.video_delay_s) {
       packet.kind = FeedPacket::Kind::navdata;
@@ -166,7 +167,6 @@ void SequenceFeedOptions::validate() const
 {
   if (generation != 1 && generation != 2)
     throw badValue("generation = {}, must be 1 or 2", generation);
-  requireRange("navdata_rate_hz", navdata_rate_hz, 1, 1000);
   requireRange("video_delay_s", video_delay_s, 0, 0.5);
 }
 

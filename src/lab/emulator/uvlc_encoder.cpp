@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The encoder is written from the published facts alone, by the definitions (direct cosine sums, a
 // walk along the diagonals), so that it can disagree with the decoder.
-#include "emulator/uvlc_encoder.h"
+#include "emulator/wire_format.h"
 
 #include "support/text.h"
 

@@ -2,12 +2,13 @@
 #pragma once
 /// \file
 /// The drone's end of the wire: what it says as bytes, and what it is told.
-
 #include <bole/ardrone_wire.h>
+#include <bole/visp.h>
 
 #include <cstdint>
 #include <string>
 #include <vector>
+#include <visp3/core/vpImage.h>
 
 namespace bole
 {
@@ -30,4 +31,9 @@ struct AtCommand
 };
 /// The commands of a datagram; what is not a command is left out.
 std::vector<AtCommand> parseAtCommands(const std::string &datagram);
+
+/// Encodes a grey picture (colours neutral) as an AR.Drone 1 does, quantiser 31. Written from the facts that stand in
+/// src/ardrone/uvlc.h and from the decoder's mathematics by definition: no code in common. Sides must be 160x120 or
+/// 88x72 times a power of two; throws vpException else.
+std::vector<std::uint8_t> encodeUvlc(const vpImage<unsigned char> &image, std::uint32_t number);
 } // namespace bole

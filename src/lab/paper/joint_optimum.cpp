@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "paper/joint_optimum.h"
+#include "paper/tree_energy.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/Sparse>

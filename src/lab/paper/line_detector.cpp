@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "paper/line_detector.h"
+#include "paper/paper_mapper.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "paper/paper_mapper.h"
 
-#include "paper/joint_optimum.h"
+#include "paper/tree_energy.h"
 #include <bole/options.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "paper/rotation_em.h"
+#include "paper/paper_mapper.h"
 
 #include "support/units.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "simulation/flight_path.h"
+#include "simulation/simulated_flight.h"
 
 #include "support/units.h"
 

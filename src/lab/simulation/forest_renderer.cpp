@@ -3,9 +3,7 @@
 
 #include "support/text.h"
 
-#include "simulation/light_maps.h"
-#include "simulation/noise_texture.h"
-#include "simulation/sensor_image.h"
+#include "simulation/renderer_parts.h"
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "simulation/light_maps.h"
+#include "simulation/renderer_parts.h"
 
 #include "simulation/random.h"
 

@@ -2,8 +2,6 @@
 #include "simulation/simulated_flight.h"
 #include "support/text.h"
 
-#include "simulation/words.h"
-
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>

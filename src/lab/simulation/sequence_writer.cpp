@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "simulation/sequence_writer.h"
+#include "simulation/simulated_flight.h"
 #include "support/text.h"
 #include <bole/open_source.h>
 #include <bole/output_folder.h>
@@ -31,10 +31,7 @@ std::uint16_t rounded(std::uint16_t depth_mm)
   const int step = depth_mm < 10000 ? 20 : 100;
   return static_cast<std::uint16_t>(std::min(65500, (depth_mm + step / 2) / step * step));
 }
-} // namespace
 
-namespace
-{
 const FileNames kFiles = {"mav0/cam0/sensor.yaml",
                           "mav0/cam0/data.csv",
                           "mav0/cam0/data/*.png",

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "simulation/simulated_flight.h"
 
-#include "simulation/sequence_writer.h"
 #include "support/text.h"
 
 #include <cmath>

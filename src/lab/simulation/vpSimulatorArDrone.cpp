@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "simulation/vpSimulatorArDrone.h"
-#include "simulation/h264_link.h"
+#include "support/h264.h"
 #include "support/text.h"
 #include "support/units.h"
 #include <bole/pose.h>

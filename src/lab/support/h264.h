@@ -3,8 +3,8 @@
 /// \file
 /// H.264 as a drone sends it, by libavcodec: baseline profile, each picture comes out at once. Same pictures, same
 /// bytes: one thread.
-
 #include <bole/visp.h>
+
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -63,5 +63,25 @@ public:
 private:
   struct Libav;
   std::unique_ptr<Libav> m_libav;
+};
+
+/// What a drone's video link does to a picture: H.264 at a low bit rate.
+///
+/// Encodes each picture as the drone does (a key frame every 30) and decodes it again.
+class H264Link
+{
+public:
+  /// \param width, height even [px]; \param kbps 50 to 20000. Throws vpException where libavcodec has no H.264 encoder.
+  H264Link(int width, int height, double rate_hz, double kbps);
+
+  /// Replaces \p image by what arrives.
+  void pass(vpImage<unsigned char> &image);
+  /// Size of the last encoded picture.
+  std::size_t lastBytes() const { return m_bytes; }
+
+private:
+  VideoPacketEncoder m_encoder;
+  VideoPacketDecoder m_decoder;
+  std::size_t m_bytes = 0;
 };
 } // namespace bole

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Constants and units.
-
+/// Constants, units, turns, quantiles and processor time.
 #include <bole/pose.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <ctime>
+#include <limits>
+#include <vector>
 
 namespace bole
 {
@@ -31,5 +34,26 @@ inline Eigen::Vector3d logSo3(const Eigen::Matrix3d &R)
 /// Angle about the vertical from the world's x axis to the x axis of the body [rad], -pi to pi.
 inline double yawOf(const Eigen::Matrix3d &wRb) { return std::atan2(wRb(1, 0), wRb(0, 0)); }
 inline double yawOf(const Pose &wMb) { return yawOf(wMb.R); }
+
+/// The one of \p values below which the part \p share of them stays, 0 to 1: the nearest rank; NaN of none.
+inline double quantileOf(std::vector<double> values, double share)
+{
+  if (values.empty())
+    return std::numeric_limits<double>::quiet_NaN();
+  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The upper one of the two in the middle where the count is even; NaN of none.
+inline double medianOf(const std::vector<double> &values) { return quantileOf(values, 0.5); }
+
+/// What this process has computed, on all its threads: what other programs take does not count.
+inline double processTime_ms()
+{
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
 } // namespace lab
 } // namespace bole

@@ -49,4 +49,70 @@ Eigen::Vector4d DroneResponse::advance(double time_s)
   }
   return path;
 }
+
+namespace
+{
+constexpr double kMemory_s = 5;        ///< of what was obeyed
+constexpr double kLeastPath_m2 = 0.05; ///< flown before anything is said of it
+constexpr double kLeastObeyed = 0.7, kMostObeyed = 1.3;
+} // namespace
+
+double PlaneResponse::obeyed() const
+{
+  return std::clamp((kLeastPath_m2 + m_flown) / (kLeastPath_m2 + m_sent), kLeastObeyed, kMostObeyed);
+}
+
+void PlaneResponse::see(const Eigen::Vector2d &place, double time_s)
+{
+  const double dt = time_s - m_time_s;
+  const Eigen::Vector2d path = m_response.advance(time_s).head<2>();
+  if (m_has_place) {
+    const double keep = std::exp(-dt / kMemory_s);
+    m_flown = keep * m_flown + path.dot(place - m_place);
+    m_sent = keep * m_sent + path.dot(path);
+  }
+  m_has_place = true;
+  m_place = place;
+  m_time_s = time_s;
+  DroneResponse ahead = m_response;
+  const Eigen::Vector2d late = ahead.advance(time_s + m_response.options().delay).head<2>();
+  m_rest = place + obeyed() * (late + ahead.coast().head<2>());
+}
+
+void PlaneResponse::send(const Eigen::Vector2d &velocity)
+{
+  m_response.send(m_time_s, {velocity.x(), velocity.y(), 0, 0});
+}
+
+void FeatureFilter::start(double seen, double sigma, double drift_sigma)
+{
+  m_x << seen, 0;
+  m_P = Eigen::Vector2d(sigma * sigma, drift_sigma * drift_sigma).asDiagonal();
+}
+
+void FeatureFilter::predict(double moved, double dt, double unrest)
+{
+  Eigen::Matrix2d F;
+  F << 1, dt, 0, 1;
+  Eigen::Matrix2d Q; // a drift that walks at random, integrated over dt
+  Q << dt * dt * dt / 3, dt * dt / 2, dt * dt / 2, dt;
+  m_x = F * m_x + Eigen::Vector2d(moved, 0);
+  m_P = F * m_P * F.transpose() + unrest * unrest * Q;
+}
+
+void FeatureFilter::correct(double seen, double sigma)
+{
+  constexpr double kBelieved = 3; // standard deviations; what is farther off counts as no more
+  const double variance = m_P(0, 0) + sigma * sigma, most = kBelieved * std::sqrt(variance);
+  const Eigen::Vector2d gain = m_P.col(0) / variance;
+  m_x += gain * std::clamp(seen - m_x(0), -most, most);
+  m_P -= gain * m_P.row(0);
+}
+
+void FeatureFilter::correctDrift(double seen, double sigma)
+{
+  const Eigen::Vector2d gain = m_P.col(1) / (m_P(1, 1) + sigma * sigma);
+  m_x += gain * (seen - m_x(1));
+  m_P -= gain * m_P.row(1);
+}
 } // namespace bole

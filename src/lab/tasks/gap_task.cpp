@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "tasks/gap_task.h"
+#include "tasks/gap_and_slalom.h"
 
 #include "support/units.h"
 

@@ -13,8 +13,8 @@
 /// Frames: velocities are those of the body (x forward, y left, z up): vpRobot::REFERENCE_FRAME of both drones.
 
 #include "support/units.h"
-#include "tasks/plane_response.h"
-#include "tasks/surroundings.h"
+#include "tasks/drone_response.h"
+#include "tasks/obstacles.h"
 #include <bole/report.h>
 
 #include <string>

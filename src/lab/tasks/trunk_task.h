@@ -25,7 +25,6 @@
 /// for a frame or two, and for a distance, from the map and the pose. A ratio needs nothing of the map.
 
 #include "tasks/drone_response.h"
-#include "tasks/feature_filter.h"
 #include "tasks/servo_task.h"
 #include <bole/vpFeatureTrunk.h>
 

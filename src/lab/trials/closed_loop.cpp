@@ -1,28 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "trials/closed_loop.h"
 
-#include "support/statistics.h"
 #include "support/text.h"
+#include "support/units.h"
 
 #include <algorithm>
-#include <ctime>
 #include <limits>
 
 namespace bole
 {
 namespace
 {
-constexpr double kTakeOff_s = 4; ///< until the height is reached and the body at rest
-constexpr double kRest_s = 2;    ///< flown on after the task is done
-constexpr double kMapKept = 8;   ///< of the record [m]
-
-/// Processor time of all threads of this process: what the loop costs, however busy the machine is.
-double processMs()
-{
-  std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
+constexpr double kTakeOff_s = 4;   ///< until the height is reached and the body at rest
+constexpr double kRest_s = 2;      ///< flown on after the task is done
+constexpr double kContact = 0.28;  ///< body's origin to bark that is a contact: ends the flight [m]
+constexpr double kMostSpeed = 1.5; ///< given to the robot [m/s]
+constexpr double kMostTurn = 1;    ///< given to the robot [rad/s]
+constexpr double kMapKept = 8;     ///< of the record [m]
 
 double loopQuantile_ms(const std::vector<LoopSample> &samples, double share)
 {
@@ -32,10 +26,10 @@ double loopQuantile_ms(const std::vector<LoopSample> &samples, double share)
   return quantileOf(std::move(ms), share);
 }
 
-void takeOff(vpSimulatorArDrone &robot, const LoopOptions &options)
+void takeOff(vpSimulatorArDrone &robot)
 {
-  robot.setMaxTranslationVelocity(options.translation_max);
-  robot.setMaxRotationVelocity(options.rotation_max);
+  robot.setMaxTranslationVelocity(kMostSpeed);
+  robot.setMaxRotationVelocity(kMostTurn);
   robot.open(vpSimulatorArDrone::Permission::fly);
   robot.takeOff();
   for (double t = 0; t < kTakeOff_s; t += 0.1) {
@@ -58,9 +52,6 @@ void LoopOptions::validate() const
 {
   requireRange("duration_s", duration_s, 1, 3600);
   requireRange("search_most_s", search_most_s, 1, 3600);
-  requireRange("contact", contact, 0.05, 2);
-  requireRange("translation_max", translation_max, 0.05, 5);
-  requireRange("rotation_max", rotation_max, 0.05, 5);
   fault.validate();
 }
 
@@ -81,7 +72,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
   options.validate();
   LoopRecord record;
   FaultInjector injector(options.fault);
-  takeOff(robot, options);
+  takeOff(robot);
   const double begin_s = robot.time();
   double rest_from_s = -1;
   for (;;) {
@@ -95,10 +86,10 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
     const double servoing_s = record.servoing_from_s < 0 ? -1 : sample.time_s - record.servoing_from_s;
     sample.is_spoilt = injector.apply(frame, servoing_s);
 
-    const double start_ms = processMs();
+    const double start_ms = processTime_ms();
     const FrameReport report = perception.process(frame, sample.truth);
     const TaskCommand command = task.step(report);
-    sample.loop_ms = processMs() - start_ms;
+    sample.loop_ms = processTime_ms() - start_ms;
     give(robot, command);
 
     if (record.servoing_from_s < 0 && task.phase() == TaskPhase::servoing)
@@ -121,7 +112,7 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
     record.samples.push_back(sample);
     record.verdicts = report.verdicts;
 
-    record.is_contact = robot.leastClearance() < options.contact;
+    record.is_contact = robot.leastClearance() < kContact;
     record.is_finished = task.phase() == TaskPhase::done;
     const bool is_over = task.phase() == TaskPhase::done || task.phase() == TaskPhase::failed;
     if (is_over && rest_from_s < 0)

@@ -5,13 +5,15 @@
 ///
 /// Idea: the task gets what the perception makes of a frame and nothing else. The truth goes into the record only,
 /// through a judge that is asked after the command has been given.
-
 #include "faults/fault.h"
+#include "simulation/forest.h"
 #include "simulation/vpSimulatorArDrone.h"
 #include "tasks/servo_task.h"
 #include "trials/perception.h"
 
 #include <functional>
+#include <optional>
+#include <string>
 
 namespace bole
 {
@@ -34,11 +36,8 @@ struct LoopSample
 
 struct LoopOptions
 {
-  double duration_s = 40;       ///< of servoing, at most, 1 to 3600
-  double search_most_s = 60;    ///< before it, at most, 1 to 3600
-  double contact = 0.28;        ///< body's origin to bark that is a contact: ends the flight [m], 0.05 to 2
-  double translation_max = 1.5; ///< given to the robot [m/s], 0.05 to 5
-  double rotation_max = 1;      ///< [rad/s], 0.05 to 5
+  double duration_s = 40;    ///< of servoing, at most, 1 to 3600
+  double search_most_s = 60; ///< before it, at most, 1 to 3600
   FaultOptions fault;
 
   void validate() const; ///< \throw vpException naming the option, its value and the range
@@ -66,4 +65,27 @@ using LoopWatcher = std::function<bool(const Frame &, const FrameReport &, const
 /// Takes off and flies. \p robot stands on the ground.
 LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, ServoTask &task, const LoopOptions &options,
                          const Judge &judge = {}, const LoopWatcher &watcher = {});
+
+// A closed-loop flight as tables: what was done, and why it failed. `apps/campaign/figures.py` draws them.
+
+/// A row a frame: time, phase, status, true and estimated place, command, speed, clearance, loop time, errors.
+std::string samplesCsv(const LoopRecord &record);
+
+/// The first of half a second of frames in which something the task flies by was wrong.
+struct Parting
+{
+  std::size_t sample = 0;
+  std::string what; ///< one line
+};
+
+/// Asked in this order, of each frame: an error of the task that it believes otherwise than it is (by half a degree, 3
+/// per cent, or .3 of any other unit); within 4 m a confirmed trunk where none stands within .6 m, or one that is .3 m
+/// off; within 2 m and 35 degrees of straight ahead a trunk that the map does not hold. None: belief was right, what
+/// failed is control.
+std::optional<Parting> findParting(const LoopRecord &record, const std::vector<SimulatedTrunk> &trunks);
+
+/// Why a flight failed, as JSON: the outcome, the parting, and at the parting and at the end the drone, the trunks as
+/// they are and as they are believed (moved to where the drone truly was).
+std::string failureJson(const LoopRecord &record, const std::vector<SimulatedTrunk> &trunks, const std::string &title,
+                        const std::optional<Parting> &parting);
 } // namespace bole

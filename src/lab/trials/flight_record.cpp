@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "trials/flight_record.h"
+#include "trials/closed_loop.h"
 
 #include "support/text.h"
 

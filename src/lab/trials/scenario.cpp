@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "trials/scenario.h"
+#include "trials/servo_trial.h"
 
 #include "simulation/random.h"
 #include "support/text.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "trials/servo_trial.h"
-#include "tasks/gap_task.h"
-#include "tasks/slalom_task.h"
+#include "tasks/gap_and_slalom.h"
 #include "tasks/trunk_task.h"
 
 #include <algorithm>

@@ -3,7 +3,6 @@
 #include "support/test.h"
 
 #include "baseline/comparison.h"
-#include "baseline/comparison_report.h"
 #include "support/units.h"
 #include <bole/cylinder.h>
 #include <bole/vpMbTrunkTracker.h>

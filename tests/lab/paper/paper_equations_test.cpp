@@ -4,8 +4,8 @@
 #include "support/drawn_trunks.h"
 #include "support/test.h"
 
-#include "paper/joint_optimum.h"
 #include "paper/paper_mapper.h"
+#include "paper/tree_energy.h"
 #include "support/units.h"
 #include <bole/smoother.h>
 

@@ -3,9 +3,9 @@
 
 #include "simulation/forest.h"
 #include "simulation/forest_renderer.h"
-#include "simulation/h264_link.h"
 #include "simulation/random.h"
 #include "simulation/simulated_flight.h"
+#include "support/h264.h"
 #include "support/units.h"
 
 using namespace bole;

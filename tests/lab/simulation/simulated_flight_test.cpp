@@ -2,7 +2,6 @@
 #include "support/test.h"
 
 #include "simulation/simulated_flight.h"
-#include "simulation/words.h"
 #include "support/units.h"
 #include <bole/open_source.h>
 

@@ -2,8 +2,7 @@
 #include "obstacles.h"
 #include "support/test.h"
 
-#include "tasks/gap_task.h"
-#include "tasks/slalom_task.h"
+#include "tasks/gap_and_slalom.h"
 
 using namespace bole;
 

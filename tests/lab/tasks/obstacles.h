@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 
-#include "tasks/surroundings.h"
+#include "tasks/obstacles.h"
 
 namespace bole::test
 {

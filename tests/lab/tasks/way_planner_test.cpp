@@ -2,7 +2,7 @@
 #include "obstacles.h"
 #include "support/test.h"
 
-#include "tasks/plane_response.h"
+#include "tasks/drone_response.h"
 #include "tasks/way_planner.h"
 
 using namespace bole;

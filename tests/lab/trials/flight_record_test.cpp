@@ -3,7 +3,7 @@
 
 #include "simulation/vpSimulatorArDrone.h"
 #include "tasks/trunk_task.h"
-#include "trials/flight_record.h"
+#include "trials/closed_loop.h"
 #include "trials/servo_trial.h"
 #include <complex>
 #include <nlohmann/json.hpp>

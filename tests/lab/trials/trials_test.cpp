@@ -3,10 +3,8 @@
 
 #include "faults/fault.h"
 #include "simulation/random.h"
-#include "support/statistics.h"
+#include "support/units.h"
 #include "trials/closed_loop.h"
-#include "trials/flight_record.h"
-#include "trials/scenario.h"
 #include "trials/servo_trial.h"
 
 using namespace bole;

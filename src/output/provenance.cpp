@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// What a run is made of: its input and the versions of the programs.
 #include "output/summary_json.h"
+
+#include "bole_commit.h"
+#include <bole/visp.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <fstream>
 #include <memory>
+#include <opencv2/core/version.hpp>
 #include <vector>
 
 extern "C" {
+#include <libavutil/avutil.h>
 #include <libavutil/mem.h>
 #include <libavutil/sha.h>
 }
@@ -19,37 +26,20 @@ namespace bole
 namespace fs = std::filesystem;
 namespace
 {
-class Sha256
+void add(AVSHA &hash, const char *data, std::size_t size)
 {
-public:
-  Sha256() : m_state(av_sha_alloc(), av_free) { av_sha_init(m_state.get(), 256); }
-  void add(const char *data, std::size_t size)
-  {
-    av_sha_update(m_state.get(), reinterpret_cast<const std::uint8_t *>(data), size);
-  }
-  std::string finish()
-  {
-    std::array<std::uint8_t, 32> digest{};
-    av_sha_final(m_state.get(), digest.data());
-    std::string text;
-    for (const std::uint8_t byte : digest)
-      text += fmt::format("{:02x}", byte);
-    return text;
-  }
-
-private:
-  std::unique_ptr<AVSHA, void (*)(void *)> m_state;
-};
+  av_sha_update(&hash, reinterpret_cast<const std::uint8_t *>(data), size);
+}
 
 /// Adds the content of \p path; false where that cannot be read or is not wanted any more.
-bool addFile(Sha256 &hash, const fs::path &path, std::uint64_t &bytes, const std::atomic<bool> &is_cancelled)
+bool addFile(AVSHA &hash, const fs::path &path, std::uint64_t &bytes, const std::atomic<bool> &is_cancelled)
 {
   std::ifstream file(path, std::ios::binary);
   std::vector<char> block(1 << 16);
   while (file && !is_cancelled) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     const auto count = static_cast<std::size_t>(file.gcount());
-    hash.add(block.data(), count);
+    add(hash, block.data(), count);
     bytes += count;
   }
   return file.eof() && !is_cancelled;
@@ -62,10 +52,11 @@ std::optional<InputDigest> digestOf(const std::string &input, const std::atomic<
   fs::path root = input;
   if (input.find('%') != std::string::npos && !fs::exists(root, error))
     root = root.has_parent_path() ? root.parent_path() : fs::path(".");
-  Sha256 hash;
+  const std::unique_ptr<AVSHA, void (*)(void *)> hash(av_sha_alloc(), av_free);
+  av_sha_init(hash.get(), 256);
   InputDigest digest;
   if (fs::is_regular_file(root, error)) {
-    if (!addFile(hash, root, digest.bytes, is_cancelled))
+    if (!addFile(*hash, root, digest.bytes, is_cancelled))
       return std::nullopt;
   }
   else if (fs::is_directory(root, error)) {
@@ -79,14 +70,25 @@ std::optional<InputDigest> digestOf(const std::string &input, const std::atomic<
     std::sort(files.begin(), files.end());
     for (const fs::path &file : files) {
       const std::string name = file.lexically_relative(root).string();
-      hash.add(name.c_str(), name.size() + 1);
-      if (!addFile(hash, file, digest.bytes, is_cancelled))
+      add(*hash, name.c_str(), name.size() + 1);
+      if (!addFile(*hash, file, digest.bytes, is_cancelled))
         return std::nullopt;
     }
   }
   else
     return std::nullopt;
-  digest.sha256 = hash.finish();
+  std::array<std::uint8_t, 32> bytes{};
+  av_sha_final(hash.get(), bytes.data());
+  digest.sha256 = fmt::format("{:02x}", fmt::join(bytes, ""));
   return digest;
+}
+
+std::map<std::string, std::string> versions()
+{
+  return {{"bole", BOLE_VERSION},
+          {"commit", BOLE_COMMIT},
+          {"visp", fmt::format("{}.{}.{}", VISP_VERSION_MAJOR, VISP_VERSION_MINOR, VISP_VERSION_PATCH)},
+          {"opencv", CV_VERSION},
+          {"libav", av_version_info()}};
 }
 } // namespace bole
