@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kAside_px = 2.5; ///< from a border into what is beside it: half of the window of saliency
-constexpr int kLeastViews = 5;    ///< views within the window that see both borders: fewer let chance pairs agree
+constexpr int kLeastInliers = 5;    ///< views within the window that see both borders: fewer let chance pairs agree
 
 /// A view reduced to the ground plane.
 struct PlaneView
@@ -159,7 +159,7 @@ std::vector<SweepResult> bestRanges(const PairHypothesis &pair, const RangeCurve
   const std::size_t end = std::max(first, ranges.firstWithin(pair.s, options.radius_min));
   scores.resize(end - first);
   const float best = scoresOfPair({left.sum + first, left.seen + first}, {right.sum + first, right.seen + first},
-                                  static_cast<int>(scores.size()), kLeastViews, scores.data());
+                                  static_cast<int>(scores.size()), kLeastInliers, scores.data());
   std::vector<SweepResult> maxima;
   if (best < options.agreement_min)
     return maxima;
@@ -202,7 +202,7 @@ Fit refine(const PlaneView &now, const ViewColumns &views, const PairHypothesis 
     Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     fit.information = H;
-    const bool is_hopeless = fit.inliers < kLeastViews || fit.inliers < 0.8 * options.inliers_min * fit.views;
+    const bool is_hopeless = fit.inliers < kLeastInliers || fit.inliers < 0.8 * options.inliers_min * fit.views;
     if (iteration == kIterations || is_hopeless)
       break;
     H.diagonal() += Vector3d(1e-2, 1e-2, 1.0); // holds what the window does not see
@@ -253,7 +253,7 @@ std::optional<Detection> verify(const std::vector<PlaneView> &views, const ViewC
                                 const DetectorOptions &options)
 {
   const Fit fit = refine(views.back(), columns, pair, sweep.range, px_per_q, options);
-  if (fit.inliers < kLeastViews || fit.inliers < options.inliers_min * fit.views || fit.rms_px > options.rms_max_px)
+  if (fit.inliers < kLeastInliers || fit.inliers < options.inliers_min * fit.views || fit.rms_px > options.rms_max_px)
     return std::nullopt;
 
   Detection detection;
@@ -317,7 +317,7 @@ std::vector<Detection> detectTrunks(const std::vector<DetectorView> &views, cons
                                     const DetectorOptions &options)
 {
   std::vector<Detection> found;
-  if (static_cast<int>(views.size()) < kLeastViews)
+  if (static_cast<int>(views.size()) < kLeastInliers)
     return found;
   std::vector<PlaneView> plane;
   plane.reserve(views.size());

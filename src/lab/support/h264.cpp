@@ -14,7 +14,7 @@ extern "C" {
 
 namespace bole
 {
-namespace
+namespace h264
 {
 constexpr int kTicks = 1'000'000; // a second
 
@@ -54,7 +54,8 @@ const AVCodec *encoder()
   const AVCodec *codec = avcodec_find_encoder_by_name("libx264");
   return codec != nullptr ? codec : avcodec_find_encoder(AV_CODEC_ID_H264);
 }
-} // namespace
+} // namespace h264
+using namespace h264;
 
 struct VideoPacketEncoder::Libav : Codec
 {
