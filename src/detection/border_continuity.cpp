@@ -9,11 +9,14 @@ namespace bole
 {
 namespace
 {
+constexpr int kSamples = 4;  ///< across a strip
+constexpr double kNoise = 2; ///< of a camera, a pixel [grey levels]: a smooth surface changes by less, and says nothing
+constexpr double kChangesOfNoise = 10 * kSamples * kNoise * kNoise; ///< variance that it gives changesAlong()
+
 /// Changes from row to row, smoothed by a binomial of three, of the mean of \p image from \p near to \p far pixels to
 /// the right of \p line.
 std::vector<double> changesAlong(const vpImage<unsigned char> &image, const BorderLine &line, double near, double far)
 {
-  constexpr int kSamples = 4;
   std::vector<double> mean(static_cast<std::size_t>(line.rows()), 0.0), changes;
   for (int i = 0; i < line.rows(); ++i) {
     const unsigned char *row = image[static_cast<unsigned>(line.row_begin + i)];
@@ -52,8 +55,8 @@ std::optional<double> continuityAcross(const vpImage<unsigned char> &image, cons
     yy += out[i] * out[i];
     xy += in[i] * out[i];
   }
-  const double variances = (xx - x * x / n) * (yy - y * y / n);
-  return variances > 0 ? std::optional((xy - x * y / n) / std::sqrt(variances)) : std::nullopt;
+  const double noise = n * kChangesOfNoise;
+  return (xy - x * y / n) / std::sqrt((xx - x * x / n + noise) * (yy - y * y / n + noise));
 }
 
 std::optional<double> continuityOf(const vpImage<unsigned char> &image, const PinholeCamera &camera,

@@ -16,8 +16,8 @@
 namespace bole
 {
 /// Correlation of the changes of brightness along \p line on its two sides, each averaged over a strip of up to eight
-/// pixels that begins off the border. \p half_width_px: of the trunk inside. None where the line is short, leaves the
-/// image or runs along nothing that changes.
+/// pixels that begins off the border. \p half_width_px: of the trunk inside. None where the line is short or leaves the
+/// image; 0 where nothing changes by more than a camera's noise.
 std::optional<double> continuityAcross(const vpImage<unsigned char> &image, const BorderLine &line, Border border,
                                        double half_width_px);
 

@@ -306,7 +306,7 @@ TEST(Gyro, TurnsThatAreLookedUpAreThoseThatAreIntegrated)
   std::vector<GyroSample> samples;
   for (int i = 0; i <= 200; ++i)
     if (i < 100 || i > 130) // a gap of 0.15 s
-      samples.push_back({i * 5000000LL, {std::sin(0.1 * i), std::cos(0.07 * i), 0.3}});
+      samples.push_back({i * 5000000LL, {std::sin(0.01 * i), std::cos(0.007 * i), 0.3}});
   const GyroTurns turns(samples);
   for (std::int64_t from_ns = -200000000; from_ns < 1200000000; from_ns += 7300000)
     for (const std::int64_t duration_ns : {2000000LL, 33000000LL, 150000000LL, 400000000LL}) {
