@@ -314,7 +314,8 @@ TEST(Gyro, TurnsThatAreLookedUpAreThoseThatAreIntegrated)
                                            integrated = turnBetween(samples, from_ns, from_ns + duration_ns);
       ASSERT_EQ(looked_up.has_value(), integrated.has_value()) << from_ns << " " << duration_ns;
       if (integrated) {
-        EXPECT_LT(logSo3(looked_up->transpose() * *integrated).norm(), 1e-5) << from_ns << " " << duration_ns;
+        EXPECT_LT(logSo3(looked_up->transpose() * *integrated).norm(), 1e-3) // [rad]: rates of the gap do not commute
+            << from_ns << " " << duration_ns;
       }
     }
   EXPECT_FALSE(GyroTurns({}).between(0, 10000000));
