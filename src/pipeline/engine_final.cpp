@@ -59,7 +59,7 @@ std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
     if (!relative.isFinite())
       continue;
     if (const auto across =
-            continuityOf(frame.image, m_camera, relative, elevationOf(relative, one.trunk, at, m_units))) {
+            continuityOf(frame.image, m_camera, relative, textureRange(relative, one.trunk, at, m_units))) {
       sum += *across;
       ++count;
     }

@@ -52,6 +52,14 @@ ElevationRange elevationOf(const RelativeTrunk &relative, const Trunk &trunk, co
   return {(options.flow.trunk_low - above) / tangent, (options.flow.trunk_high - above) / tangent};
 }
 
+ElevationRange textureRange(const RelativeTrunk &relative, const Trunk &trunk, const Viewpoint &view,
+                            const StageOptions &options)
+{
+  ElevationRange part = elevationOf(relative, trunk, view, options);
+  part.high = std::max(part.high, options.detection.profile.range.high);
+  return part;
+}
+
 std::vector<PredictedTrunk> predictTrunks(const TrunkMap &map, const Smoother &smoother, const Viewpoint &view,
                                           const StageOptions &options)
 {

@@ -50,6 +50,9 @@ HiddenBorders hiddenBorders(const Trunk &trunk, int id, const TrunkMap &map, con
 /// The part of a trunk that is looked at: between two heights over the ground, where the ground is known.
 ElevationRange elevationOf(const RelativeTrunk &relative, const Trunk &trunk, const Viewpoint &view,
                            const StageOptions &options);
+/// The same, up to where the detector looks: more rows tell more of what goes on across a border.
+ElevationRange textureRange(const RelativeTrunk &relative, const Trunk &trunk, const Viewpoint &view,
+                            const StageOptions &options);
 
 /// Active trunks before the camera and within the range of tracking.
 std::vector<PredictedTrunk> predictTrunks(const TrunkMap &map, const Smoother &smoother, const Viewpoint &view,

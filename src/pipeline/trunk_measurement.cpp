@@ -100,7 +100,7 @@ std::vector<TrackedTrunk> trackTrunks(const vpImage<unsigned char> &image, const
       result.status = TrackingStatus::tracked;
     if (result.status == TrackingStatus::tracked)
       tracked.continuity = continuityOf(image, view.camera, result.optimum,
-                                        elevationOf(result.optimum, map.trunk(prediction.id).trunk, view, options));
+                                        textureRange(result.optimum, map.trunk(prediction.id).trunk, view, options));
     seen.push_back(tracked);
   }
   return seen;
