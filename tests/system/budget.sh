@@ -6,7 +6,8 @@ bole=$1 table=$2 sequence=$3 frames=30 worse=0
 command -v valgrind >/dev/null && command -v callgrind_annotate >/dev/null || { echo "no valgrind: skipped"; exit 77; }
 grep -q avx2 /proc/cpuinfo || { echo "the table counts AVX2: skipped"; exit 77; }
 run=$(mktemp -d) && trap 'rm -rf "$run"' EXIT
-valgrind --tool=callgrind --callgrind-out-file="$run/counts" "$bole" track "$sequence" -o "$run/run" --no-video --quiet \
+# One thread: those of OpenMP wait by spinning, for as long as the machine is busy.
+OMP_NUM_THREADS=1 valgrind --tool=callgrind --callgrind-out-file="$run/counts" "$bole" track "$sequence" -o "$run/run" --no-video --quiet \
   --frames $frames >"$run/log" 2>&1
 grep -q "Unrecognised instruction" "$run/log" && { echo "this valgrind does not know this processor: skipped"; exit 77; }
 [ -s "$run/counts" ] || { cat "$run/log"; exit 1; }
