@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kAside_px = 2.5; ///< from a border into what is beside it: half of the window of saliency
-constexpr int kLeastInliers = 5;    ///< views within the window that see both borders: fewer let chance pairs agree
+constexpr int kLeastInliers = 5;  ///< views within the window that see both borders: fewer let chance pairs agree
 
 /// A view reduced to the ground plane.
 struct PlaneView
