@@ -43,7 +43,7 @@ namespace bole::paper
 constexpr double kIntensity = 0.02;             ///< sigma_I, noise of a pixel [full scale]
 constexpr double kBackground_px = 0.15;         ///< of Sigma_b: flow about V omega
 constexpr double kForeground_px = 3;            ///< of Sigma_f: flow about 0
-constexpr int kEmIterations = 8;                  ///< of EM
+constexpr int kEmIterations = 8;                ///< of EM
 using FlowMatrix = Eigen::Matrix<double, 2, 3>; ///< V
 using Turn = Eigen::Matrix3d;                   ///< pRc: current camera in the previous one, Exp(omega)
 
