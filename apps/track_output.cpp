@@ -78,6 +78,18 @@ void measureMotion(const Trajectory &trajectory, RunSummary &summary)
   }
 }
 
+/// Orders \p views by frame and leaves one a trunk and frame: as it was known in flight, or else as the final map has
+/// it.
+void order(std::vector<TrunkTrace> &views)
+{
+  const auto place = [](const TrunkTrace &view) { return std::pair(view.frame, view.id); };
+  std::stable_sort(views.begin(), views.end(),
+                   [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) < place(b); });
+  views.erase(std::unique(views.begin(), views.end(),
+                          [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) == place(b); }),
+              views.end());
+}
+
 std::size_t confirmedIn(const FrameReport &report)
 {
   return static_cast<std::size_t>(
@@ -321,8 +333,7 @@ void TrackOutput::waitForKeeping()
     loseVideos(error); // the disk may be full of them
 }
 
-/// With the views of confirmed trunks alone, one a trunk and frame: as it was known in flight, or else as the final map
-/// has it. Without lengths where none is known.
+/// With the views of confirmed trunks alone, and without lengths where none is known.
 FlightTrace TrackOutput::confirmedTrace() const
 {
   FlightTrace trace;
@@ -330,16 +341,9 @@ FlightTrace TrackOutput::confirmedTrace() const
   if (!m_summary.reference.has_ranges)
     return trace;
   trace.evidence = m_trace.evidence;
-  std::vector<TrunkTrace> &views = trace.views;
   for (const TrunkRecord &trunk : m_summary.trunks)
     if (const auto seen = m_views.find(trunk.id); trunk.status == TrunkStatus::confirmed && seen != m_views.end())
-      views.insert(views.end(), seen->second.begin(), seen->second.end());
-  const auto place = [](const TrunkTrace &view) { return std::pair(view.frame, view.id); };
-  std::stable_sort(views.begin(), views.end(),
-                   [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) < place(b); });
-  views.erase(std::unique(views.begin(), views.end(),
-                          [&](const TrunkTrace &a, const TrunkTrace &b) { return place(a) == place(b); }),
-              views.end());
+      trace.views.insert(trace.views.end(), seen->second.begin(), seen->second.end());
   return trace;
 }
 
@@ -365,6 +369,7 @@ void TrackOutput::keep(const Pipeline &pipeline)
   known->graph = pipeline.graph();
   m_keeping = std::async(std::launch::async, [this, known = std::move(known)]() mutable -> std::string {
     try {
+      order(known->trace.views);
       writeTrace(m_folder.path(), known->trace);
       writeG2o(m_folder.file("graph.g2o"), known->graph);
       writeFiles(m_folder, known->picture, known->summary);
@@ -395,7 +400,9 @@ void TrackOutput::write(const Pipeline &pipeline, bool is_complete)
     writeFiles(m_folder, picture, m_summary);
   }
   writeG2o(m_folder.file("graph.g2o"), pipeline.graph());
-  writeTrace(m_folder.path(), confirmedTrace());
+  FlightTrace trace = confirmedTrace();
+  order(trace.views);
+  writeTrace(m_folder.path(), trace);
   writeBestViews();
 }
 

@@ -13,21 +13,21 @@ constexpr int kSamples = 4;  ///< across a strip
 constexpr double kNoise = 2; ///< of a camera, a pixel [grey levels]: a smooth surface changes by less, and says nothing
 constexpr double kChangesOfNoise = 10 * kSamples * kNoise * kNoise; ///< variance that it gives changesAlong()
 
-/// Changes from row to row, smoothed by a binomial of three, of the mean of \p image from \p near to \p far pixels to
-/// the right of \p line.
+/// Changes from row to row, smoothed by a binomial of three, of the sum of kSamples of \p image from \p near to \p far
+/// pixels to the right of \p line.
 std::vector<double> changesAlong(const vpImage<unsigned char> &image, const BorderLine &line, double near, double far)
 {
-  std::vector<double> mean(static_cast<std::size_t>(line.rows()), 0.0), changes;
+  std::vector<double> sum(static_cast<std::size_t>(line.rows()), 0.0), changes;
   for (int i = 0; i < line.rows(); ++i) {
     const unsigned char *row = image[static_cast<unsigned>(line.row_begin + i)];
     for (int k = 0; k < kSamples; ++k) {
       const double x = line.xAt(line.row_begin + i) + near + (far - near) * k / (kSamples - 1);
       const int column = static_cast<int>(x);
-      mean[static_cast<std::size_t>(i)] += row[column] + (x - column) * (row[column + 1] - row[column]);
+      sum[static_cast<std::size_t>(i)] += row[column] + (x - column) * (row[column + 1] - row[column]);
     }
   }
-  for (std::size_t i = 2; i + 2 < mean.size(); ++i)
-    changes.push_back(mean[i + 2] + 2 * mean[i + 1] - 2 * mean[i - 1] - mean[i - 2]);
+  for (std::size_t i = 2; i + 2 < sum.size(); ++i)
+    changes.push_back(sum[i + 2] + 2 * sum[i + 1] - 2 * sum[i - 1] - sum[i - 2]);
   return changes;
 }
 } // namespace

@@ -144,7 +144,8 @@ struct MapTrunk
 
 /// Log-odds of a strip of a surface against a trunk, by how far what it shows goes on across its borders
 /// (continuityOf()). Every other surface shows rows that go on; of trunks 95 in 100 stay below .15, on path-traced,
-/// simulated and real flights alike.
+/// simulated and real flights alike. Below 0 for what does not go on, which counts where a whole flight is known: in
+/// flight the surfaces that show no such rows are as likely as before.
 double logOddsOfSurface(double continuity);
 
 /// Running mean of the signed contrast of a border; one whose sign flips begins anew. \p now: 0 where it was not seen.

@@ -163,7 +163,6 @@ void Estimation::calibrateGyro()
   GyroTurns gyro(samples);
   std::vector<Turn> turns;                  // that every offset can be tried on
   for (int round = 0; round < 2; ++round) { // the second one with the bias taken off exactly
-    gyro = GyroTurns(samples);
     turns.clear();
     for (const Turn &turn : m_turns)
       if (gyro.between(turn.a_ns - nsOf(kMostLate_s), turn.b_ns + nsOf(kMostLate_s)))
@@ -177,8 +176,9 @@ void Estimation::calibrateGyro()
     bias += fit.value;
     for (GyroSample &sample : samples)
       sample.rate -= fit.value;
+    gyro = GyroTurns(samples);
   }
-  m_result.verdicts = judgeCamera(GyroTurns(samples), turns, m_bMc.R, m_overlap);
+  m_result.verdicts = judgeCamera(gyro, turns, m_bMc.R, m_overlap);
   for (SensorVerdict &verdict : m_result.verdicts)
     verdict.since_s = secondsOf(m_frames.front().stamp_ns);
   m_is_gyro_explained = fit.failing < kMostFailing;

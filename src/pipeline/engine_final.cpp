@@ -42,7 +42,7 @@ Viewpoint Engine::viewpointOf(std::size_t pose, double time_s) const
 /// over its nearest views, nothing where too few show it.
 std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
 {
-  constexpr std::size_t kNearest = 16, kLeast = 4;     // views; borders in them
+  constexpr std::size_t kNearest = 16, kLeast = 4;     // views; of them those that tell
   std::vector<std::pair<double, std::size_t>> nearest; // range, number of the keyframe
   for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i)
     if (const Keyframe &frame = m_keyframes.frames()[i];
