@@ -43,6 +43,7 @@ struct PointTracker::State
   std::vector<PointTrack> tracks;
   std::uint64_t next_id = 1;
   std::size_t frames = 0;
+  double brightness_change = 0;
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
   std::vector<unsigned char> peaks;         ///< of a row
@@ -59,23 +60,33 @@ namespace
 cv::Point2f toCv(const Eigen::Vector2d &p) { return {float(p.x()), float(p.y())}; }
 Eigen::Vector2d toEigen(const cv::Point2f &p) { return {double(p.x), double(p.y)}; }
 
-/// Makes the image \p before as bright as \p now is, where the exposure changed. What comes into view changes the mean,
-/// and hardly the median of all ratios.
-void brighten(GreyPyramid &before, const GreyPyramid &now)
+/// Logarithm of the brightness of \p now over that of \p before, whose picture has moved by \p shift [px]. What comes
+/// into view changes the mean, and hardly the median of all ratios. 0 where too little is neither dark nor saturated.
+double changeOfBrightness(const GreyPyramid &before, const GreyPyramid &now, const Eigen::Vector2d &shift)
 {
-  constexpr double kLeast = 0.1; // of change: less is followed as it is
-  constexpr double kMost = 3;    // factor: what is darker has too few grey levels
-  constexpr double kDark = 8;    // grey levels that are no light
+  constexpr int kDarkest = 4, kBrightest = 245; // grey levels that tell how much light there is
+  constexpr double kLeastShare = 0.1;           // of the pixels
   const cv::Mat &a = before.back(), &b = now.back();
+  const Eigen::Vector2d coarse = std::ldexp(1.0, 1 - static_cast<int>(now.size())) * shift;
+  cv::Mat moved;
+  cv::warpAffine(a, moved, cv::Matx23d(1, 0, coarse.x(), 0, 1, coarse.y()), a.size(), cv::INTER_LINEAR,
+                 cv::BORDER_CONSTANT, cv::Scalar(0));
+  const auto tells = [](int level) { return level >= kDarkest && level <= kBrightest; };
   std::vector<double> ratios;
-  for (int y = 0; y < a.rows; ++y)
-    for (int x = 0; x < a.cols; ++x)
-      ratios.push_back((b.at<unsigned char>(y, x) + kDark) / (a.at<unsigned char>(y, x) + kDark));
-  const double ratio = medianOf(std::move(ratios));
-  if (std::abs(ratio - 1) < kLeast || std::max(ratio, 1 / ratio) > kMost)
-    return;
+  for (int y = 0; y < b.rows; ++y)
+    for (int x = 0; x < b.cols; ++x)
+      if (const int from = moved.at<unsigned char>(y, x), to = b.at<unsigned char>(y, x); tells(from) && tells(to))
+        ratios.push_back(static_cast<double>(to) / from);
+  return static_cast<double>(ratios.size()) < kLeastShare * static_cast<double>(b.total())
+             ? 0
+             : std::log(medianOf(std::move(ratios)));
+}
+
+/// Makes the image \p before brighter by the factor \p ratio.
+void brighten(GreyPyramid &before, double ratio)
+{
   cv::Mat brighter;
-  before.front().convertTo(brighter, CV_8U, ratio, (ratio - 1) * kDark);
+  before.front().convertTo(brighter, CV_8U, ratio);
   buildPyramid(brighter, kLevels, before);
 }
 
@@ -120,10 +131,9 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
                                   m_state->camera.width, m_state->camera.height));
   }
   buildPyramid(current, kLevels, m_state->next);
-  if (!m_state->pyramid.empty() && !m_state->tracks.empty()) {
-    brighten(m_state->pyramid, m_state->next);
+  m_state->brightness_change = 0;
+  if (!m_state->pyramid.empty() && !m_state->tracks.empty())
     m_state->follow(aRb);
-  }
   m_state->replenish(current);
   m_state->pyramid.swap(m_state->next);
   ++m_state->frames;
@@ -151,16 +161,33 @@ PointTracker::State::search(const Start &start) const
 
 void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
 {
-  auto [places, found] = search([&](const Eigen::Vector2d &from) {
-    const Eigen::Vector3d turned = aRb.transpose() * camera.ray(from);
-    return toCv(turned.z() > 0.1 ? Eigen::Vector2d(camera.project(turned)) : from);
-  });
+  constexpr double kLeastChange = 0.1;   // of brightness: less is followed as it is
+  constexpr std::size_t kLeastFound = 8; // that tell how the picture moved
+  const auto turned = [&](const Eigen::Vector2d &from) {
+    const Eigen::Vector3d ray = aRb.transpose() * camera.ray(from);
+    return ray.z() > 0.1 ? Eigen::Vector2d(camera.project(ray)) : from;
+  };
+  const Eigen::Vector2d middle(0.5 * camera.width, 0.5 * camera.height);
+  brightness_change = changeOfBrightness(pyramid, next, turned(middle) - middle);
+  const bool is_brighter = std::abs(brightness_change) > kLeastChange;
+  if (is_brighter)
+    brighten(pyramid, std::exp(brightness_change));
+  auto [places, found] = search([&](const Eigen::Vector2d &from) { return toCv(turned(from)); });
   if (double(found) < kEnough * double(tracks.size())) { // turned farther than was expected?
     const Eigen::Vector2d shift = coarseShift(pyramid.front(), next.front());
     auto shifted = search([&](const Eigen::Vector2d &from) { return toCv(from + shift); });
     if (shifted.second > found)
       places = std::move(shifted.first);
   }
+  std::vector<double> x, y;
+  for (std::size_t i = 0; i < tracks.size(); ++i)
+    if (places[i]) {
+      x.push_back(places[i]->x() - tracks[i].current().x());
+      y.push_back(places[i]->y() - tracks[i].current().y());
+    }
+  if (x.size() >= kLeastFound)
+    brightness_change = (is_brighter ? brightness_change : 0) +
+                        changeOfBrightness(pyramid, next, {medianOf(std::move(x)), medianOf(std::move(y))});
   std::vector<PointTrack> kept;
   kept.reserve(kMostPoints);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
@@ -251,6 +278,8 @@ std::vector<PointMatch> PointTracker::matches(int frames_back) const
       matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current(), track.id});
   return matches;
 }
+
+double PointTracker::brightnessChange() const { return m_state->brightness_change; }
 
 std::size_t PointTracker::frames() const { return m_state->frames; }
 

@@ -68,6 +68,8 @@ public:
   const std::vector<PointTrack> &tracks() const;
   /// Tracks seen in the current frame and in the one \p frames_back before it (1: the last one).
   std::vector<PointMatch> matches(int frames_back) const;
+  /// Logarithm of the brightness of the current image over that of the one before it: the camera's exposure.
+  double brightnessChange() const;
   /// Frames seen since the start or the last reset().
   std::size_t frames() const;
   /// Forgets the last image: the next one is tracked from the one before it. Tracks that it ended stay ended. Once

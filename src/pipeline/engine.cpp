@@ -6,6 +6,7 @@
 #include "pipeline/scene_points.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 
 namespace bole
@@ -87,11 +88,13 @@ Engine::Engine(const PinholeCamera &camera, const Pose &bMc, const StageOptions 
 {
 }
 
-FrameReport Engine::process(const Frame &frame)
+FrameReport Engine::process(const Frame &as_it_came)
 {
   Laps lap;
   FrameReport report;
-  const Motion motion = estimateMotion(frame); // by gyro, pose filter and points, or by the images alone
+  const Motion motion = estimateMotion(as_it_came); // by gyro, pose filter and points, or by the images alone
+  Frame scratch;
+  const Frame &frame = asUsuallyExposed(as_it_came, motion, scratch);
   lap("motion");
   const Viewpoint view = extendTrajectory(frame, motion); // Eq. 2: the next pose, and all that was seen before it
   lap("smoothing");
@@ -140,6 +143,28 @@ Motion Engine::estimateMotion(const Frame &frame)
   Motion motion;
   motion.start = m_motion->first(frame);
   return motion;
+}
+
+/// \p frame with the image as an exposure that never changed would have made it, in \p scratch: all that follows
+/// compares brightness between frames. What the exposure settles at becomes usual.
+const Frame &Engine::asUsuallyExposed(const Frame &frame, const Motion &motion, Frame &scratch)
+{
+  constexpr double kUsual_s = 10;         // longer than a trunk is in sight
+  constexpr std::size_t kSaturated = 250; // grey level: how much light there was is not known
+  if (frame.status != FrameStatus::ok || !motion.image_fault.empty())
+    return frame;
+  const double elapsed_s = m_online.empty() ? 0 : secondsOf(frame.stamp_ns - m_online.back().stamp_ns);
+  m_brightness = m_brightness * std::exp(-elapsed_s / kUsual_s) + m_motion->points().tracker().brightnessChange();
+  if (m_brightness == 0)
+    return frame;
+  std::array<unsigned char, 256> level;
+  for (std::size_t i = 0; i < level.size(); ++i)
+    level[i] = static_cast<unsigned char>(
+        i >= kSaturated ? i : std::lround(std::min(255.0, std::exp(-m_brightness) * static_cast<double>(i))));
+  scratch = frame;
+  for (unsigned i = 0; i < scratch.image.getSize(); ++i)
+    scratch.image.bitmap[i] = level[scratch.image.bitmap[i]];
+  return scratch;
 }
 
 /// By the points of this frame, or level where the motion itself rests on a level ground.

@@ -70,6 +70,7 @@ private:
   };
 
   Motion estimateMotion(const Frame &frame);
+  const Frame &asUsuallyExposed(const Frame &frame, const Motion &motion, Frame &scratch);
   Viewpoint extendTrajectory(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
   void dropUncertain(std::vector<PredictedTrunk> &predicted, const Viewpoint &view);
@@ -121,6 +122,7 @@ private:
   double m_metres_of_units = 1;  ///< value of m_metres for which m_units was made
   std::size_t m_next_scale = 10; ///< frame at which the scale is measured next
   std::unique_ptr<MotionSource> m_motion;
+  double m_brightness = 0; ///< logarithm of that of the images over that of the images of the last ten seconds
   SaliencyEstimator m_saliency;
   Smoother m_smoother;
   DetectionWindow m_window;
