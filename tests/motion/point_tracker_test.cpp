@@ -42,7 +42,7 @@ TEST(PointTracker, FollowsCornersToTheirPlaceInTheNextFrames)
   EXPECT_GT(aMb.t.norm(), 0.2);
 }
 
-TEST(PointTracker, FollowsCornersThroughExposuresThatHunt)
+TEST(PointTracker, FollowsCornersThroughExposuresThatHuntAndMeasuresThem)
 {
   constexpr std::size_t kFrames = 6;
   const auto followed = [](double darkest) {
@@ -52,6 +52,7 @@ TEST(PointTracker, FollowsCornersThroughExposuresThatHunt)
       for (unsigned i = 0; i < image.getSize(); ++i)
         image.bitmap[i] = static_cast<unsigned char>(std::lround((k % 2 == 0 ? 1 : darkest) * image.bitmap[i]));
       tracker.track(image);
+      EXPECT_NEAR(tracker.brightnessChange(), k == 0 ? 0 : k % 2 == 0 ? -std::log(darkest) : std::log(darkest), 0.01);
     }
     return tracker.matches(kFrames - 1).size();
   };

@@ -10,6 +10,7 @@
 #include <bole/pose.h>
 #include <cstdio>
 #include <ostream>
+#include <set>
 #include <visp3/io/vpImageIo.h>
 #include <visp3/mbt/vpMbGenericTracker.h>
 
@@ -130,6 +131,36 @@ TEST(Accuracy, ALongLookMakesNoTrunks)
   EXPECT_GE(evaluation.trunks->all.found, 5u) << "of " << evaluation.trunks->all.expected;
   EXPECT_LE(evaluation.trunks->false_positives.size(), 1u) << "of " << evaluation.trunks->confirmed;
   EXPECT_LE(evaluation.trunks->all.radius_rmse, .05); // the sun is low: half of most trunks is in shade
+}
+
+/// The images of \p sequence under an exposure that hunts by 60 % with a period of .9 s.
+void flyWithHuntingExposure(const std::string &sequence, const fs::path &folder)
+{
+  fs::copy(sequence, folder, fs::copy_options::recursive);
+  const std::set<fs::path> images(fs::directory_iterator(folder / "mav0/cam0/data"), fs::directory_iterator());
+  std::size_t k = 0;
+  for (const fs::path &path : images) {
+    vpImage<unsigned char> image;
+    vpImageIo::read(image, path.string());
+    const double by = 1 + 0.6 * std::sin(2 * M_PI * static_cast<double>(k++) / 9);
+    for (unsigned i = 0; i < image.getSize(); ++i)
+      image.bitmap[i] = static_cast<unsigned char>(std::min(255.0, std::round(by * image.bitmap[i])));
+    vpImageIo::write(image, path.string());
+  }
+}
+
+TEST(Accuracy, AnExposureThatHuntsCostsFewTrunks)
+{
+  const std::string sequence = BOLE_SHARED_DATA_DIR "/rendered/pine-arc", flight = freshFolder("hunting"),
+                    folder = freshFolder("hunting_map");
+  if (!fs::exists(sequence))
+    GTEST_SKIP() << sequence << " is absent";
+  flyWithHuntingExposure(sequence, flight);
+  ASSERT_EQ(run("track " + flight + " -o " + folder + " --no-video").status, 0);
+  const bole::Evaluation evaluation = bole::evaluate(folder, flight);
+  ASSERT_TRUE(evaluation.trunks);
+  EXPECT_GE(evaluation.trunks->all.found, 6u) << "of " << evaluation.trunks->all.expected; // 8 as it was filmed
+  EXPECT_LE(evaluation.trunks->false_positives.size(), 1u) << "of " << evaluation.trunks->confirmed;
 }
 
 /// A pole in a hall of ropes and beams, seen through a wide lens that others rendered, with their log as odometry.
