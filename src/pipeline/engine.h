@@ -106,7 +106,6 @@ private:
   void runFinalPass();
   ScaleEstimate estimateScale(bool with_radii) const;
   void updateScale(double seconds_passed);
-  void measureScale();
   void fixScale();
   void setUnits();
   std::vector<KnownTrunk> knownTrunks(const std::vector<PredictedTrunk> &predicted, const Viewpoint &view) const;
@@ -116,11 +115,10 @@ private:
 
   PinholeCamera m_camera;
   Pose m_bMc;
-  StageOptions m_options;        ///< in metres
-  StageOptions m_units;          ///< the same with lengths in units of the motion
-  double m_metres = 1;           ///< in one unit of the motion
-  double m_metres_of_units = 1;  ///< value of m_metres for which m_units was made
-  std::size_t m_next_scale = 10; ///< frame at which the scale is measured next
+  StageOptions m_options;       ///< in metres
+  StageOptions m_units;         ///< the same with lengths in units of the motion
+  double m_metres = 1;          ///< in one unit of the motion
+  double m_metres_of_units = 1; ///< value of m_metres for which m_units was made
   std::unique_ptr<MotionSource> m_motion;
   double m_brightness = 0; ///< logarithm of that of the images over that of the images of the last ten seconds
   SaliencyEstimator m_saliency;

@@ -32,20 +32,14 @@ ScaleEstimate Engine::estimateScale(bool with_radii) const
           scale.source};
 }
 
-/// Measures the scale from time to time and lets the metres follow it. The radii count only at the end: the detector
+/// Lets the metres follow the scale. The radii count only at the end: the detector
 /// looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows them runs away.
 void Engine::updateScale(double seconds_passed)
 {
-  constexpr std::size_t kLeast = 10, kMost = 60; // frames between two measurements
-  constexpr std::size_t kShare = 10;             // of what is compared there is a tenth more by then
-  constexpr double kAtOnce = 0.1;                // of the log of the scale: as much changes decisions
-  constexpr double kFollows_s = 2;               // below that, at a pace that nobody takes for a motion
+  constexpr double kAtOnce = 0.1;  // of the log of the scale: as much changes decisions
+  constexpr double kFollows_s = 2; // below that, at a pace that nobody takes for a motion
   if (!m_motion->hasRanges())
     return;
-  if (newest() >= m_next_scale) {
-    measureScale();
-    m_next_scale = newest() + std::clamp(newest() / kShare, kLeast, kMost);
-  }
   const double log_metres = std::log(m_metres), off = estimateScale(false).log_scale - log_metres;
   const double share = std::abs(off) > kAtOnce ? 1 : 1 - std::exp(-seconds_passed / kFollows_s);
   m_metres = std::exp(log_metres + share * off);
@@ -53,17 +47,11 @@ void Engine::updateScale(double seconds_passed)
     setUnits();
 }
 
-void Engine::measureScale()
-{
-  m_motion->measureScale([this](std::size_t pose) { return m_smoother.pose(pose); });
-}
-
 /// Fixes the scale at the end of the flight, by the radii of the trunks too.
 void Engine::fixScale()
 {
   if (!m_motion->hasRanges())
     return;
-  measureScale();
   m_metres = std::exp(estimateScale(true).log_scale);
   setUnits();
 }

@@ -10,7 +10,6 @@
 #include <bole/report.h>
 #include <bole/trunk_record.h>
 
-#include "motion/path_scale.h"
 #include "motion/point_motion.h"
 
 #include <memory>
@@ -76,8 +75,6 @@ public:
   virtual bool isTranslationMeasured() const = 0;
   /// Height of the ground in the world [units of the motion], where it is known.
   virtual std::optional<double> groundZ() const = 0;
-  /// Compares the lengths of the path as it is known now, \p path, with what measures metres.
-  virtual void measureScale(const PathScale::Path &path) { static_cast<void>(path); }
   /// The scale as the motion source estimates it by itself.
   virtual ScaleEstimate scale() const = 0;
   /// Sensors that contradicted the others so far.

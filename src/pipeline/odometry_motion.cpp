@@ -40,7 +40,6 @@ OdometryMotion::OdometryMotion(const PinholeCamera &camera, const Pose &bMc, boo
       m_use_points(options.flow.use_points),
       m_scale_sigma(options.motion.scale_sigma),
       m_model(options.motion, options.points.gyro),
-      m_path_scale(options.points.gyro, options.flow.use_points ? PathScale::kWalkAmongTrees : odometry::kWalk),
       m_inertial(bMc, options.points.gyro),
       m_monitor(bMc)
 {
@@ -69,9 +68,6 @@ std::vector<RelativeMotion> OdometryMotion::observe(const Frame &frame)
   const Frame &trusted = m_monitor.trusted(frame, scratch);
   m_inertial_step = trusted.wMb_odometry ? std::nullopt : m_inertial.stepTo(trusted, m_last_ns);
   m_inertial.process(trusted, seen);
-  m_path_scale.add(trusted);
-  if (m_inertial.hasBegunAnew())
-    m_path_scale.forget(InertialScale::kMisfit_s);
   m_last_ns = frame.stamp_ns;
   return seen;
 }
@@ -110,21 +106,10 @@ std::optional<double> OdometryMotion::groundZ() const
   return m_has_odometry ? std::optional<double>(0.0) : std::nullopt;
 }
 
-/// Takes the scale of the path, which is observable where the path sways, or that of the odometry where it is known
-/// better.
-void OdometryMotion::measureScale(const PathScale::Path &path)
-{
-  if (!m_has_odometry)
-    return;
-  const std::optional<LogScale> of_path = m_path_scale.measure(path, m_scale_sigma),
-                                of_odometry = m_inertial.scale(m_scale_sigma);
-  m_scale = of_path && !(of_odometry && of_odometry->sigma < of_path->sigma) ? of_path : of_odometry;
-}
-
 ScaleEstimate OdometryMotion::scale() const
 {
-  if (m_scale)
-    return {-m_scale->mean, m_scale->sigma, ScaleSource::odometry};
+  if (const auto measured = m_has_odometry ? m_inertial.scale(m_scale_sigma) : std::nullopt)
+    return {-measured->mean, measured->sigma, ScaleSource::odometry};
   return {0, m_scale_sigma, ScaleSource::odometry};
 }
 

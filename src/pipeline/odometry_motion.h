@@ -11,8 +11,8 @@
 namespace bole
 {
 /// The pose filter gives the translation, the gyro the rotation, and points relative poses against earlier frames. The
-/// scale of the path comes from the accelerometer where there is one, and so do its steps while the filter is silent. A
-/// sensor that contradicts the others is left out until it agrees with them again.
+/// scale of the odometry comes from the accelerometer where there is one, and so do its steps while the filter is
+/// silent. A sensor that contradicts the others is left out until it agrees with them again.
 class OdometryMotion : public MotionSource
 {
 public:
@@ -23,7 +23,6 @@ public:
   Motion step(const Frame &frame, const Pose &wMa, const Vector6d &velocity) override;
   bool isTranslationMeasured() const override { return m_has_odometry; }
   std::optional<double> groundZ() const override;
-  void measureScale(const PathScale::Path &path) override;
   ScaleEstimate scale() const override;
   std::vector<SensorVerdict> verdicts() const override { return m_monitor.verdicts(); }
   WorldReference reference() const override;
@@ -36,8 +35,6 @@ private:
   bool m_has_odometry, m_use_points;
   double m_scale_sigma;
   MotionModel m_model;
-  PathScale m_path_scale;                      ///< by the accelerometer
-  std::optional<LogScale> m_scale;             ///< of the path or the odometry, when measured last
   InertialScale m_inertial;                    ///< scale of the odometry; stands in for it
   std::optional<InertialStep> m_inertial_step; ///< to the frame at hand, where the pose filter is silent
   SensorMonitor m_monitor;
