@@ -51,10 +51,8 @@ std::unique_ptr<FrameSource> openRecording(TrackArguments &arguments, const Opti
                                            SensorCalibration &calibration)
 {
   auto source = openVideo(arguments, made);
-  const bool has_sensors =
-      (source->hasGyro() && !arguments.is_without_gyro) || (source->hasOdometry() && !arguments.is_without_odometry);
   const bool is_stream = LiveVideoSource::accepts(arguments.input); // cannot be looked through twice
-  if (!has_sensors || is_stream || !options.stages.calibration || !options.stages.points || !source->isCameraKnown())
+  if (is_stream || !options.stages.calibration || !options.stages.points)
     return source;
   calibration = calibrateSensors(*source, !arguments.is_without_gyro, !arguments.is_without_odometry);
   made.calibration = calibration.constants;

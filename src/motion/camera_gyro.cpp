@@ -3,6 +3,7 @@
 
 #include "geometry/constants.h"
 #include "motion/calibration_fit.h"
+#include "motion/relative_pose.h"
 
 #include <fmt/format.h>
 
@@ -90,6 +91,59 @@ Fitted fitBias(const GyroTurns &gyro, const std::vector<Turn> &turns, double lat
                         logSo3(orthonormalized(turned->transpose() * turn.aRb)), turn.information, overlap);
   }
   return solve(rows, kWideBias * kWideBias, scatter);
+}
+
+namespace
+{
+/// \p px of a lens with the radial distortion \p k1, as \p camera without it would show it.
+Eigen::Vector2d undistorted(const Eigen::Vector2d &px, const PinholeCamera &camera, double k1)
+{
+  constexpr int kIterations = 8;
+  const Eigen::Vector2d seen = camera.ray(px).head<2>();
+  Eigen::Vector2d straight = seen;
+  for (int i = 0; i < kIterations; ++i)
+    straight = seen / (1 + k1 * straight.squaredNorm());
+  return camera.project(straight.homogeneous());
+}
+
+/// Logarithm of the residual of \p pairs [px] under motions of a camera with the distortion \p k1, in the mean.
+double logResidual(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera, double k1)
+{
+  constexpr double kLeast_px = 0.02, kNoMotion_px = 1; // least that points are worth; where they agree on none
+  double sum = 0;
+  for (std::vector<PointMatch> matches : pairs) {
+    for (PointMatch &match : matches) {
+      match.a_px = undistorted(match.a_px, camera, k1);
+      match.b_px = undistorted(match.b_px, camera, k1);
+    }
+    const double sigma_px = estimateRelativePose(matches, camera).sigma_px;
+    sum += std::log(sigma_px > 0 ? std::max(sigma_px, kLeast_px) : kNoMotion_px);
+  }
+  return sum / static_cast<double>(pairs.size());
+}
+} // namespace
+
+std::optional<SensorVerdict> judgeLens(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera)
+{
+  constexpr std::size_t kLeastPairs = 8;
+  constexpr int kSteps = 4;
+  constexpr double kStep = 0.1;                  // of the share by which the corner of the image is moved
+  constexpr double kCloser = 0.1, kSharp = 0.05; // of the logarithm of the residual; lenses as stated: at most .02
+  if (pairs.size() < kLeastPairs)
+    return std::nullopt;
+  const double corner = camera.ray({0, 0}).head<2>().squaredNorm();
+  std::vector<double> costs;
+  for (int i = -kSteps; i <= kSteps; ++i)
+    costs.push_back(logResidual(pairs, camera, kStep * i / corner));
+  const auto best = std::min_element(costs.begin(), costs.end());
+  if (best == costs.begin() || best + 1 == costs.end() || costs[kSteps] - *best < kCloser ||
+      std::min(best[-1], best[1]) - *best < kSharp)
+    return std::nullopt;
+  const double step = static_cast<double>(best - costs.begin()) - kSteps + peakOffset(-best[-1], -best[0], -best[1]);
+  return SensorVerdict{"images", "lens", 0,
+                       fmt::format("images: the lens bends them otherwise than the camera file says, as k1 = {:+.2f} "
+                                   "beside it would",
+                                   kStep * step / corner)};
 }
 
 std::vector<SensorVerdict> judgeCamera(const GyroTurns &gyro, const std::vector<Turn> &turns, const Matrix3d &bRc,

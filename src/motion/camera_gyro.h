@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// \file
-/// Whether what is stated of camera and gyro can be true: focal lengths, attitude of the camera on the body, scale of
-/// the rates.
+/// Whether what is stated of camera and gyro can be true: lens, focal lengths, attitude of the camera on the body,
+/// scale of the rates.
 
 #include "geometry/constants.h"
 #include "input/frame_builder.h"
 #include "motion/calibration_fit.h"
 #include "motion/gyro.h"
+#include "motion/point_tracker.h"
 
 namespace bole::calibration
 {
@@ -23,6 +24,12 @@ struct Turn
 /// The bias of a gyro that is \p late_s, by the rotations of the points.
 /// \param scatter of the noise; 0: that of what is left
 Fitted fitBias(const GyroTurns &gyro, const std::vector<Turn> &turns, double late_s, double overlap, double scatter);
+
+/// A radial distortion beside that of the camera file under which the points of many pairs of frames would agree much
+/// more closely with a motion of the camera; nothing where they agree as it is, or where the images do not tell.
+/// SensorVerdict::since_s is left at 0.
+/// \param pairs the matches of pairs of frames between which the camera moved
+std::optional<SensorVerdict> judgeLens(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera);
 
 /// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of \p turns; empty
 /// where they do as it is. Nothing is corrected: the numbers are the user's. SensorVerdict::since_s is left at 0.

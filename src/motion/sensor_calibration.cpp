@@ -440,12 +440,12 @@ SensorCalibration calibrate(const std::vector<Frame> &frames, const std::vector<
 
 SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_odometry)
 {
-  if (!(use_gyro && source.hasGyro()) && !(use_odometry && source.hasOdometry()))
-    return {};
+  constexpr std::size_t kLensEvery = 8; // motions that the lens is judged by: a frame is in one of them
   const PinholeCamera camera = source.camera();
   PointTracker tracker(camera);
   std::vector<Frame> frames; // without images
   std::vector<RelativeMotion> motions;
+  std::vector<std::vector<PointMatch>> pairs;
   std::vector<std::size_t> tracked;
   const auto sinceFrame = [&frames](std::size_t a) { return secondsOf(frames.back().stamp_ns - frames[a].stamp_ns); };
   for (Frame frame; (frames.empty() || sinceFrame(0) < calibration::kLooksThrough_s) && source.next(frame);) {
@@ -477,9 +477,20 @@ SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_
     motion.b_index = tracked.back();
     motion.a_ns = frames[motion.a_index].stamp_ns;
     motion.b_ns = frame.stamp_ns;
-    motion.points = motion.estimate = estimateRelativePose(tracker.matches(back), camera);
+    std::vector<PointMatch> matches = tracker.matches(back);
+    motion.points = motion.estimate = estimateRelativePose(matches, camera);
     motions.push_back(motion);
+    if (motions.size() % kLensEvery == 0 && motion.points.hasDirection())
+      pairs.push_back(std::move(matches));
   }
+  if (auto lens = calibration::judgeLens(pairs, camera)) { // whatever else is measured rests on the camera
+    lens->since_s = secondsOf(frames.front().stamp_ns);
+    SensorCalibration as_stated;
+    as_stated.verdicts.push_back(std::move(*lens));
+    return as_stated;
+  }
+  if (!(use_gyro && source.hasGyro()) && !(use_odometry && source.hasOdometry()))
+    return {};
   return calibrate(frames, motions, source.bMc());
 }
 } // namespace bole

@@ -35,7 +35,7 @@ namespace bole
 SensorCalibration calibrate(const std::vector<Frame> &frames, const std::vector<RelativeMotion> &motions,
                             const Pose &bMc);
 
-/// Looks through the first seconds of \p source, which it consumes, and estimates. As stated where the source has
-/// neither gyro nor odometry that is to be used.
+/// Looks through the first seconds of \p source, which it consumes, judges its lens and estimates. As stated where the
+/// lens is not, or where the source has neither gyro nor odometry that is to be used.
 SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro = true, bool use_odometry = true);
 } // namespace bole

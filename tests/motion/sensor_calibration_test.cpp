@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/made_flight.h"
+#include "motion/synthetic.h"
 #include "support/test.h"
 
+#include "motion/camera_gyro.h"
 #include "motion/gyro.h"
 #include "motion/sensor_calibration.h"
 
@@ -270,6 +272,39 @@ std::vector<GyroSample> samplesOf(const Eigen::Vector3d &rate, double noise, std
     samples.push_back({stamp, rate + Eigen::Vector3d(normal(random), normal(random), normal(random))});
   return samples;
 }
+
+/// What judgeLens() says of a camera whose lens has the distortion \p k1 that its file does not tell.
+std::optional<SensorVerdict> lensVerdict(double k1, const Pose &aMb = test::typicalMotion())
+{
+  const PinholeCamera camera;
+  std::vector<std::vector<PointMatch>> pairs;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    test::CloudOptions cloud;
+    cloud.noise_px = 0.1;
+    cloud.outliers = 0.1;
+    cloud.seed = seed;
+    pairs.push_back(test::cloudMatches(camera, aMb, cloud));
+    for (PointMatch &match : pairs.back())
+      for (Eigen::Vector2d *px : {&match.a_px, &match.b_px}) {
+        const Eigen::Vector2d straight = camera.ray(*px).head<2>();
+        *px = camera.project(Eigen::Vector2d(straight * (1 + k1 * straight.squaredNorm())).homogeneous());
+      }
+  }
+  return calibration::judgeLens(pairs, camera);
+}
+
+TEST(Lens, ADistortionThatTheCameraFileDoesNotTellIsNamedAndNoneWhereThereIsNone)
+{
+  for (const double k1 : {-0.25, 0.2}) {
+    const auto verdict = lensVerdict(k1);
+    ASSERT_TRUE(verdict) << k1;
+    EXPECT_NEAR(std::stod(verdict->text.substr(verdict->text.find("k1 = ") + 5)), k1, 0.05) << verdict->text;
+  }
+  EXPECT_FALSE(lensVerdict(0));
+  EXPECT_FALSE(lensVerdict(0.01));
+}
+
+TEST(Lens, ACameraThatStandsStillTellsNothingOfIt) { EXPECT_FALSE(lensVerdict(-0.25, Pose())); }
 
 TEST(Gyro, AConstantRateIntegratesToItsExponential)
 {
