@@ -141,8 +141,7 @@ std::optional<SensorVerdict> judgeLens(const std::vector<std::vector<PointMatch>
     return std::nullopt;
   const double step = static_cast<double>(best - costs.begin()) - kSteps + peakOffset(-best[-1], -best[0], -best[1]);
   return SensorVerdict{"images", "lens", 0,
-                       fmt::format("images: the lens bends them otherwise than the camera file says, as k1 = {:+.2f} "
-                                   "beside it would",
+                       fmt::format("images: the lens bends them otherwise than told, by about k1 = {:+.2f}",
                                    kStep * step / corner)};
 }
 
