@@ -81,6 +81,8 @@ struct SourceOptions
   /// [degrees], 10 to 150: horizontal field of view where no camera is given. Default: 65 is assumed, and said, which
   /// is between a phone's video and an action camera's.
   std::optional<double> field_of_view_deg;
+  /// Radial distortion where no camera is given: k1 of Distortion::radial_tangential. Default: 0.
+  double distortion_k1 = 0;
   /// Errors of gyro and odometry that are taken out. Default: none.
   SensorCalibration calibration;
 

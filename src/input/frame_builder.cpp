@@ -119,6 +119,9 @@ MountedCamera cameraFor(const SourceOptions &options, int width, int height, std
       note += fmt::format("; a pixel is {:.3g} times as wide as high, as the video says", pixel_aspect);
     CameraModel model;
     model.pinhole = {f, f * pixel_aspect, 0.5 * (width - 1), 0.5 * (height - 1), width, height};
+    if (options.distortion_k1 != 0)
+      model.distortion = Distortion::radial_tangential;
+    model.coefficients[0] = options.distortion_k1;
     const MountedCamera guess = {model, forwardCamera()};
     requirePlausible(guess); // pictures of a few pixels hold no trunk
     return guess;

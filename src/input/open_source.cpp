@@ -17,6 +17,7 @@ void SourceOptions::validate() const
     requireRange("max_width_px", max_width_px, 64, 16384);
   if (field_of_view_deg)
     requireRange("field_of_view_deg", *field_of_view_deg, 10, 150);
+  requireRange("distortion_k1", distortion_k1, -10, 10);
 }
 
 void requireUsed(const SourceOptions &options, const std::string &input, const SourceKind &kind)

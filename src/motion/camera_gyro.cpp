@@ -5,6 +5,8 @@
 #include "motion/calibration_fit.h"
 #include "motion/relative_pose.h"
 
+#include <algorithm>
+#include <array>
 #include <fmt/format.h>
 
 namespace bole::calibration
@@ -106,43 +108,66 @@ Eigen::Vector2d undistorted(const Eigen::Vector2d &px, const PinholeCamera &came
   return camera.project(straight.homogeneous());
 }
 
-/// Logarithm of the residual of \p pairs [px] under motions of a camera with the distortion \p k1, in the mean.
-double logResidual(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera, double k1)
+/// Logarithms of the residuals of \p pairs [px], each under a motion of a camera with the distortion \p k1.
+Eigen::VectorXd logResiduals(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera, double k1)
 {
   constexpr double kLeast_px = 0.02, kNoMotion_px = 1; // least that points are worth; where they agree on none
-  double sum = 0;
-  for (std::vector<PointMatch> matches : pairs) {
+  Eigen::VectorXd residuals(static_cast<Eigen::Index>(pairs.size()));
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    std::vector<PointMatch> matches = pairs[i];
     for (PointMatch &match : matches) {
       match.a_px = undistorted(match.a_px, camera, k1);
       match.b_px = undistorted(match.b_px, camera, k1);
     }
     const double sigma_px = estimateRelativePose(matches, camera).sigma_px;
-    sum += std::log(sigma_px > 0 ? std::max(sigma_px, kLeast_px) : kNoMotion_px);
+    residuals[static_cast<Eigen::Index>(i)] = std::log(sigma_px > 0 ? std::max(sigma_px, kLeast_px) : kNoMotion_px);
   }
-  return sum / static_cast<double>(pairs.size());
+  return residuals;
 }
 } // namespace
 
-std::optional<SensorVerdict> judgeLens(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera)
+std::optional<double> findDistortion(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera,
+                                     bool is_focal_known)
 {
   constexpr std::size_t kLeastPairs = 8;
   constexpr int kSteps = 4;
-  constexpr double kStep = 0.1;                  // of the share by which the corner of the image is moved
-  constexpr double kCloser = 0.1, kSharp = 0.05; // of the logarithm of the residual; lenses as stated: at most .02
+  constexpr double kStep = 0.1;                   // of the share by which the corner of the image is moved
+  constexpr double kCloser = 0.05, kSharp = 0.05; // of the logarithm of the residual; lenses as told: at most .02
+  constexpr double kSure = 3;                     // standard deviations of the mean over the pairs
   if (pairs.size() < kLeastPairs)
     return std::nullopt;
-  const double corner = camera.ray({0, 0}).head<2>().squaredNorm();
-  std::vector<double> costs;
-  for (int i = -kSteps; i <= kSteps; ++i)
-    costs.push_back(logResidual(pairs, camera, kStep * i / corner));
-  const auto best = std::min_element(costs.begin(), costs.end());
-  if (best == costs.begin() || best + 1 == costs.end() || costs[kSteps] - *best < kCloser ||
-      std::min(best[-1], best[1]) - *best < kSharp)
+  const double corner = camera.ray({0, 0}).head<2>().squaredNorm(), count = static_cast<double>(pairs.size());
+  Eigen::VectorXd straight, best; // residuals of the lens as it is told, and under the distortion that fits best
+  using Costs = Eigen::Matrix<double, 2 * kSteps + 1, 1>;
+  Costs costs = Costs::Zero(); // by distortion, at the focal length that fits best
+  for (const double factor : is_focal_known ? std::vector{1.0} : std::vector{0.6, 0.8, 1.0, 1.25, 1.6}) {
+    PinholeCamera other = camera;
+    other.fx *= factor;
+    other.fy *= factor;
+    Costs here;
+    bool is_best = false;
+    for (int i = -kSteps; i <= kSteps; ++i) {
+      const Eigen::VectorXd residuals = logResiduals(pairs, other, kStep * i / corner * factor * factor);
+      here[kSteps + i] = residuals.mean();
+      if (i == 0 && (straight.size() == 0 || residuals.mean() < straight.mean()))
+        straight = residuals;
+      if (best.size() == 0 || residuals.mean() < best.mean()) {
+        best = residuals;
+        is_best = true;
+      }
+    }
+    if (is_best)
+      costs = here;
+  }
+  Eigen::Index at = 0;
+  const double least = costs.minCoeff(&at);
+  if (at == 0 || at == 2 * kSteps)
     return std::nullopt;
-  const double step = static_cast<double>(best - costs.begin()) - kSteps + peakOffset(-best[-1], -best[0], -best[1]);
-  return SensorVerdict{"images", "lens", 0,
-                       fmt::format("images: the lens bends them otherwise than told, by about k1 = {:+.2f}",
-                                   kStep * step / corner)};
+  const Eigen::VectorXd closer = straight - best;
+  const double sigma = std::sqrt((closer.array() - closer.mean()).square().sum() / (count - 1) / count);
+  if (closer.mean() < std::max(kCloser, kSure * sigma) || std::min(costs[at - 1], costs[at + 1]) - least < kSharp)
+    return std::nullopt;
+  return kStep * (static_cast<double>(at) - kSteps + peakOffset(-costs[at - 1], -least, -costs[at + 1])) / corner;
 }
 
 std::vector<SensorVerdict> judgeCamera(const GyroTurns &gyro, const std::vector<Turn> &turns, const Matrix3d &bRc,

@@ -25,11 +25,12 @@ struct Turn
 /// \param scatter of the noise; 0: that of what is left
 Fitted fitBias(const GyroTurns &gyro, const std::vector<Turn> &turns, double late_s, double overlap, double scatter);
 
-/// A radial distortion beside that of the camera file under which the points of many pairs of frames would agree much
-/// more closely with a motion of the camera; nothing where they agree as it is, or where the images do not tell.
-/// SensorVerdict::since_s is left at 0.
+/// The radial distortion k1 beside that which was taken out under which the points of many pairs of frames would agree
+/// much more closely with a motion of the camera; nothing where they agree as it is, or where the images do not tell.
 /// \param pairs the matches of pairs of frames between which the camera moved
-std::optional<SensorVerdict> judgeLens(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera);
+/// \param is_focal_known false: the focal length of \p camera is a guess; another may be the true one
+std::optional<double> findDistortion(const std::vector<std::vector<PointMatch>> &pairs, const PinholeCamera &camera,
+                                     bool is_focal_known = true);
 
 /// A camera file or a scale of the gyro under which images and gyro would agree, in both halves of \p turns; empty
 /// where they do as it is. Nothing is corrected: the numbers are the user's. SensorVerdict::since_s is left at 0.

@@ -483,10 +483,11 @@ SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_
     if (motions.size() % kLensEvery == 0 && motion.points.hasDirection())
       pairs.push_back(std::move(matches));
   }
-  if (auto lens = calibration::judgeLens(pairs, camera)) { // whatever else is measured rests on the camera
-    lens->since_s = secondsOf(frames.front().stamp_ns);
+  if (const auto k1 = calibration::findDistortion(pairs, camera)) { // whatever else is measured rests on the camera
     SensorCalibration as_stated;
-    as_stated.verdicts.push_back(std::move(*lens));
+    as_stated.verdicts.push_back(
+        {"images", "lens", secondsOf(frames.front().stamp_ns),
+         fmt::format("images: the lens bends them otherwise than told, by about k1 = {:+.2f}", *k1)});
     return as_stated;
   }
   if (!(use_gyro && source.hasGyro()) && !(use_odometry && source.hasOdometry()))

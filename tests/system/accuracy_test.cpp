@@ -9,6 +9,7 @@
 #include <bole/open_source.h>
 #include <bole/pose.h>
 #include <cstdio>
+#include <cstring>
 #include <ostream>
 #include <set>
 #include <visp3/io/vpImageIo.h>
@@ -161,6 +162,44 @@ TEST(Accuracy, AnExposureThatHuntsCostsFewTrunks)
   ASSERT_TRUE(evaluation.trunks);
   EXPECT_GE(evaluation.trunks->all.found, 6u) << "of " << evaluation.trunks->all.expected; // 8 as it was filmed
   EXPECT_LE(evaluation.trunks->false_positives.size(), 1u) << "of " << evaluation.trunks->confirmed;
+}
+
+/// The images of \p sequence (320x240, f = 200 px) through a lens with the radial distortion \p k1, numbered.
+void filmThrough(double k1, const std::string &sequence, const fs::path &folder)
+{
+  const PinholeCamera camera{200, 200, 159.5, 119.5, 320, 240};
+  const std::set<fs::path> images(fs::directory_iterator(fs::path(sequence) / "mav0/cam0/data"),
+                                  fs::directory_iterator());
+  fs::create_directories(folder);
+  int number = 0;
+  for (const fs::path &path : images) {
+    vpImage<unsigned char> image, bent(240, 320);
+    vpImageIo::read(image, path.string());
+    for (int v = 0; v < camera.height; ++v)
+      for (int u = 0; u < camera.width; ++u) {
+        const Eigen::Vector2d seen = camera.ray({u, v}).head<2>();
+        Eigen::Vector2d straight = seen;
+        for (int i = 0; i < 12; ++i)
+          straight = seen / (1 + k1 * straight.squaredNorm());
+        const Eigen::Vector2d at = camera.project(straight.homogeneous());
+        bent[v][u] = image.getValue(std::clamp(at.y(), 0.0, 238.9), std::clamp(at.x(), 0.0, 318.9));
+      }
+    vpImageIo::write(bent, (folder / (std::to_string(1000 + number++) + ".png")).string());
+  }
+}
+
+TEST(Accuracy, AVideoThroughALensThatBendsTellsItsDistortionAndItsFieldOfView)
+{
+  const std::string video = freshFolder("bent"), folder = freshFolder("bent_map");
+  filmThrough(-0.12, kFlight, video);
+  const auto made = run("track " + video + " --rate 10 -o " + folder + " --no-video");
+  ASSERT_EQ(made.status, 0) << made.text;
+  const auto after = [&made](const char *words) {
+    const std::size_t at = made.text.find(words);
+    return at == std::string::npos ? 0 : std::stod(made.text.substr(at + std::strlen(words)));
+  };
+  EXPECT_NEAR(after("bends the images by k1 = "), -0.12, 0.03) << made.text;
+  EXPECT_NEAR(after("a field of view of "), 77.3, 4) << made.text; // without its distortion 64
 }
 
 /// A pole in a hall of ropes and beams, seen through a wide lens that others rendered, with their log as odometry.
