@@ -133,7 +133,7 @@ std::optional<double> findDistortion(const std::vector<std::vector<PointMatch>> 
   constexpr int kSteps = 4;
   constexpr double kStep = 0.1;                   // of the share by which the corner of the image is moved
   constexpr double kCloser = 0.05, kSharp = 0.05; // of the logarithm of the residual; lenses as told: at most .02
-  constexpr double kSure = 3;                     // standard deviations of the mean over the pairs
+  constexpr double kSure = 2.5;                   // standard deviations of the mean over the pairs
   if (pairs.size() < kLeastPairs)
     return std::nullopt;
   const double corner = camera.ray({0, 0}).head<2>().squaredNorm(), count = static_cast<double>(pairs.size());
