@@ -36,6 +36,7 @@ void requireUsed(const SourceOptions &options, const std::string &input, const S
   require(!options.frame_rate_hz || kind.takes_rate, "frame_rate_hz (--rate)", name + " has stamps of its own");
   require(!options.field_of_view_deg || !(kind.has_camera || has_camera), "field_of_view_deg (--field-of-view)",
           "the camera is known");
+  require(options.distortion_k1 == 0 || !(kind.has_camera || has_camera), "distortion_k1", "the camera is known");
 }
 
 std::unique_ptr<FrameSource> openSource(const std::string &input, const SourceOptions &options)

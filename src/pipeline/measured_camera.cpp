@@ -59,7 +59,7 @@ MeasuredSource openMeasured(const std::string &input, const SourceOptions &optio
   FocalEstimate focal;
   for (int round = 0; round < kRounds; ++round) {
     const MeasuredLens lens = measureLens(*opened.source);
-    focal = lens.k1 ? FocalEstimate() : lens.focal; // that of bent images is none
+    focal = lens.k1 || !lens.focal.known ? FocalEstimate() : lens.focal; // that of bent images is none
     side /= focal.factor;
     k1 = std::max((k1 + lens.k1.value_or(0)) * focal.factor * focal.factor, kFolds / (side * side)); // of the same px
     if (focal.known)
