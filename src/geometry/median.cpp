@@ -16,6 +16,16 @@ double medianOf(std::vector<double> values)
   return *middle;
 }
 
+Eigen::Vector2d medianByAxis(const std::vector<Eigen::Vector2d> &values)
+{
+  std::vector<double> x, y;
+  for (const Eigen::Vector2d &value : values) {
+    x.push_back(value.x());
+    y.push_back(value.y());
+  }
+  return {medianOf(std::move(x)), medianOf(std::move(y))};
+}
+
 double centreOf(std::vector<double> values)
 {
   if (values.empty())

@@ -3,12 +3,15 @@
 /// \file
 /// Median and quantiles of a handful of measurements, and the peak between three samples.
 
+#include <Eigen/Core>
 #include <vector>
 
 namespace bole
 {
 /// The upper one of the two in the middle where the count is even; 0 of none.
 double medianOf(std::vector<double> values);
+/// The median of each coordinate by itself, as medianOf().
+Eigen::Vector2d medianByAxis(const std::vector<Eigen::Vector2d> &values);
 /// The mean of the two in the middle where the count is even; NaN of none.
 double centreOf(std::vector<double> values);
 /// The one of \p values below which the part \p share of them stays, 0 to 1: the nearest rank; NaN of none.

@@ -33,16 +33,6 @@ constexpr double kClip = 6;             // spreads: an interval farther off is a
 constexpr double kLogRatio = 30;        // of the likelihoods: a dozen hypotheses are tried ten times a second
 constexpr double kLogRatioToClear = -8; // a verdict stands until the images agree again
 constexpr double kFitsInSpreads = 2;    // rms of the intervals by the hypothesis that is believed
-
-Eigen::Vector2d median(const std::vector<Eigen::Vector2d> &values)
-{
-  std::vector<double> x, y;
-  for (const Eigen::Vector2d &value : values) {
-    x.push_back(value.x());
-    y.push_back(value.y());
-  }
-  return {medianOf(std::move(x)), medianOf(std::move(y))};
-}
 } // namespace
 
 void GyroAgreement::reset()
@@ -79,7 +69,7 @@ double GyroAgreement::cost(int lag, double sign_x, double sign_y, bool is_odomet
     const Eigen::Vector2d expected = is_odometry ? *felt.odometry : felt.gyro;
     differences.emplace_back(seen.image - Eigen::Vector2d(sign_x * expected.x(), sign_y * expected.y()));
   }
-  const Eigen::Vector2d centre = median(differences);
+  const Eigen::Vector2d centre = medianByAxis(differences);
   std::vector<double> squares;
   for (const Eigen::Vector2d &difference : differences)
     squares.push_back((difference - centre).squaredNorm());
@@ -108,7 +98,7 @@ std::optional<GyroAgreement::Usual> GyroAgreement::usual() const
   if (m_agreed.size() < kAgreedLeast)
     return std::nullopt;
   Usual usual;
-  usual.centre = median({m_agreed.begin(), m_agreed.end()});
+  usual.centre = medianByAxis({m_agreed.begin(), m_agreed.end()});
   std::vector<double> squares;
   for (const Eigen::Vector2d &difference : m_agreed)
     squares.push_back((difference - usual.centre).squaredNorm());

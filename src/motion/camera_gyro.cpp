@@ -6,7 +6,6 @@
 #include "motion/relative_pose.h"
 
 #include <algorithm>
-#include <array>
 #include <fmt/format.h>
 
 namespace bole::calibration

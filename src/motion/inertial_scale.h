@@ -48,8 +48,8 @@ public:
   /// Takes in the next frame and what the points say of it. A frame without samples of the accelerometer begins anew.
   void process(const Frame &frame, const std::vector<RelativeMotion> &motions);
 
-  static constexpr double kMisfit_s = 2; ///< in which innovations that are too large show
-  /// Whether they did with the frame processed last: the accelerometer has another bias than before, or is broken.
+  /// Whether innovations were too large with the frame processed last: the accelerometer has another bias than before,
+  /// or is broken.
   bool hasBegunAnew() const { return m_has_begun_anew; }
 
   /// The scale, an odometry of scale 1 within \p prior_sigma (of the log) being expected: a measurement far outside of

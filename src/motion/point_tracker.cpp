@@ -179,15 +179,12 @@ void PointTracker::State::follow(const Eigen::Matrix3d &aRb)
     if (shifted.second > found)
       places = std::move(shifted.first);
   }
-  std::vector<double> x, y;
+  std::vector<Eigen::Vector2d> moved;
   for (std::size_t i = 0; i < tracks.size(); ++i)
-    if (places[i]) {
-      x.push_back(places[i]->x() - tracks[i].current().x());
-      y.push_back(places[i]->y() - tracks[i].current().y());
-    }
-  if (x.size() >= kLeastFound)
-    brightness_change = (is_brighter ? brightness_change : 0) +
-                        changeOfBrightness(pyramid, next, {medianOf(std::move(x)), medianOf(std::move(y))});
+    if (places[i])
+      moved.push_back(*places[i] - tracks[i].current());
+  if (moved.size() >= kLeastFound)
+    brightness_change = (is_brighter ? brightness_change : 0) + changeOfBrightness(pyramid, next, medianByAxis(moved));
   std::vector<PointTrack> kept;
   kept.reserve(kMostPoints);
   for (std::size_t i = 0; i < tracks.size(); ++i) {

@@ -6,8 +6,8 @@
 #include "pipeline/scene_points.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
+#include <iterator>
 
 namespace bole
 {
@@ -157,13 +157,12 @@ const Frame &Engine::asUsuallyExposed(const Frame &frame, const Motion &motion, 
   m_brightness = m_brightness * std::exp(-elapsed_s / kUsual_s) + m_motion->points().tracker().brightnessChange();
   if (m_brightness == 0)
     return frame;
-  std::array<unsigned char, 256> level;
-  for (std::size_t i = 0; i < level.size(); ++i)
+  unsigned char level[256];
+  for (std::size_t i = 0; i < std::size(level); ++i)
     level[i] = static_cast<unsigned char>(
         i >= kSaturated ? i : std::lround(std::min(255.0, std::exp(-m_brightness) * static_cast<double>(i))));
   scratch = frame;
-  for (unsigned i = 0; i < scratch.image.getSize(); ++i)
-    scratch.image.bitmap[i] = level[scratch.image.bitmap[i]];
+  scratch.image.performLut(level);
   return scratch;
 }
 

@@ -2,7 +2,6 @@
 // The scale of the map, and the results in metres.
 #include "pipeline/engine.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -32,8 +31,8 @@ ScaleEstimate Engine::estimateScale(bool with_radii) const
           scale.source};
 }
 
-/// Lets the metres follow the scale. The radii count only at the end: the detector
-/// looks for trunks of usual size, so at any scale it finds some that look it, and a scale that follows them runs away.
+/// Lets the metres follow the scale. The radii count only at the end: the detector looks for trunks of usual size, so
+/// at any scale it finds some that look it, and a scale that follows them runs away.
 void Engine::updateScale(double seconds_passed)
 {
   constexpr double kAtOnce = 0.1;  // of the log of the scale: as much changes decisions
