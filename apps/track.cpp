@@ -54,7 +54,9 @@ std::unique_ptr<FrameSource> openRecording(TrackArguments &arguments, const Opti
   const bool is_stream = LiveVideoSource::accepts(arguments.input); // cannot be looked through twice
   if (is_stream || !options.stages.calibration || !options.stages.points)
     return source;
-  calibration = calibrateSensors(*source, !arguments.is_without_gyro, !arguments.is_without_odometry);
+  const bool is_known = source->isCameraKnown(); // by a guess sensors cannot be measured
+  calibration =
+      calibrateSensors(*source, is_known && !arguments.is_without_gyro, is_known && !arguments.is_without_odometry);
   made.calibration = calibration.constants;
   arguments.source.calibration = calibration;
   return openSource(arguments.input, arguments.source);
