@@ -482,7 +482,8 @@ std::optional<DepthBorders> depthBordersWithin(int reach, double px, const Trunk
 }
 } // namespace
 
-std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest)
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest,
+                                         double thickest)
 {
   constexpr double kNear = 6, kFar = 8; // [px] outside of the borders
   constexpr std::size_t kLeastViews = 6;
@@ -499,6 +500,6 @@ std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<C
   const auto near = within(radius + kNear * px); // a far place costs as much, and is seldom asked
   if (!near || (near->likely[0] && near->likely[1]))
     return near;
-  return within(4 * radius + kFar * px);
+  return within(std::max(4 * radius, 2 * thickest) + kFar * px);
 }
 } // namespace bole

@@ -135,5 +135,7 @@ struct DepthBorders
   double px = 0;                                      ///< a pixel at the range of the trunk [m]
 };
 /// The ends of \p trunk by depth; none where its views are few or the trunk itself is not consistent in them.
-std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest);
+/// \p thickest: radius of the thickest trunk on whose bark it may be a strip [m].
+std::optional<DepthBorders> depthBorders(const Trunk &trunk, const std::vector<ColumnView> &views, double farthest,
+                                         double thickest = 0);
 } // namespace bole

@@ -167,7 +167,7 @@ std::optional<BorderProposal> proposeBorders(const Hypothesis &hypothesis, const
   // not
   constexpr double kInside_px = 2.5, kBeside_px = 1.5;
   const Trunk &trunk = hypothesis.trunk;
-  const std::optional<DepthBorders> borders = depthBorders(trunk, views, farthest);
+  const std::optional<DepthBorders> borders = depthBorders(trunk, views, farthest, radius_max);
   if (!borders)
     return std::nullopt;
   const std::array<double, 2> beyond = beyondBorders(trunk, *borders);
@@ -190,14 +190,14 @@ std::optional<BorderProposal> proposeBorders(const Hypothesis &hypothesis, const
   Hypothesis guess{hypothesis.id, withBordersMoved(trunk, move, leftwards), hypothesis.online,
                    hypothesis.points_beside};
   guess.covariance.topLeftCorner<3, 3>() = covarianceByBorders({variance, variance}, leftwards, radius);
-  return BorderProposal{guess, logOddsAgainst(trunk, *borders)};
+  return BorderProposal{guess, logOddsAgainst(trunk, *borders), radius_max};
 }
 
 bool isBetterSilhouette(const ScoredHypothesis &other, const ScoredHypothesis &hypothesis,
                         const BorderProposal &proposal, const std::vector<ColumnView> &views, double farthest)
 {
   constexpr double kSure = 0.1; // log-odds
-  const auto borders = depthBorders(other.trunk, views, farthest);
+  const auto borders = depthBorders(other.trunk, views, farthest, proposal.thickest);
   const double against = borders ? logOddsAgainst(other.trunk, *borders) : 0;
   return other.log_odds - against > hypothesis.log_odds - proposal.against + kSure;
 }

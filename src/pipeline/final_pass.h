@@ -94,6 +94,7 @@ struct BorderProposal
 {
   Hypothesis guess;   ///< the hypothesis between the ends that depth gives the trunk
   double against = 0; ///< log-odds of depth against the present borders
+  double thickest = 0; ///< radius that the proposal may have had [m]
 };
 /// Proposes other borders for \p hypothesis where depth contradicts its own; none where it does not, or where the
 /// proposal is wider than \p radius_max [m]. A hypothesis beside its trunk is moved with its width. \p outside_px:
