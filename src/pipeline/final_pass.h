@@ -92,8 +92,8 @@ bool isBackgroundInside(const PhotoConsistency &evidence);
 /// Borders that depth proposes in place of those of a hypothesis, which it contradicts.
 struct BorderProposal
 {
-  Hypothesis guess;   ///< the hypothesis between the ends that depth gives the trunk
-  double against = 0; ///< log-odds of depth against the present borders
+  Hypothesis guess;    ///< the hypothesis between the ends that depth gives the trunk
+  double against = 0;  ///< log-odds of depth against the present borders
   double thickest = 0; ///< radius that the proposal may have had [m]
 };
 /// Proposes other borders for \p hypothesis where depth contradicts its own; none where it does not, or where the

@@ -166,6 +166,18 @@ TEST(DepthBorders, AreThoseOfTheSilhouetteWhateverTheLight)
   EXPECT_NEAR(*narrow->likely[1], 0.27, 1.5 * narrow->px);
 }
 
+/// A line on the bark of a thick trunk, near its left border: the other border is ten times as far off as the line.
+TEST(DepthBorders, AreLookedForAsFarAsTheThickestTrunkGoes)
+{
+  const DrawnTrunk whole{3.7, 0.1, 0.3, 60}, strip{3.46, 0.3, 0.05, 0};
+  const LevelFlight flight(barkOf(whole, 0), sweep());
+  const auto near = depthBorders(trunkOf(strip), flight.views(), kFarthest);
+  EXPECT_FALSE(near && near->likely[1]);
+  const auto far = depthBorders(trunkOf(strip), flight.views(), kFarthest, 0.6);
+  ASSERT_TRUE(far && far->likely[0] && far->likely[1]);
+  EXPECT_NEAR(*far->likely[0] + *far->likely[1], 2 * whole.radius, 0.1);
+}
+
 TEST(PhotoConsistency, WithoutParallaxOrWhereNothingIsThereIsNone)
 {
   const DrawnTrunk trunk{3.5, 0.4, 0.15, 40};
