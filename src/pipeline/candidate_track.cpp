@@ -72,7 +72,8 @@ TrunkPrior priorOf(const Trunk &guess, const SmootherOptions &options)
 Trunk fitTrunk(const Trunk &guess, const std::vector<TrackedView> &views, const SmootherOptions &options,
                Matrix5d *information)
 {
-  constexpr int kIterations = 4; // from a detection's guess it has settled after two or three
+  constexpr int kIterations = 4;   // from a detection's guess it has settled after two or three
+  constexpr double kLogRadius = 1; // most that a step may change: beyond a factor of e no residual is linear
   const TrunkPrior prior = priorOf(guess, options);
   const double robust = options.summary_loss.width;
   std::vector<std::pair<SquareRootSummary, Pose>> usable;
@@ -90,7 +91,8 @@ Trunk fitTrunk(const Trunk &guess, const std::vector<TrackedView> &views, const 
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * r;
     }
-    trunk = trunk.plus(-H.ldlt().solve(g));
+    const Vector5d step = -H.ldlt().solve(g);
+    trunk = trunk.plus(step * std::min(1.0, kLogRadius / std::abs(step[2])));
     if (information)
       *information = H;
   }
