@@ -64,6 +64,7 @@ private:
   /// better than those in the smoother.
   struct RetrackedHypothesis
   {
+    int id = 0; ///< in the map
     std::optional<ScoredHypothesis> scored;
     std::optional<CandidateTrack> views;
     bool is_seen = false;
@@ -95,9 +96,9 @@ private:
   double farthestScored() const;
   std::vector<CandidateTrack> trackThroughKeyframes(const std::vector<Hypothesis> &hypotheses, const TrunkMap &map,
                                                     KeyframeGradients &gradients) const;
-  std::vector<RetrackedHypothesis> retrackLikely(const std::vector<ScoredHypothesis> &likely,
-                                                 const std::vector<ColumnView> &views,
-                                                 KeyframeGradients &gradients) const;
+  std::vector<RetrackedHypothesis> retrack(const std::vector<ScoredHypothesis> &likely,
+                                           const std::vector<ScoredHypothesis> &best,
+                                           const std::vector<ColumnView> &views, KeyframeGradients &gradients) const;
   void detectLeaning(const TrunkMap &likely, KeyframeGradients &gradients);
   void refineByConsistency();
   void indexViews();

@@ -13,8 +13,6 @@ namespace bole
 {
 namespace
 {
-constexpr double kLikely = -1.5; ///< log-odds above which a hypothesis is tracked again
-
 std::vector<int> idsOf(const std::vector<ScoredHypothesis> &scored, double least)
 {
   std::vector<int> ids;
@@ -42,7 +40,8 @@ Viewpoint Engine::viewpointOf(std::size_t pose, double time_s) const
 /// over its nearest views, nothing where too few show it.
 std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
 {
-  constexpr std::size_t kNearest = 16, kLeast = 4;     // views; of them those that tell
+  constexpr std::size_t kNearest = 16;                 // views
+  constexpr int kLeast = 4;                            // of them that tell
   std::vector<std::pair<double, std::size_t>> nearest; // range, number of the keyframe
   for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i)
     if (const Keyframe &frame = m_keyframes.frames()[i];
@@ -51,7 +50,7 @@ std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
   std::sort(nearest.begin(), nearest.end());
   nearest.resize(std::min(nearest.size(), kNearest));
   double sum = 0;
-  std::size_t count = 0;
+  int count = 0;
   for (const auto &[range, i] : nearest) {
     const Keyframe &frame = m_keyframes.frames()[i];
     const Viewpoint at = viewpointOf(frame.pose, frame.time_s);
@@ -64,7 +63,7 @@ std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
       ++count;
     }
   }
-  return count >= kLeast ? std::optional(sum / static_cast<double>(count)) : std::nullopt;
+  return count >= kLeast ? std::optional(sum / count) : std::nullopt;
 }
 
 /// Scores \p hypothesis, which was seen from \p first_s to \p last_s, against chance, and, where it is worth the work,
@@ -77,7 +76,7 @@ std::optional<ScoredHypothesis> Engine::score(const Hypothesis &hypothesis, doub
     return scored;
   scored->first_seen_s = first_s;
   scored->last_seen_s = last_s;
-  if (scored->log_odds > kLikely)
+  if (scored->log_odds > kMayBeTrunk)
     weighAgainstSurface(*scored, views, farthestScored(), continuity(*scored));
   return scored;
 }
@@ -145,20 +144,23 @@ std::vector<CandidateTrack> Engine::trackThroughKeyframes(const std::vector<Hypo
   return found;
 }
 
-/// Tracks the likely hypotheses again through all keyframes and scores each where that puts it. A trunk that is still
-/// in the smoother keeps its views there unless the new ones score better.
-std::vector<Engine::RetrackedHypothesis> Engine::retrackLikely(const std::vector<ScoredHypothesis> &likely,
-                                                               const std::vector<ColumnView> &views,
-                                                               KeyframeGradients &gradients) const
+/// Tracks \p likely hypotheses again through all keyframes, where the surest of the \p best may occlude them, and
+/// scores each where that puts it. A trunk that is still in the smoother keeps its views there unless the new ones
+/// score better.
+std::vector<Engine::RetrackedHypothesis> Engine::retrack(const std::vector<ScoredHypothesis> &likely,
+                                                         const std::vector<ScoredHypothesis> &best,
+                                                         const std::vector<ColumnView> &views,
+                                                         KeyframeGradients &gradients) const
 {
   constexpr double kBetter = 0.3; // log-odds by which new views must score better than those in the smoother
   constexpr double kHides = 1.5;  // log-odds above which a hypothesis may occlude what stands behind it
-  const TrunkMap map = m_map.withTrunks(idsOf(likely, kHides));
+  const TrunkMap map = m_map.withTrunks(idsOf(best, kHides));
   const auto read = [&](const std::vector<Hypothesis> &hypotheses) {
     std::vector<RetrackedHypothesis> results;
     std::vector<CandidateTrack> followed = trackThroughKeyframes(hypotheses, map, gradients);
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       RetrackedHypothesis result;
+      result.id = hypotheses[i].id;
       result.is_seen = !followed[i].views.empty();
       const NewTrunk &trunk = followed[i].trunk;
       if (followed[i].views.size() >= kLeastViews)
@@ -252,26 +254,31 @@ void Engine::runFinalPass()
   const std::vector<ScoredHypothesis> before = scoreAll(views);
   KeyframeGradients gradients(m_keyframes.frames(), m_units.gradient);
   detectLeaning(m_map.withTrunks(idsOf(before, kHides)), gradients);
-  const double apart = m_units.map.merge_distance;
   m_scored = scoreAll(views, before);
-  std::vector<RetrackedHypothesis> results =
-      retrackLikely(chooseSet(m_scored, kLikely, apart, views, farthestScored()), views, gradients);
-  std::vector<ScoredHypothesis> again;
-  for (const RetrackedHypothesis &result : results) // one of unknown place must not suppress another of its lines
-    if (result.scored && isPlaced(result.views ? result.views->trunk.covariance.topLeftCorner<2, 2>()
-                                               : m_map.trunk(result.scored->id).place_covariance))
-      again.push_back(*result.scored);
-  const std::vector<ScoredHypothesis> chosen =
-      chooseSet(again, m_units.map.confirm_odds, apart, views, farthestScored());
+  std::vector<RetrackedHypothesis> results;
+  const auto again = [&](const std::vector<ScoredHypothesis> &untried, const std::vector<ScoredHypothesis> &best) {
+    std::vector<std::optional<ScoredHypothesis>> scored;
+    for (RetrackedHypothesis &result : retrack(untried, best, views, gradients)) {
+      const bool is_placed = isPlaced(result.views ? result.views->trunk.covariance.topLeftCorner<2, 2>()
+                                                   : m_map.trunk(result.id).place_covariance);
+      scored.push_back(is_placed ? result.scored : std::nullopt);
+      results.push_back(std::move(result));
+    }
+    return scored;
+  };
+  const double apart = m_units.map.merge_distance;
+  const auto candidates = scoreBestAgain(m_scored, apart, views, farthestScored(), again);
   std::map<int, TrunkDecision> decisions;
-  for (const ScoredHypothesis &one : m_scored)
-    decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
-  for (const ScoredHypothesis &one : chosen)
-    decisions[one.id] = {one.id, one.log_odds, true, std::nullopt};
+  for (const auto &scored : {m_scored, candidates})
+    for (const ScoredHypothesis &one : scored)
+      decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
+  const double least = std::max(m_units.map.confirm_odds, kMayBeTrunk);
+  for (const ScoredHypothesis &one : chooseSet(candidates, least, apart, views, farthestScored()))
+    decisions[one.id].is_trunk = true;
   for (RetrackedHypothesis &result : results) {
-    if (!result.scored || !result.views || !decisions[result.scored->id].is_trunk)
-      continue;
-    decisions[result.scored->id].found = addToSmoother(*result.views);
+    TrunkDecision &decision = decisions[result.id];
+    if (decision.is_trunk && result.views)
+      decision.found = addToSmoother(*result.views);
   }
   std::vector<TrunkDecision> list;
   for (auto &[id, decision] : decisions)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace bole
 {
@@ -302,5 +303,28 @@ std::vector<ScoredHypothesis> chooseSet(std::vector<ScoredHypothesis> scored, do
         }))
       chosen.push_back(one);
   return chosen;
+}
+
+std::vector<ScoredHypothesis> scoreBestAgain(std::vector<ScoredHypothesis> scored, double apart,
+                                             const std::vector<ColumnView> &views, double farthest,
+                                             const ScoreAgain &again)
+{
+  std::set<int> tried;
+  while (true) {
+    const std::vector<ScoredHypothesis> best = chooseSet(scored, kMayBeTrunk, apart, views, farthest);
+    std::vector<ScoredHypothesis> untried;
+    std::copy_if(best.begin(), best.end(), std::back_inserter(untried),
+                 [&](const ScoredHypothesis &one) { return tried.count(one.id) == 0; });
+    if (untried.empty())
+      return scored;
+    const std::vector<std::optional<ScoredHypothesis>> results = again(untried, best);
+    for (std::size_t i = 0; i < untried.size(); ++i) {
+      const int id = untried[i].id;
+      tried.insert(id);
+      scored.erase(std::find_if(scored.begin(), scored.end(), [&](const auto &one) { return one.id == id; }));
+      if (results[i])
+        scored.push_back(*results[i]);
+    }
+  }
 }
 } // namespace bole

@@ -13,6 +13,7 @@
 #include <bole/pipeline.h>
 
 #include <deque>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -54,6 +55,9 @@ private:
   std::vector<std::shared_ptr<const Gradient>> m_made;
   std::size_t m_bytes = 0;
 };
+
+/// Log-odds above which a hypothesis is weighed against a surface and tracked again.
+inline constexpr double kMayBeTrunk = -1.5;
 
 /// A hypothesis with its photo-consistency over all views and the log-odds that follow from it.
 struct ScoredHypothesis
@@ -130,4 +134,14 @@ Trunk fuseTextureRange(const Trunk &trunk, const std::vector<ColumnView> &views,
 /// most of their views.
 std::vector<ScoredHypothesis> chooseSet(std::vector<ScoredHypothesis> scored, double least, double apart,
                                         const std::vector<ColumnView> &views, double farthest);
+
+/// Scores hypotheses again by a closer look at them; none for one that does not bear it.
+/// \p best: the set that they are of.
+using ScoreAgain = std::function<std::vector<std::optional<ScoredHypothesis>>(
+    const std::vector<ScoredHypothesis> &untried, const std::vector<ScoredHypothesis> &best)>;
+/// Scores the best set of \p scored \p again, and what takes the place of those that do not bear it, until all of the
+/// best set were scored again. Best is what chooseSet() chooses of those that may be trunks.
+std::vector<ScoredHypothesis> scoreBestAgain(std::vector<ScoredHypothesis> scored, double apart,
+                                             const std::vector<ColumnView> &views, double farthest,
+                                             const ScoreAgain &again);
 } // namespace bole

@@ -69,6 +69,27 @@ TEST(FinalPass, TwoReadingsOfTheSameColumnsAtTwoRangesAreOne)
               testing::ElementsAre(1, 2));
 }
 
+/// The likeliest in a place is none when it is looked at closely; the next best one there is.
+TEST(FinalPass, WhatDoesNotBearACloserLookMakesRoomForItsRivals)
+{
+  const Path path;
+  const std::vector<ScoredHypothesis> scored = {
+      judgedAt(1, trunkAt(4, 0, 0.15), 2), judgedAt(2, trunkAt(4.2, 0.1, 0.12), 1),
+      judgedAt(3, trunkAt(4.1, 0, 0.2), 0), judgedAt(4, trunkAt(4, 2, 0.15), 1),
+      judgedAt(5, trunkAt(5, -2, 0.15), kMayBeTrunk - 1)};
+  std::vector<std::vector<int>> looked_at;
+  const auto again = scoreBestAgain(scored, 0.3, path.views, 14, [&](const auto &untried, const auto &) {
+    looked_at.push_back(idsOf(untried));
+    std::vector<std::optional<ScoredHypothesis>> results;
+    for (const ScoredHypothesis &one : untried)
+      results.push_back(one.id == 1 ? std::nullopt : std::optional(judgedAt(one.id, one.trunk, one.log_odds + 0.5)));
+    return results;
+  });
+  EXPECT_THAT(looked_at, testing::ElementsAre(testing::ElementsAre(1, 4), testing::ElementsAre(2)));
+  EXPECT_THAT(idsOf(again), testing::UnorderedElementsAre(2, 3, 4, 5));
+  EXPECT_THAT(idsOf(chooseSet(again, 0, 0.3, path.views, 14)), testing::UnorderedElementsAre(2, 4));
+}
+
 TEST(FinalPass, AStripOfAFacadeIsNoTrunkHoweverClearItsBordersAre)
 {
   const test::DrawnTrunk one{4, 0.4, 0.15, 40};
