@@ -123,3 +123,21 @@ TEST(DetectionWindow, KeepsViewsFromPlacesApartAndAlwaysTheNewest)
     EXPECT_GE(window.views()[i].pose - window.views()[i - 1].pose, 2u);
 }
 } // namespace
+
+/// A guess as thin as a twig where views show a thick trunk: one full step would make it wider than the wood.
+TEST(FitTrunk, ChangesNoRadiusBeyondAllReason)
+{
+  SmootherOptions options;
+  options.bMc = kMount;
+  const Trunk thick{{4, 0}, std::log(2.0)}, guess{{4, 0}, std::log(0.02)};
+  std::vector<TrackedView> views;
+  for (int k = 0; k < kFrames; ++k) {
+    const Pose wMb(Eigen::Matrix3d::Identity(), {0, 0.08 * k, 1.2});
+    views.push_back({static_cast<std::size_t>(k),
+                     wMb,
+                     {relativeTrunk(wMb, kMount, thick), 0, Vector4d::Zero(), 1e4 * Matrix4d::Identity()}});
+  }
+  const Trunk fitted = fitTrunk(guess, views, options);
+  EXPECT_LT(fitted.radius(), 4);
+  EXPECT_GT(fitted.radius(), guess.radius());
+}
