@@ -40,8 +40,7 @@ Viewpoint Engine::viewpointOf(std::size_t pose, double time_s) const
 /// over its nearest views, nothing where too few show it.
 std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
 {
-  constexpr std::size_t kNearest = 16;                 // views
-  constexpr int kLeast = 4;                            // of them that tell
+  constexpr std::size_t kNearest = 16, kLeast = 4;     // views; of them those that tell
   std::vector<std::pair<double, std::size_t>> nearest; // range, number of the keyframe
   for (std::size_t i = 0; i < m_keyframes.frames().size(); ++i)
     if (const Keyframe &frame = m_keyframes.frames()[i];
@@ -50,7 +49,7 @@ std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
   std::sort(nearest.begin(), nearest.end());
   nearest.resize(std::min(nearest.size(), kNearest));
   double sum = 0;
-  int count = 0;
+  std::size_t count = 0;
   for (const auto &[range, i] : nearest) {
     const Keyframe &frame = m_keyframes.frames()[i];
     const Viewpoint at = viewpointOf(frame.pose, frame.time_s);
@@ -63,7 +62,7 @@ std::optional<double> Engine::continuity(const ScoredHypothesis &one) const
       ++count;
     }
   }
-  return count >= kLeast ? std::optional(sum / count) : std::nullopt;
+  return count >= kLeast ? std::optional(sum / static_cast<double>(count)) : std::nullopt;
 }
 
 /// Scores \p hypothesis, which was seen from \p first_s to \p last_s, against chance, and, where it is worth the work,
@@ -261,6 +260,7 @@ void Engine::runFinalPass()
     for (RetrackedHypothesis &result : retrack(untried, best, views, gradients)) {
       const bool is_placed = isPlaced(result.views ? result.views->trunk.covariance.topLeftCorner<2, 2>()
                                                    : m_map.trunk(result.id).place_covariance);
+      // one of unknown place must not suppress another of its lines
       scored.push_back(is_placed ? result.scored : std::nullopt);
       results.push_back(std::move(result));
     }
@@ -269,9 +269,10 @@ void Engine::runFinalPass()
   const double apart = m_units.map.merge_distance;
   const auto candidates = scoreBestAgain(m_scored, apart, views, farthestScored(), again);
   std::map<int, TrunkDecision> decisions;
-  for (const auto &scored : {m_scored, candidates})
-    for (const ScoredHypothesis &one : scored)
-      decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
+  for (const ScoredHypothesis &one : m_scored)
+    decisions[one.id] = {one.id, one.log_odds, false, std::nullopt};
+  for (const ScoredHypothesis &one : candidates)
+    decisions[one.id].log_odds = one.log_odds;
   const double least = std::max(m_units.map.confirm_odds, kMayBeTrunk);
   for (const ScoredHypothesis &one : chooseSet(candidates, least, apart, views, farthestScored()))
     decisions[one.id].is_trunk = true;

@@ -321,9 +321,11 @@ std::vector<ScoredHypothesis> scoreBestAgain(std::vector<ScoredHypothesis> score
     for (std::size_t i = 0; i < untried.size(); ++i) {
       const int id = untried[i].id;
       tried.insert(id);
-      scored.erase(std::find_if(scored.begin(), scored.end(), [&](const auto &one) { return one.id == id; }));
+      const auto known = std::find_if(scored.begin(), scored.end(), [&](const auto &one) { return one.id == id; });
       if (results[i])
-        scored.push_back(*results[i]);
+        *known = *results[i];
+      else
+        scored.erase(known);
     }
   }
 }
