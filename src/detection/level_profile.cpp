@@ -78,7 +78,7 @@ std::optional<double> meanAlong(const vpImage<float> &image, const PinholeCamera
   const Vector3d low = at(range.low), high = at(range.high);
   const BorderLine line = clippedLine(camera, low.cross(high).normalized(), low, high, 1);
   const double rows_full = std::min(camera.fy * (range.high - range.low) * horizontal, double(camera.height));
-  if (line.rows() < kLeastRows * rows_full)
+  if (line.rows() * std::hypot(1, line.slope) < kLeastRows * rows_full)
     return std::nullopt;
   return meanAlongOnly(image, line);
 }
