@@ -47,7 +47,7 @@ BorderLine clippedLine(const PinholeCamera &camera, const Vector3d &cn, const Ve
   BorderLine line;
   Vector3d foot = low, top = high;
   const double slope = -camera.fx * cn.y() / (camera.fy * cn.x());
-  if (!clipToFront(foot, top) || !(std::abs(slope) < 3))
+  if (!clipToFront(foot, top) || !(std::abs(slope) < kMostSlope))
     return line;
 
   double v0 = camera.project(top).y(), v1 = camera.project(foot).y();

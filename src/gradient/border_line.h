@@ -34,9 +34,13 @@ struct ElevationRange
   double high = 0.45; ///< below the crowns
 };
 
+/// Columns per row of the most inclined line that is sampled row by row, 72 degrees: a sample then reaches over three
+/// columns, and a drone banks less while it flies.
+constexpr double kMostSlope = 3;
+
 /// Rows and line of the plane through the camera centre with normal \p cn between the two directions
 /// \p low and \p high of that plane (camera frame), clipped to the image less \p margin_px columns.
-/// No rows when the line is not steep (more than 45 degrees from the image's vertical) or not in the image.
+/// No rows when the line is not in the image or leans more than kMostSlope from the image's vertical.
 BorderLine clippedLine(const PinholeCamera &camera, const Eigen::Vector3d &cn, const Eigen::Vector3d &low,
                        const Eigen::Vector3d &high, double margin_px = 4);
 

@@ -299,7 +299,7 @@ std::optional<InertialStep> InertialScale::stepTo(const Frame &frame, std::int64
 
 std::optional<LogScale> InertialScale::scale(double prior_sigma) const
 {
-  if (m_compared == 0 || 2 * m_directions < m_compared || !m_force_varies)
+  if (m_compared == 0 || 4 * m_directions < m_compared || !m_force_varies)
     return std::nullopt;
   const double variance = m_covariance(kScale, kScale), prior2 = prior_sigma * prior_sigma;
   LogScale result;
