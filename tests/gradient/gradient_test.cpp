@@ -110,7 +110,14 @@ TEST(BorderLine, HasNoRowsWhereThereIsNothingToSee)
 {
   EXPECT_EQ(borderLine(kCamera, seen(0, -4, 0.4), Border::left, {}).rows(), 0); // behind the camera
   EXPECT_EQ(borderLine(kCamera, seen(0, 2, 4), Border::left, {}).rows(), 0);    // beside the image
-  EXPECT_EQ(borderLine(kCamera, seen(1.0), Border::left, {}).rows(), 0);        // not steep
+  EXPECT_EQ(borderLine(kCamera, seen(1.3), Border::left, {}).rows(), 0);        // nearly level
+}
+
+TEST(BorderLine, HasRowsInABankOf57Degrees)
+{
+  const BorderLine line = borderLine(kCamera, seen(1.0), Border::left, {});
+  EXPECT_GT(line.rows(), 30);
+  EXPECT_NEAR(std::abs(line.slope), std::tan(1.0), 0.2);
 }
 
 TEST(BorderLine, MovesItsEndsByWhatItIsTold)

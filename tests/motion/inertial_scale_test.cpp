@@ -72,6 +72,21 @@ TEST(InertialScale, IsUnknownWherePointsTellNoDirection)
   EXPECT_FALSE(inertial.scale(0.03));
 }
 
+TEST(InertialScale, IsKnownWherePointsTellTheDirectionInOneWindowOfThree)
+{
+  MadeFlight made;
+  made.factor = 0.97;
+  made.odometry_noise = 0.012;
+  made.force_noise = 0.1;
+  InertialScale inertial(forwardCamera());
+  for (std::size_t i = 0; i < 200; ++i)
+    inertial.process(made.frame(i), i / 10 % 3 == 0 ? made.seen(i) : std::vector<RelativeMotion>());
+  const auto scale = inertial.scale(kWide);
+  ASSERT_TRUE(scale);
+  EXPECT_LT(std::abs(scale->mean - std::log(made.factor)), 3 * scale->sigma);
+  EXPECT_LT(scale->sigma, 0.03);
+}
+
 TEST(InertialScale, ARotationThatPointsTookForATranslationIsUndoneByTheGyro)
 {
   MadeFlight made;
