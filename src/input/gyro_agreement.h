@@ -14,12 +14,11 @@ namespace bole
 /// Compares the shift of whole images with the rotation of the camera over about a second.
 ///
 /// Idea: between two frames the distant part of a scene moves by the rotation alone, by f w, whatever the camera's
-/// translation; the translation of a flight adds a shift that changes slowly and is taken out as the median. The
-/// sum of squared differences is formed for the images as they are, for images that are late or early by up to six
-/// frames, mirrored, and upside down. Another hypothesis is believed when its sum is several times smaller and the
-/// camera rotated enough to tell. Where the flight has shown how well its images agree with its gyro, the last four
-/// intervals may suffice: each hypothesis has a likelihood, and no interval counts for more than a wrong match of the
-/// images would.
+/// translation; the translation of a flight adds a shift that changes slowly and is taken out as the median. What is
+/// left has a likelihood for the images as they are, for images that are late or early by up to six frames, mirrored,
+/// and upside down; no interval counts for more than a wrong match of the images would. Another hypothesis is believed
+/// when it is far likelier and the camera rotated enough to tell. Its scale is how well the flight has shown that its
+/// images agree with its gyro: then the last four intervals may suffice. Before that it takes eight.
 class GyroAgreement
 {
 public:
@@ -57,27 +56,25 @@ private:
     int lag = 0;
     double x = 1, y = 1; ///< signs of the shift
   };
-  /// Median of the differences that the flight has shown, and of their squared distances from it [rad^2].
+  /// Median of the differences, and of their squared distances from it [rad^2].
   struct Usual
   {
     Eigen::Vector2d centre = Eigen::Vector2d::Zero();
     double variance = 0;
+    bool is_of_flight = false; ///< it was shown by the flight
   };
   static const std::vector<Hypothesis> &hypotheses();
+  static Usual usualOf(const std::vector<Eigen::Vector2d> &differences);
   std::optional<Usual> usual() const;
-  double clippedSum(const Hypothesis &hypothesis, const Usual &usual, int count, bool is_odometry) const;
-  Verdict judgeSuffix();
-  double cost(int lag, double sign_x, double sign_y, bool is_odometry) const;
+  std::vector<Eigen::Vector2d> differences(const Hypothesis &hypothesis, int count, bool is_odometry) const;
+  double misfit(const Hypothesis &hypothesis, const Usual &usual, int count, bool is_odometry) const;
   double variance() const;
   bool hasJumped() const;
-  Verdict judgeWindow();
+  Verdict judge();
 
   std::deque<Interval> m_intervals;
   std::deque<Eigen::Vector2d> m_agreed; ///< differences of intervals that agreed [rad]
   int m_lag = 0;
-  bool m_is_late = false;
-  Verdict m_suspected = Verdict::agrees, m_held = Verdict::agrees;
-  int m_suspected_lag = 0;
-  int m_same = 0;
+  Verdict m_held = Verdict::agrees;
 };
 } // namespace bole
