@@ -26,40 +26,52 @@ std::optional<GravityInnovation> compareGravity(const Trajectory &poses, const s
   struct Velocity
   {
     std::int64_t at_ns;
+    double duration; // [s]
     Eigen::Vector3d mean;
   };
   const auto velocity = [](const StampedPose &a, const StampedPose &b) {
-    return Velocity{(a.stamp_ns + b.stamp_ns) / 2, (b.wMb.t - a.wMb.t) / secondsOf(b.stamp_ns - a.stamp_ns)};
+    const double duration = secondsOf(b.stamp_ns - a.stamp_ns);
+    return Velocity{(a.stamp_ns + b.stamp_ns) / 2, duration, (b.wMb.t - a.wMb.t) / duration};
   };
   const Velocity begin = velocity(poses.front(), at(poses.front().stamp_ns + kVelocity_ns)),
                  end = velocity(at(poses.back().stamp_ns - kVelocity_ns), poses.back());
+  const std::int64_t begin_ns = poses.front().stamp_ns, end_ns = poses.back().stamp_ns;
   GravityInnovation result;
-  std::int64_t before_ns = begin.at_ns;
+  std::int64_t before_ns = begin_ns;
   const Eigen::Vector3d *first_force = nullptr;
   bool varies = false;
   int count = 0;
-  auto pose = poses.begin();
+  double weights = 0;
+  std::size_t next = 0;                           // pose after the sample
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero(); // to it from the one before
   for (const GyroSample &sample : samples) {
-    if (sample.stamp_ns <= begin.at_ns || sample.stamp_ns > end.at_ns)
+    if (sample.stamp_ns <= begin_ns || sample.stamp_ns > end_ns)
       continue;
     if (!sample.force || secondsOf(sample.stamp_ns - before_ns) > kMostGap_s)
       return std::nullopt;
     before_ns = sample.stamp_ns;
-    while (pose + 1 != poses.end() && (pose->stamp_ns + (pose + 1)->stamp_ns) / 2 < sample.stamp_ns)
-      ++pose; // the one nearest in time
+    for (; poses[next].stamp_ns < sample.stamp_ns; ++next)
+      turn = logSo3(orthonormalized(poses[next].wMb.R.transpose() * poses[next + 1].wMb.R));
+    const StampedPose &a = poses[next - 1], &b = poses[next];
+    const double along = double(sample.stamp_ns - a.stamp_ns) / double(b.stamp_ns - a.stamp_ns);
+    const Eigen::Matrix3d R = a.wMb.R * expSo3(along * turn);
+    // The difference of two mean velocities is that of the accelerations between, those within either mean in part.
+    const double weight = std::min({secondsOf(sample.stamp_ns - begin_ns) / begin.duration,
+                                    secondsOf(end_ns - sample.stamp_ns) / end.duration, 1.0});
     first_force = first_force == nullptr ? &*sample.force : first_force;
     varies = varies || *first_force != *sample.force;
-    result.off += pose->wMb.R * *sample.force;
-    result.by_rotation += pose->wMb.R * skew(*sample.force);
-    result.by_bias -= pose->wMb.R;
+    result.off += weight * R * *sample.force;
+    result.by_rotation += weight * R * skew(*sample.force);
+    result.by_bias -= weight * R;
+    weights += weight;
     ++count;
   }
-  if (count < kLeast || !varies || secondsOf(end.at_ns - before_ns) > kMostGap_s)
+  if (count < kLeast || !varies || secondsOf(end_ns - before_ns) > kMostGap_s)
     return std::nullopt;
   const double dt = secondsOf(end.at_ns - begin.at_ns);
-  result.off = (result.off / count - (end.mean - begin.mean) / dt - kGravity * Eigen::Vector3d::UnitZ()).eval();
-  result.by_rotation /= count;
-  result.by_bias /= count;
+  result.off = (result.off / weights - (end.mean - begin.mean) / dt - kGravity * Eigen::Vector3d::UnitZ()).eval();
+  result.by_rotation /= weights;
+  result.by_bias /= weights;
   result.sigma = kVelocitySigma / dt;
   return result;
 }
