@@ -42,12 +42,12 @@ bool clipToFront(Vector3d &low, Vector3d &high)
 } // namespace
 
 BorderLine clippedLine(const PinholeCamera &camera, const Vector3d &cn, const Vector3d &low, const Vector3d &high,
-                       double margin_px)
+                       double margin_px, double most_slope)
 {
   BorderLine line;
   Vector3d foot = low, top = high;
   const double slope = -camera.fx * cn.y() / (camera.fy * cn.x());
-  if (!clipToFront(foot, top) || !(std::abs(slope) < kMostSlope))
+  if (!clipToFront(foot, top) || !(std::abs(slope) < most_slope))
     return line;
 
   double v0 = camera.project(top).y(), v1 = camera.project(foot).y();

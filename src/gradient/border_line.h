@@ -40,9 +40,9 @@ constexpr double kMostSlope = 3;
 
 /// Rows and line of the plane through the camera centre with normal \p cn between the two directions
 /// \p low and \p high of that plane (camera frame), clipped to the image less \p margin_px columns.
-/// No rows when the line is not in the image or leans more than kMostSlope from the image's vertical.
+/// No rows when the line is not in the image or has more than \p most_slope columns per row.
 BorderLine clippedLine(const PinholeCamera &camera, const Eigen::Vector3d &cn, const Eigen::Vector3d &low,
-                       const Eigen::Vector3d &high, double margin_px = 4);
+                       const Eigen::Vector3d &high, double margin_px = 4, double most_slope = kMostSlope);
 
 /// The line of one border of a relative trunk.
 BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,

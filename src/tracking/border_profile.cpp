@@ -67,7 +67,7 @@ ImageBorder imageBorder(const PinholeCamera &camera, const Vector3d &cn, const V
                         double margin_px)
 {
   ImageBorder border;
-  border.line = clippedLine(camera, cn, foot, top, margin_px);
+  border.line = clippedLine(camera, cn, foot, top, margin_px, 1);
   if (border.isVisible())
     return border;
   PinholeCamera turned = camera; // the image with its axes exchanged
@@ -75,7 +75,7 @@ ImageBorder imageBorder(const PinholeCamera &camera, const Vector3d &cn, const V
   std::swap(turned.cx, turned.cy);
   std::swap(turned.width, turned.height);
   const auto exchanged = [](const Vector3d &v) { return Vector3d(v.y(), v.x(), v.z()); };
-  border.line = clippedLine(turned, exchanged(cn), exchanged(foot), exchanged(top), margin_px);
+  border.line = clippedLine(turned, exchanged(cn), exchanged(foot), exchanged(top), margin_px, 1);
   border.is_flat = true;
   return border;
 }
