@@ -2,6 +2,7 @@
 #include "motion/sensor_monitor.h"
 
 #include "geometry/constants.h"
+#include "geometry/median.h"
 #include "motion/accelerometer.h"
 #include "motion/calibration_fit.h"
 #include "motion/camera_gyro.h"
@@ -271,6 +272,32 @@ void SensorMonitor::checkStamps()
           Lasts::until_agree);
 }
 
+/// Checks for a gyro that lost samples in most of the last second: their spacing is then no longer the usual one. How
+/// much of the rotation that leaves open is part of its covariance (see integrateGyro()), so that it stays in use.
+void SensorMonitor::checkLostSamples(std::int64_t now_ns)
+{
+  constexpr std::size_t kLeast = 12; // spacings
+  constexpr double kUsual = 2;       // times the median
+  constexpr double kMost_s = 0.33;   // of the last second in longer ones; .6 where samples are lost at random
+  std::vector<double> spacings_s;
+  double lost_s = 0, longest_s = 0;
+  for (std::size_t i = 1; i < m_samples.size(); ++i)
+    spacings_s.push_back(secondsOf(m_samples[i].stamp_ns - m_samples[i - 1].stamp_ns));
+  if (m_lost_samples || spacings_s.size() < kLeast)
+    return;
+  const double usual_s = medianOf(spacings_s);
+  for (std::size_t i = 0; i < spacings_s.size(); ++i)
+    if (now_ns - m_samples[i + 1].stamp_ns < nanoseconds(1) && spacings_s[i] > kUsual * usual_s &&
+        spacings_s[i] < kSilence_s) {
+      lost_s += spacings_s[i];
+      longest_s = std::max(longest_s, spacings_s[i]);
+    }
+  m_lost_samples = lost_s > kMost_s;
+  if (m_lost_samples)
+    raise(Sensor::gyro, "holes", secondsOf(now_ns) - 1,
+          fmt::format("gyro: samples are lost, for up to {:.0f} ms", 1e3 * longest_s), Lasts::no);
+}
+
 /// Checks for a gyro that repeats its value or has no more samples.
 void SensorMonitor::checkGyroSamples(const Frame &frame)
 {
@@ -286,6 +313,7 @@ void SensorMonitor::checkGyroSamples(const Frame &frame)
   }
   if (!m_had_gyro)
     return;
+  checkLostSamples(frame.stamp_ns);
   if (secondsOf(frame.stamp_ns - m_last_gyro_ns) > kSilence_s)
     raise(Sensor::gyro, "ended", secondsOf(m_last_gyro_ns),
           fmt::format("gyro: nothing since {:.1f} s", secondsOf(m_last_gyro_ns)), Lasts::until_agree);

@@ -7,9 +7,9 @@
 /// squared difference over its variance; the sensor that stands in both failing pairs is the one that lies. Further
 /// tests need one sensor or two: an odometry that stands still, jumps, scatters, ends, begins far from the ground,
 /// leans against gravity or flies askew to the points' direction; an accelerometer whose gravity is not the odometry's;
-/// a gyro that repeats its value or ends. A pair fails when four of the last six comparisons exceed a limit, so that
-/// one false match raises no alarm. Stamps of the images that are off by an error of their own show otherwise: see
-/// checkStamps().
+/// a gyro that repeats its value, loses samples or ends. A pair fails when four of the last six comparisons exceed a
+/// limit, so that one false match raises no alarm. Stamps of the images that are off by an error of their own show
+/// otherwise: see checkStamps().
 ///
 /// Where the points contradict the gyro, the odometry, too coarse to fail against either, still says which of the two
 /// is more likely: its two squared differences are summed over the window.
@@ -116,6 +116,7 @@ private:
   void collect(const Frame &frame);
   void compare(const Frame &frame, const RelativeMotion &motion);
   void checkGyroSamples(const Frame &frame);
+  void checkLostSamples(std::int64_t now_ns);
   void checkSteps(const Frame &frame, const std::vector<RelativeMotion> &motions);
   void checkHeight(double height, double time_s);
   void raiseJump(double extent, double time_s);
@@ -153,7 +154,7 @@ private:
   Eigen::Vector3d m_turning = Eigen::Vector3d::Zero(); ///< the body, by what was trusted last [rad/s]
   std::optional<std::int64_t> m_gyro_changed_ns;       ///< when the gyro's value was last another one
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;
-  bool m_had_gyro = false, m_had_odometry = false;
+  bool m_had_gyro = false, m_had_odometry = false, m_lost_samples = false;
   std::vector<SensorVerdict> m_verdicts;
   State m_states[4];
 };

@@ -159,6 +159,32 @@ TEST(SensorMonitor, TwoSecondsWithoutAPictureRaiseNothing)
   EXPECT_TRUE(monitor.verdicts().empty()) << monitor.verdicts().front().text;
 }
 
+TEST(SensorMonitor, AGyroThatLosesSamplesIsNamedAndStaysInUse)
+{
+  const auto keep = [](const std::function<bool(std::size_t)> &isKept) {
+    return [isKept, count = std::size_t(0)](Frame &f) mutable {
+      std::vector<GyroSample> kept;
+      for (const GyroSample &sample : f.gyro)
+        if (isKept(count++))
+          kept.push_back(sample);
+      f.gyro.swap(kept);
+    };
+  };
+  std::mt19937 random(7);
+  std::bernoulli_distribution tenth(0.1);
+  const SensorMonitor holes = fly(keep([&](std::size_t i) { return i < 500 || tenth(random); }));
+  ASSERT_FALSE(holes.verdicts().empty());
+  const SensorVerdict &verdict = holes.verdicts().front();
+  EXPECT_EQ(verdict.sensor + " " + verdict.kind, "gyro holes") << verdict.text;
+  EXPECT_TRUE(holes.trusts(Sensor::gyro) && holes.trusts(Sensor::odometry));
+  for (const std::size_t every : {2, 5}) { // a slower one
+    const SensorMonitor slow = fly(keep([every](std::size_t i) { return i % every == 1; }));
+    EXPECT_TRUE(slow.verdicts().empty()) << every << ": " << slow.verdicts().front().text;
+  }
+  const SensorMonitor some = fly(keep([](std::size_t i) { return i % 10 != 0; })); // a sample now and then
+  EXPECT_TRUE(some.verdicts().empty()) << some.verdicts().front().text;
+}
+
 TEST(SensorMonitor, AnAccelerometerThatFeelsNoGravityIsNotTheOdometrysFault)
 {
   const SensorMonitor monitor = fly([](Frame &f) {
