@@ -19,7 +19,7 @@ constexpr double kLargestSpread_rad = 6e-3; // beyond, the flight has not shown 
 constexpr double kLeastSpread_rad = 1.5e-3; // they never agree better for long
 constexpr double kFollowsInSpreads = 3;     // clean flights stay below 3.5 from frame to frame
 constexpr std::size_t kAgreedMost =
-    11; // intervals that tell what is usual: five of a fault that is not told yet do not
+    12; // intervals that tell what is usual: five of a fault that is not told yet do not
 constexpr std::size_t kAgreedLeast = 6;
 constexpr int kShortest = 4, kUntold = 8; // intervals that may tell another hypothesis, and where nothing is usual
 constexpr double kClip = 6;               // spreads: an interval farther off is a wrong match of the images
@@ -107,17 +107,18 @@ bool GyroAgreement::hasJumped() const
   return off > kJump_rad && off > kJumpInSpreads * spread;
 }
 
-/// Differences over the last \p count intervals by \p hypothesis; none where one of them is not known.
-std::vector<Eigen::Vector2d> GyroAgreement::differences(const Hypothesis &hypothesis, int count, bool is_odometry) const
+/// Differences by \p hypothesis over \p count intervals of the images that end \p back before the last; none where one
+/// of them is not known.
+std::vector<Eigen::Vector2d> GyroAgreement::differences(const Hypothesis &hypothesis, int count, int back,
+                                                        bool is_odometry) const
 {
   const auto size = static_cast<int>(m_intervals.size());
-  const int back_image = std::max(0, -hypothesis.lag), back_gyro = std::max(0, hypothesis.lag);
   std::vector<Eigen::Vector2d> out;
-  for (int k = size - count; k < size; ++k) {
-    if (k - std::max(back_image, back_gyro) < 0)
+  for (int k = size - back - count; k < size - back; ++k) {
+    if (k < 0 || k - hypothesis.lag < 0)
       return {};
-    const Interval &seen = m_intervals[static_cast<std::size_t>(k - back_image)];
-    const Interval &felt = m_intervals[static_cast<std::size_t>(k - back_gyro)];
+    const Interval &seen = m_intervals[static_cast<std::size_t>(k)];
+    const Interval &felt = m_intervals[static_cast<std::size_t>(k - hypothesis.lag)];
     if ((is_odometry && !felt.odometry) || !seen.is_seen)
       return {};
     const Eigen::Vector2d turned = is_odometry ? *felt.odometry : felt.gyro;
@@ -126,16 +127,17 @@ std::vector<Eigen::Vector2d> GyroAgreement::differences(const Hypothesis &hypoth
   return out;
 }
 
-/// Squared differences of the last \p count intervals by \p hypothesis over the variance that is \p usual, each
-/// clipped; negative where one is not known. What the translation adds is the centre of the flight, else their median.
-double GyroAgreement::misfit(const Hypothesis &hypothesis, const Usual &usual, int count, bool is_odometry) const
+/// Their squares over the variance that is \p usual, each clipped; negative where one is not known. What the
+/// translation adds is the centre of the flight, else their median.
+double GyroAgreement::misfit(const Hypothesis &hypothesis, const Usual &usual, int count, int back,
+                             bool is_odometry) const
 {
-  const std::vector<Eigen::Vector2d> off = differences(hypothesis, count, is_odometry);
-  const Eigen::Vector2d centre(hypothesis.x * usual.centre.x(), hypothesis.y * usual.centre.y());
-  const Eigen::Vector2d middle = usual.is_of_flight ? centre : medianByAxis(off);
+  const std::vector<Eigen::Vector2d> off = differences(hypothesis, count, back, is_odometry);
+  const Eigen::Vector2d of_flight(hypothesis.x * usual.centre.x(), hypothesis.y * usual.centre.y());
+  const Eigen::Vector2d centre = usual.is_of_flight ? of_flight : medianByAxis(off);
   double sum = off.empty() ? -1 : 0;
   for (const Eigen::Vector2d &difference : off)
-    sum += std::min((difference - middle).squaredNorm() / usual.variance, kClip * kClip);
+    sum += std::min((difference - centre).squaredNorm() / usual.variance, kClip * kClip);
   return sum;
 }
 
@@ -151,7 +153,7 @@ GyroAgreement::Verdict GyroAgreement::judge()
   const int least = scale || is_held ? kShortest : kUntold;
   if (!scale)
     for (const Hypothesis &hypothesis : hypotheses())
-      if (const auto off = differences(hypothesis, kUntold, false); !off.empty())
+      if (const auto off = differences(hypothesis, kUntold, std::max(0, -hypothesis.lag), false); !off.empty())
         if (const Usual fitted = usualOf(off); !scale || fitted.variance < scale->variance)
           scale = fitted;
   if (!scale)
@@ -162,12 +164,14 @@ GyroAgreement::Verdict GyroAgreement::judge()
     for (const Hypothesis &other : hypotheses()) {
       if (is_held && (other.verdict != m_held || std::abs(other.lag - m_lag) > 1))
         continue;
-      const double as_it_is = misfit({}, *scale, count, false), sum = misfit(other, *scale, count, false);
+      const int back = std::max(0, -other.lag); // what images will be early by is not felt yet
+      const auto misfitOf = [&](const Hypothesis &hypothesis, bool is_odometry) {
+        return misfit(hypothesis, *scale, count, back, is_odometry);
+      };
+      const double as_it_is = misfitOf({}, false), sum = misfitOf(other, false), by_odometry = misfitOf({}, true);
       if (as_it_is < 0 || sum < 0 || (!is_held && sum > count * kFitsInSpreads * kFitsInSpreads))
         continue;
-      const double by_odometry = misfit({}, *scale, count, true);
-      const bool odometry_agrees =
-          by_odometry >= 0 && by_odometry < kOdometryAsWellAs * misfit(other, *scale, count, true);
+      const bool odometry_agrees = by_odometry >= 0 && by_odometry < kOdometryAsWellAs * misfitOf(other, true);
       if (const double ratio = 0.5 * (as_it_is - sum); ratio > most && !odometry_agrees) {
         most = ratio;
         verdict = other.verdict;

@@ -66,8 +66,8 @@ private:
   static const std::vector<Hypothesis> &hypotheses();
   static Usual usualOf(const std::vector<Eigen::Vector2d> &differences);
   std::optional<Usual> usual() const;
-  std::vector<Eigen::Vector2d> differences(const Hypothesis &hypothesis, int count, bool is_odometry) const;
-  double misfit(const Hypothesis &hypothesis, const Usual &usual, int count, bool is_odometry) const;
+  std::vector<Eigen::Vector2d> differences(const Hypothesis &hypothesis, int count, int back, bool is_odometry) const;
+  double misfit(const Hypothesis &hypothesis, const Usual &usual, int count, int back, bool is_odometry) const;
   double variance() const;
   bool hasJumped() const;
   Verdict judge();
