@@ -155,17 +155,17 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   m_seen.pop_back();
 }
 
+/// From the widest pairs alone: what the points of a frame err by in common is a smaller part of their rotation.
 void PointMotion::learn(const std::vector<RelativeMotion> &motions)
 {
-  if (motions.empty())
+  const int widest = *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end());
+  const auto step = std::find_if(motions.begin(), motions.end(),
+                                 [widest](const RelativeMotion &motion) { return motion.frames_back == widest; });
+  if (step == motions.end() || !step->gyro || !step->gyro->complete || !step->estimate.hasRotation() ||
+      step->a_ns < m_bias_until_ns)
     return;
-  const RelativeMotion &step =
-      *std::max_element(motions.begin(), motions.end(),
-                        [](const RelativeMotion &x, const RelativeMotion &y) { return x.frames_back < y.frames_back; });
-  if (!step.gyro || !step.gyro->complete || !step.estimate.hasRotation() || step.a_ns < m_bias_until_ns)
-    return;
-  m_bias = refineBias(m_bias, *step.gyro, m_bMc.R * step.estimate.aRb * m_bMc.R.transpose(),
-                      m_bMc.R * step.estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose());
-  m_bias_until_ns = step.b_ns;
+  m_bias = refineBias(m_bias, *step->gyro, m_bMc.R * step->estimate.aRb * m_bMc.R.transpose(),
+                      m_bMc.R * step->estimate.covariance.topLeftCorner<3, 3>() * m_bMc.R.transpose());
+  m_bias_until_ns = step->b_ns;
 }
 } // namespace bole
