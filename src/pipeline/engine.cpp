@@ -104,7 +104,7 @@ FrameReport Engine::process(const Frame &as_it_came)
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
-    dropUncertain(predicted, view);
+    dropUncertain(predicted);
     if (m_units.flow.mask_texture_edges)
       maskTextureEdges(predicted);
     if (m_units.flow.track_texture && view.has_ranges && newest() > 0)
@@ -218,18 +218,14 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
   return m_saliency.update(frame.image, rotation, translation);
 }
 
-/// Drops the predictions of trunks that were out of sight while the path drifted by more than their width: a neighbour
-/// could be associated with them. Such a trunk is detected as a new one, and the map merges both visits once both are
-/// known.
-void Engine::dropUncertain(std::vector<PredictedTrunk> &predicted, const Viewpoint &view)
+/// Drops the predictions of trunks whose bearing is not known to their width: a neighbour could be associated with
+/// them. Such a trunk is detected as a new one, and the map merges both visits once both are known.
+void Engine::dropUncertain(std::vector<PredictedTrunk> &predicted)
 {
-  const auto isUnplaced = [&](const PredictedTrunk &one) {
-    return !one.is_placed && view.time_s - m_map.trunk(one.id).last_seen_s > m_units.map.candidate_memory_s;
-  };
-  for (const PredictedTrunk &one : predicted)
-    if (isUnplaced(one))
-      m_map.markOutOfSight(one.id);
-  predicted.erase(std::remove_if(predicted.begin(), predicted.end(), isUnplaced), predicted.end());
+  const auto first =
+      std::stable_partition(predicted.begin(), predicted.end(), [](const auto &one) { return one.is_placed; });
+  std::for_each(first, predicted.end(), [this](const PredictedTrunk &one) { m_map.markOutOfSight(one.id); });
+  predicted.erase(first, predicted.end());
 }
 
 /// Replaces the image of each trunk tracked by a summary factor.

@@ -119,8 +119,7 @@ std::vector<OptionEntry> optionTable(Options &o)
       {"map.confirm_sigma", &o.map.confirm_sigma, 0, 10, "m",
        "trunks whose place, from where they were seen, has a larger standard deviation are left out; 0: none"},
       {"map.merge_distance", &o.map.merge_distance, 0, 5, "m", "trunks with less between their bark are one"},
-      {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s",
-       "a candidate not seen for longer is dropped, a trunk looked for only while its bearing is known to its width"},
+      {"map.candidate_memory", &o.map.candidate_memory, 0.1, 1e6, "s", "a candidate not seen for longer is dropped"},
       {"map.lag", &o.map.lag, 0, 1e5, "s", "older poses are fixed and forgotten; 0: never"},
 
       {"odometry.step", &o.odometry.step, 1e-4, 1, "m", "horizontal walk of the pose filter in 0.1 s"},
