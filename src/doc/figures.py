@@ -4,7 +4,7 @@
 
   cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
-  src/doc/figures.py beside run/overlay.mp4 data/figures/success-and-failure.png 112 45   (run of data/park-forward)
+  src/doc/figures.py beside run/overlay.mp4 data/figures/success-and-failure.png 12 45   (run of data/park-forward)
   src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
 import argparse
 import csv
