@@ -185,6 +185,21 @@ TEST(PointMotion, FindsTheMotionOfEveryFrame)
   }
 }
 
+TEST(PointMotion, LearnsTheBiasOfTheGyroFromTheWidestPairsAlone)
+{
+  const Pose bMc = forwardCamera();
+  const Eigen::Vector3d bias(0, 0, 0.01);
+  PointMotion motion(kCamera, bMc);
+  for (int k = 0; k < 8; ++k) {
+    Frame frame = frameAt(k, drawWalls(kCamera, poseAt(k)), bMc);
+    for (GyroSample &sample : frame.gyro)
+      sample.rate += bias;
+    motion.learn(motion.process(frame));
+    EXPECT_EQ(motion.gyroBias().mean.isZero(), k < 3) << k; // the widest pair is three frames apart
+  }
+  EXPECT_LT((motion.gyroBias().mean - bias).norm(), 0.3 * bias.norm()) << motion.gyroBias().mean.transpose();
+}
+
 TEST(PointMotion, FallsBackToTheGyroWithinAFrameAndRecovers)
 {
   const Pose bMc = forwardCamera();
