@@ -104,7 +104,7 @@ FrameReport Engine::process(const Frame &as_it_came)
     std::optional<Saliency> saliency = estimateSaliency(frame, motion); // Eq. 10-17
     lap("saliency");
     std::vector<PredictedTrunk> predicted = predictTrunks(m_map, m_smoother, view, m_units); // Eq. 5-8
-    dropUncertain(predicted);
+    dropUncertain(predicted, view);
     if (m_units.flow.mask_texture_edges)
       maskTextureEdges(predicted);
     if (m_units.flow.track_texture && view.has_ranges && newest() > 0)
@@ -218,12 +218,15 @@ std::optional<Saliency> Engine::estimateSaliency(const Frame &frame, const Motio
   return m_saliency.update(frame.image, rotation, translation);
 }
 
-/// Drops the predictions of trunks whose bearing is not known to their width: a neighbour could be associated with
-/// them. Such a trunk is detected as a new one, and the map merges both visits once both are known.
-void Engine::dropUncertain(std::vector<PredictedTrunk> &predicted)
+/// Drops the predictions of trunks that were out of sight while the path drifted by more than their width: a neighbour
+/// could be associated with them. Such a trunk is detected as a new one, and the map merges both visits once both are
+/// known.
+void Engine::dropUncertain(std::vector<PredictedTrunk> &predicted, const Viewpoint &view)
 {
-  const auto first =
-      std::stable_partition(predicted.begin(), predicted.end(), [](const auto &one) { return one.is_placed; });
+  constexpr double kOutOfSight_s = 1; // less: a view that failed, of a trunk that is followed
+  const auto first = std::stable_partition(predicted.begin(), predicted.end(), [&](const PredictedTrunk &one) {
+    return one.is_placed || view.time_s - m_map.trunk(one.id).last_seen_s < kOutOfSight_s;
+  });
   std::for_each(first, predicted.end(), [this](const PredictedTrunk &one) { m_map.markOutOfSight(one.id); });
   predicted.erase(first, predicted.end());
 }

@@ -74,7 +74,7 @@ private:
   const Frame &asUsuallyExposed(const Frame &frame, const Motion &motion, Frame &scratch);
   Viewpoint extendTrajectory(const Frame &frame, const Motion &motion);
   std::optional<Saliency> estimateSaliency(const Frame &frame, const Motion &motion);
-  void dropUncertain(std::vector<PredictedTrunk> &predicted);
+  void dropUncertain(std::vector<PredictedTrunk> &predicted, const Viewpoint &view);
   void add(const std::vector<TrackedTrunk> &tracked, const Viewpoint &view);
   void addNewCandidates(const Viewpoint &view, const vpImage<float> *p_background);
   void addBestCandidates(std::vector<Detection> found, const DetectionWindow &window, const Viewpoint &view);
