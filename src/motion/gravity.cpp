@@ -2,6 +2,7 @@
 #include "motion/gravity.h"
 
 #include "geometry/constants.h"
+#include "input/trajectory.h"
 #include "motion/gyro.h"
 
 #include <algorithm>
@@ -16,9 +17,6 @@ std::optional<GravityInnovation> compareGravity(const Trajectory &poses, const s
   constexpr int kLeast = 40;                         // samples
   if (poses.size() < 3 || samples.empty() || poses.back().stamp_ns - poses.front().stamp_ns < 2 * kVelocity_ns)
     return std::nullopt;
-  for (std::size_t i = 1; i < poses.size(); ++i)
-    if (poses[i].stamp_ns - poses[i - 1].stamp_ns > kVelocity_ns)
-      return std::nullopt; // nobody knows how it turned in between
   const auto isBefore = [](const StampedPose &pose, std::int64_t stamp_ns) { return pose.stamp_ns < stamp_ns; };
   const auto at = [&](std::int64_t stamp_ns) {
     return *std::lower_bound(poses.begin(), poses.end() - 1, stamp_ns - 1'000'000, isBefore);
@@ -42,27 +40,23 @@ std::optional<GravityInnovation> compareGravity(const Trajectory &poses, const s
   bool varies = false;
   int count = 0;
   double weights = 0;
-  std::size_t next = 0;                           // pose after the sample
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero(); // to it from the one before
   for (const GyroSample &sample : samples) {
     if (sample.stamp_ns <= begin_ns || sample.stamp_ns > end_ns)
       continue;
     if (!sample.force || secondsOf(sample.stamp_ns - before_ns) > kMostGap_s)
       return std::nullopt;
     before_ns = sample.stamp_ns;
-    for (; poses[next].stamp_ns < sample.stamp_ns; ++next)
-      turn = logSo3(orthonormalized(poses[next].wMb.R.transpose() * poses[next + 1].wMb.R));
-    const StampedPose &a = poses[next - 1], &b = poses[next];
-    const double along = double(sample.stamp_ns - a.stamp_ns) / double(b.stamp_ns - a.stamp_ns);
-    const Eigen::Matrix3d R = a.wMb.R * expSo3(along * turn);
+    const std::optional<Pose> pose = interpolate(poses, sample.stamp_ns, kVelocity_ns);
+    if (!pose)
+      return std::nullopt; // nobody knows how it turned in between
     // The difference of two mean velocities is that of the accelerations between, those within either mean in part.
     const double weight = std::min({secondsOf(sample.stamp_ns - begin_ns) / begin.duration,
                                     secondsOf(end_ns - sample.stamp_ns) / end.duration, 1.0});
     first_force = first_force == nullptr ? &*sample.force : first_force;
     varies = varies || *first_force != *sample.force;
-    result.off += weight * R * *sample.force;
-    result.by_rotation += weight * R * skew(*sample.force);
-    result.by_bias -= weight * R;
+    result.off += weight * pose->R * *sample.force;
+    result.by_rotation += weight * pose->R * skew(*sample.force);
+    result.by_bias -= weight * pose->R;
     weights += weight;
     ++count;
   }
