@@ -18,8 +18,7 @@ constexpr double kJumpInSpreads = 5.5;
 constexpr double kLargestSpread_rad = 6e-3; // beyond, the flight has not shown that its images agree with the gyro
 constexpr double kLeastSpread_rad = 1.5e-3; // they never agree better for long
 constexpr double kFollowsInSpreads = 3;     // clean flights stay below 3.5 from frame to frame
-constexpr std::size_t kAgreedMost =
-    12; // intervals that tell what is usual: five of a fault that is not told yet do not
+constexpr std::size_t kAgreedMost = 12;     // intervals that tell what is usual; five of a fault, not told yet, do not
 constexpr std::size_t kAgreedLeast = 6;
 constexpr int kShortest = 4, kUntold = 8; // intervals that may tell another hypothesis, and where nothing is usual
 constexpr double kClip = 6;               // spreads: an interval farther off is a wrong match of the images
@@ -168,15 +167,15 @@ GyroAgreement::Verdict GyroAgreement::judge()
       const auto misfitOf = [&](const Hypothesis &hypothesis, bool is_odometry) {
         return misfit(hypothesis, *scale, count, back, is_odometry);
       };
-      const double as_it_is = misfitOf({}, false), sum = misfitOf(other, false), by_odometry = misfitOf({}, true);
-      if (as_it_is < 0 || sum < 0 || (!is_held && sum > count * kFitsInSpreads * kFitsInSpreads))
+      const double as_it_is = misfitOf({}, false), sum = misfitOf(other, false), ratio = 0.5 * (as_it_is - sum);
+      if (as_it_is < 0 || sum < 0 || ratio <= most || (!is_held && sum > count * kFitsInSpreads * kFitsInSpreads))
         continue;
-      const bool odometry_agrees = by_odometry >= 0 && by_odometry < kOdometryAsWellAs * misfitOf(other, true);
-      if (const double ratio = 0.5 * (as_it_is - sum); ratio > most && !odometry_agrees) {
-        most = ratio;
-        verdict = other.verdict;
-        m_lag = other.lag;
-      }
+      const double by_odometry = misfitOf({}, true);
+      if (by_odometry >= 0 && by_odometry < kOdometryAsWellAs * misfitOf(other, true))
+        continue;
+      most = ratio;
+      verdict = other.verdict;
+      m_lag = other.lag;
     }
   return verdict;
 }
