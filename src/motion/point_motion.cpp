@@ -99,7 +99,7 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
   const RelativePosePrior prior = expect(step, frames_back, false);
   const std::vector<PointMatch> matches = m_tracker.matches(frames_back);
   step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
-  if (frames_back == *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end()))
+  if (frames_back == m_options.widest())
     step.points = prior.aRb ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose) : step.estimate;
   return step;
 }
@@ -158,7 +158,7 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
 /// From the widest pairs alone: what the points of a frame err by in common is a smaller part of their rotation.
 void PointMotion::learn(const std::vector<RelativeMotion> &motions)
 {
-  const int widest = *std::max_element(m_options.frames_back.begin(), m_options.frames_back.end());
+  const int widest = m_options.widest();
   const auto step = std::find_if(motions.begin(), motions.end(),
                                  [widest](const RelativeMotion &motion) { return motion.frames_back == widest; });
   if (step == motions.end() || !step->gyro || !step->gyro->complete || !step->estimate.hasRotation() ||

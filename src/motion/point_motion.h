@@ -25,6 +25,7 @@
 #include "motion/gyro.h"
 #include "motion/relative_pose.h"
 
+#include <algorithm>
 #include <deque>
 #include <string>
 
@@ -35,6 +36,7 @@ struct PointMotionOptions
   RelativePoseOptions relative_pose;
   GyroOptions gyro;
   std::vector<int> frames_back{1, 3}; ///< each 1 to PointTracker::kHistory - 1
+  int widest() const { return *std::max_element(frames_back.begin(), frames_back.end()); }
   int every = 1; ///< good frames from one whose motions are told to the next, 1 to 20: those of frames between are no
                  ///< news, as the same errors of the same points are in them
 };
