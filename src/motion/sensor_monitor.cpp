@@ -272,28 +272,27 @@ void SensorMonitor::checkStamps()
           Lasts::until_agree);
 }
 
-/// Checks for a gyro that lost samples in most of the last second: their spacing is then no longer the usual one. How
-/// much of the rotation that leaves open is part of its covariance (see integrateGyro()), so that it stays in use.
+/// Checks for a gyro that lost samples in a third of the last second: their spacing is then no longer the usual one.
+/// How much of the rotation that leaves open is part of its covariance (see integrateGyro()), so that it stays in use.
 void SensorMonitor::checkLostSamples(std::int64_t now_ns)
 {
   constexpr std::size_t kLeast = 12; // spacings
   constexpr double kUsual = 2;       // times the median
   constexpr double kMost_s = 0.33;   // of the last second in longer ones; .6 where samples are lost at random
+  const auto isHoles = [](const SensorVerdict &verdict) { return verdict.kind == "holes"; };
+  if (m_samples.size() <= kLeast || std::any_of(m_verdicts.begin(), m_verdicts.end(), isHoles))
+    return;
   std::vector<double> spacings_s;
-  double lost_s = 0, longest_s = 0;
   for (std::size_t i = 1; i < m_samples.size(); ++i)
     spacings_s.push_back(secondsOf(m_samples[i].stamp_ns - m_samples[i - 1].stamp_ns));
-  if (m_lost_samples || spacings_s.size() < kLeast)
-    return;
-  const double usual_s = medianOf(spacings_s);
+  const double long_s = kUsual * medianOf(spacings_s);
+  double lost_s = 0, longest_s = 0;
   for (std::size_t i = 0; i < spacings_s.size(); ++i)
-    if (now_ns - m_samples[i + 1].stamp_ns < nanoseconds(1) && spacings_s[i] > kUsual * usual_s &&
-        spacings_s[i] < kSilence_s) {
+    if (now_ns - m_samples[i + 1].stamp_ns < nanoseconds(1) && spacings_s[i] > long_s && spacings_s[i] < kSilence_s) {
       lost_s += spacings_s[i];
       longest_s = std::max(longest_s, spacings_s[i]);
     }
-  m_lost_samples = lost_s > kMost_s;
-  if (m_lost_samples)
+  if (lost_s > kMost_s)
     raise(Sensor::gyro, "holes", secondsOf(now_ns) - 1,
           fmt::format("gyro: samples are lost, for up to {:.0f} ms", 1e3 * longest_s), Lasts::no);
 }

@@ -154,7 +154,7 @@ private:
   Eigen::Vector3d m_turning = Eigen::Vector3d::Zero(); ///< the body, by what was trusted last [rad/s]
   std::optional<std::int64_t> m_gyro_changed_ns;       ///< when the gyro's value was last another one
   std::int64_t m_last_gyro_ns = 0, m_last_odometry_ns = 0;
-  bool m_had_gyro = false, m_had_odometry = false, m_lost_samples = false;
+  bool m_had_gyro = false, m_had_odometry = false;
   std::vector<SensorVerdict> m_verdicts;
   State m_states[4];
 };
