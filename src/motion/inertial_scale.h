@@ -53,9 +53,9 @@ public:
   bool hasBegunAnew() const { return m_has_begun_anew; }
 
   /// The scale, an odometry of scale 1 within \p prior_sigma (of the log) being expected: a measurement far outside of
-  /// that stands alone. Nothing while no accelerometer was compared, or where points did not tell the direction of half
-  /// of the way: by the accelerometer alone a steady curve, whose acceleration a bias may be, has no scale, and the
-  /// filter believes that it has.
+  /// that stands alone. Nothing while no accelerometer was compared, or where points did not tell the direction of a
+  /// quarter of the way: by the accelerometer alone a steady curve, whose acceleration a bias may be, has no scale, and
+  /// the filter believes that it has.
   std::optional<LogScale> scale(double prior_sigma) const;
 
   /// The displacement from \p from_ns, which is no earlier than the last comparison, to \p frame, which is yet to be
