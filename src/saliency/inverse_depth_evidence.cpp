@@ -11,9 +11,11 @@ namespace bole
 {
 namespace
 {
-constexpr double kNearPrior = 0.3;   // p(nearer than near_range) before looking
-constexpr float kOutside = 1;        // residual where the older image ends: as bad as any, so that it says nothing
-constexpr double kUnrelatedPx = 2.5; // two unrelated places of the same texture differ as if so far apart
+constexpr double kNearPrior = 0.3;      // p(nearer than near_range) before looking
+constexpr float kOutside = 1;           // residual where the older image ends: as bad as any, so that it says nothing
+constexpr double kResidualSigma = 0.05; // 1 = full scale; above a pixel's noise: light, leaves, model
+constexpr float kDecay = 0.8f;          // share of the evidence that a frame inherits
+constexpr double kUnrelatedPx = 2.5;    // two unrelated places of the same texture differ as if so far apart
 
 std::size_t index(int i, int j, int width)
 {
@@ -28,7 +30,7 @@ InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int leve
       m_rows((camera.height + kRowStep - 1) / kRowStep),
       m_window_rows(options.window_height_px / kRowStep | 1)
 {
-  const double sigma = options.sigma_residual * std::max(std::ldexp(1.0, -level), 0.25);
+  const double sigma = kResidualSigma * std::max(std::ldexp(1.0, -level), 0.25);
   m_intensity_variance = 2 * sigma * sigma;
   const double rho_max = 1 / options.min_range;
   for (int k = 0; k < kInverseDepths; ++k) {
@@ -81,8 +83,8 @@ void InverseDepthEvidence::predict(const Pose &pMc)
 {
   RowsSeen seen(m_camera, pMc, m_rho);
   for (int i = 0; i < m_rows; ++i)
-    movedEvidenceOfRow(seen(i * kRowStep), m_evidence.data(), m_rows, 1.f / kRowStep, m_camera.width,
-                       static_cast<float>(m_options.evidence_decay), &m_scratch[index(i, 0, m_camera.width)]);
+    movedEvidenceOfRow(seen(i * kRowStep), m_evidence.data(), m_rows, 1.f / kRowStep, m_camera.width, kDecay,
+                       &m_scratch[index(i, 0, m_camera.width)]);
   m_evidence.swap(m_scratch);
 }
 

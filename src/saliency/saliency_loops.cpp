@@ -352,23 +352,19 @@ void logOddsOfEvidence(const float *evidence, const float *log_prior, const floa
 }
 
 BOLE_VECTOR_CLONES
-int labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
-                float prior_log_odds, float unknown_below, float *__restrict p_background, float *__restrict confidence)
+void labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
+                 float prior_log_odds, float *__restrict p_background, float *__restrict confidence)
 {
   const int n = static_cast<int>(columns.left.size()), *left = columns.left.data();
   const float *between = columns.share.data();
-  int unknown = 0;
-#pragma omp simd reduction(+ : unknown)
+#pragma omp simd
   for (int j = 0; j < n; ++j) {
     const int c = left[j];
     const float above = upper[c] + between[j] * (upper[c + 1] - upper[c]);
     const float below = lower[c] + between[j] * (lower[c + 1] - lower[c]);
     const float odds = above + share * (below - above);
-    const float change = std::abs(odds - prior_log_odds);
     p_background[j] = 1 / (1 + fastExp(odds));
-    confidence[j] = change;
-    unknown += change < unknown_below ? 1 : 0;
+    confidence[j] = std::abs(odds - prior_log_odds);
   }
-  return unknown;
 }
 } // namespace bole

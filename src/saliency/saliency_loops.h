@@ -105,8 +105,7 @@ struct ColumnsBetween
   std::vector<float> share;
 };
 
-/// \p upper and \p lower: the rows of log odds above and below, \p share: how far from the upper one. Returns how many
-/// pixels changed less than \p unknown_below from \p prior_log_odds.
-int labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
-                float prior_log_odds, float unknown_below, float *p_background, float *confidence);
+/// \p upper and \p lower: the rows of log odds above and below, \p share: how far from the upper one.
+void labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
+                 float prior_log_odds, float *p_background, float *confidence);
 } // namespace bole
