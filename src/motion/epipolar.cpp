@@ -104,13 +104,13 @@ double bulkSigma(std::vector<double> residuals)
   return sigma;
 }
 
-RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
-                        const RelativePoseOptions &options)
+RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma)
 {
+  constexpr int kIterations = 15;
   RotationFit fit;
   fit.aRb = prior.aRb;
   std::vector<double> residuals(2 * rays.size()), weights(rays.size());
-  for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
     const TransferTerms terms = {fit.aRb.data(), kKernel};
     transferResiduals(rays.columns, terms, residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
@@ -118,8 +118,8 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
     const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, weights.data());
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
-    H /= variance * options.inflation;
-    Eigen::Vector3d g = Eigen::Vector3d::Map(sums.g) / (variance * options.inflation);
+    H /= variance * kInflation;
+    Eigen::Vector3d g = Eigen::Vector3d::Map(sums.g) / (variance * kInflation);
     fit.information = H + prior.rotation_information;
     g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
     const Eigen::Vector3d step = -solveDefinite<3>(fit.information + 1e-9 * Eigen::Matrix3d::Identity(), g);
@@ -151,11 +151,10 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
 
 } // namespace
 
-double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
-              const RelativePoseOptions &options)
+double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma)
 {
   const double cost = costOfMatches(rays.columns, termsOf(motion, sigma));
-  return cost / options.inflation + priorCost(motion, prior);
+  return cost / kInflation + priorCost(motion, prior);
 }
 
 namespace
@@ -172,15 +171,15 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, Matrix5d &H
 }
 
 /// Levenberg-Marquardt with a fixed sigma.
-void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const RelativePoseOptions &options)
+void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, int iterations)
 {
   double damping = 1e-4;
-  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
-  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma);
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     Vector5d g;
     linearize(rays, fit.motion, fit.sigma, fit.information, g);
-    Matrix5d H = fit.information / options.inflation;
-    g /= options.inflation;
+    Matrix5d H = fit.information / kInflation;
+    g /= kInflation;
     if (prior.has_rotation) {
       H.topLeftCorner<3, 3>() += prior.rotation_information;
       g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
@@ -198,7 +197,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
       if (step.tail<2>().norm() > 0.5)
         step *= 0.5 / step.tail<2>().norm();
       const Motion tried = moved(fit.motion, step);
-      const double cost = costOf(rays, tried, prior, fit.sigma, options);
+      const double cost = costOf(rays, tried, prior, fit.sigma);
       better = cost <= fit.cost;
       damping = better ? std::max(1e-7, damping * 0.2) : std::max(1e-3, damping * 10);
       if (better) {
@@ -213,22 +212,22 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
 }
 } // namespace
 
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
-                   const RelativePoseOptions &options)
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma)
 {
+  constexpr int kIterations = 12;
   JointFit fit;
   fit.motion = start;
   fit.sigma = sigma;
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
-    descend(rays, fit, prior, options);
+    descend(rays, fit, prior, kIterations);
     residualsOfMatches(rays.columns, termsOf(fit.motion, fit.sigma), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
     if (std::abs(fit.sigma - before) < 0.02 * before)
       break;
   }
-  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma);
   Vector5d g;
   linearize(rays, fit.motion, fit.sigma, fit.information, g);
   return fit;
@@ -281,15 +280,13 @@ void drawFrom(const Rays &rays, std::mt19937 &random, std::size_t n, Rays &sampl
 }
 } // namespace
 
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
-                                 const RelativePoseOptions &options)
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma)
 {
+  constexpr int kFew = 5;            // iterations
   constexpr std::size_t kSample = 6; // matches that a hypothesis is fitted to: five would do, one for the noise
   std::mt19937 random(kSeed);
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   const bool rotation_known = prior.has_rotation;
-  RelativePoseOptions few = options;
-  few.iterations = 5;
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
@@ -305,13 +302,13 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
       fit.motion = motion;
       fit.sigma = 3 * sigma;
       drawFrom(rays, random, kSample, sample);
-      descend(sample, fit, free, few);
+      descend(sample, fit, free, kFew);
       motion = fit.motion;
     }
-    scored.emplace_back(costOf(rays, motion, free, sigma, options), motion);
+    scored.emplace_back(costOf(rays, motion, free, sigma), motion);
   }
   if (prior.has_direction)
-    scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
+    scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma), Motion{aRb, prior.direction});
   std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
   std::vector<Motion> starts;
   for (const auto &[cost, motion] : scored) {

@@ -150,8 +150,8 @@ void FocalFinder::addTurn(const PointTracker &tracker)
   std::vector<double> costs;
   for (int k = 0; k < kSteps; ++k) {
     const PinholeCamera camera = withFocal(m_guess, std::exp(logFactor(k)));
-    const auto turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx,
-                                          RelativePoseOptions());
+    const auto turn =
+        motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx);
     costs.push_back(std::log(turn.sigma * camera.fx));
   }
   if (*std::min_element(costs.begin(), costs.end()) < std::log(kTurnResidual * flow_px))

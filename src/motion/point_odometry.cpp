@@ -64,14 +64,12 @@ constexpr double kStartDirection = 3 * kDegree; // standard deviation of its dir
 constexpr int kPlacingPoints = 12;              // of known depth that place a frame, at least
 constexpr int kPlacingIterations = 6;           // of the bundle adjustment a frame
 constexpr double kLeastNoise_px = 0.1;          // floor of the observation noise
-constexpr double kPlacingInflation = 3;         // as RelativePoseOptions::inflation
 } // namespace
 
 struct PointOdometry::State
 {
   PinholeCamera camera;
-  double focal_sigma = 0;            ///< of its log
-  RelativePoseOptions relative_pose; ///< of the start
+  double focal_sigma = 0; ///< of its log
   std::deque<KeyFrame> window;
   std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
   std::unordered_map<std::uint64_t, Landmark> landmarks;
@@ -172,15 +170,15 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     prior.aRb = turned->R;
     prior.rotation_covariance = turned->covariance();
   }
-  const auto estimate = estimateRelativePose(matches, camera, prior, relative_pose);
+  const auto estimate = estimateRelativePose(matches, camera, prior);
   const double wanted_px = kStartParallax * focal();
   const bool translates =
       focal_sigma == 0 || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
   if ((!translates || !estimate.hasRotation()) && matches.size() >= 6) {
     // What looks like a flight past a wall is taken for a pan, and so is what cannot be told from one.
-    wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
-                                                       kLeastNoise_px / focal(), relative_pose)
-                                       .aRb;
+    wMc.R =
+        window.front().wMc.R *
+        motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior), kLeastNoise_px / focal()).aRb;
   }
   else if (estimate.hasRotation()) {
     wMc.R = window.front().wMc.R * estimate.aRb;
@@ -211,9 +209,8 @@ void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
   constexpr double kSurprise = 2 * kDegree;
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return;
-  const Eigen::Matrix3d turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}),
-                                                   kLeastNoise_px / focal(), relative_pose)
-                                   .aRb;
+  const Eigen::Matrix3d turn =
+      motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeastNoise_px / focal()).aRb;
   if (logSo3(velocity.R.transpose() * turn).norm() > kSurprise)
     velocity.R = turn;
 }
@@ -229,8 +226,7 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
     other.fx *= factor;
     other.fy *= factor;
     const double pixel = 1 / (factor * focal());
-    const auto fit =
-        motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel, relative_pose);
+    const auto fit = motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel);
     least = std::min(least, fit.sigma / pixel);
   }
   return least;
@@ -434,7 +430,7 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     disassemble(frames, points, ids);
     result.points = known();
     result.status = result.points >= kPlacingPoints ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
-    result.covariance = kPlacingInflation * solved.last_covariance;
+    result.covariance = motion::kInflation * solved.last_covariance;
     if (result.status == PointOdometryStatus::rotation_only)
       result.covariance.topLeftCorner<3, 3>() += kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
   }
