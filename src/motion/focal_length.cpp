@@ -92,27 +92,6 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &cost
     return std::nullopt;
   return logFactor(best + vertex);
 }
-
-/// The inverse depth of \p point, by all that see it.
-void triangulate(motion::BundlePoint &point, const std::vector<motion::BundleFrame> &frames)
-{
-  constexpr int kIterations = 5;
-  constexpr double kStart = 0.05; // of the first baseline's inverse
-  point.inverse_depth = kStart;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    double H = 1e-12, g = 0;
-    for (const motion::BundleObservation &seen : point.seen) {
-      Eigen::Vector2d J;
-      const Eigen::Vector2d e = motion::reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                                                     frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
-                                                     point.inverse_depth, seen.xy, nullptr, nullptr, &J);
-      H += J.squaredNorm();
-      g += J.dot(e);
-    }
-    point.inverse_depth -= g / H;
-  }
-  point.inverse_depth = std::max(point.inverse_depth, 0.0);
-}
 } // namespace
 
 FocalFinder::FocalFinder(const PinholeCamera &guess) : m_guess(guess)
@@ -211,17 +190,17 @@ FocalEstimate FocalFinder::adjusted(double log_factor) const
     for (const auto &[id, xy] : m_seen[frame]) {
       const auto [track, is_new] = tracks.try_emplace(id);
       if (is_new) {
-        track->second.anchor = static_cast<int>(k);
+        track->second.anchor = k;
         track->second.xy = scale * xy;
       }
       else
-        track->second.seen.push_back({static_cast<int>(k), scale * xy, 1});
+        track->second.seen.push_back({k, scale * xy, 1});
     }
   }
   std::vector<motion::BundlePoint> points;
   for (auto &[id, point] : tracks)
     if (point.seen.size() + 1 >= kLeastSeen) {
-      triangulate(point, frames);
+      motion::triangulate(point, frames);
       points.push_back(std::move(point));
     }
   const double pixel = scale / m_guess.fx;

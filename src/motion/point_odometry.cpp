@@ -56,7 +56,7 @@ constexpr double kHeldSigma = 1.0; // of a translation that was not seen, in uni
 constexpr double kDepthPrior = 10;
 constexpr double kRestSigma = 1e-2;
 constexpr std::size_t kKeyFrames = 8;           // of the window
-constexpr int kHeldKeyFrames = 3;               // oldest of them, not moved any more
+constexpr std::size_t kHeldKeyFrames = 3;       // oldest of them, not moved any more
 constexpr double kKeyParallax = 1.2 * kDegree;  // median flow without rotation that makes a new key frame
 constexpr double kKeyShared = 0.5;              // share of the last one's tracks below which a new one is made
 constexpr double kStartParallax = 1 * kDegree;  // of the first baseline
@@ -129,9 +129,8 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, const st
     state.expectTurn(tracker.matches(1));
   PointOdometryResult result = state.started ? state.place(turned.has_value()) : state.begin(tracker);
   result.wMc = state.wMc;
-  result.previousMc = before.inverse() * state.wMc;
   if (state.started && result.status == PointOdometryStatus::ok)
-    state.velocity = result.previousMc;
+    state.velocity = before.inverse() * state.wMc;
   Record &last = state.records.back();
   last.status = result.status;
   if (state.started) {
@@ -193,7 +192,6 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
       start(estimate)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
-    result.key_frame = true;
     return result;
   }
   // Too little is left of what the first key frame saw: go on from here.
@@ -249,17 +247,19 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
   wMc = origin.wMc * Pose(first.aRb, first.direction);
   landmarks.clear();
   // Inverse depths from the two frames, then both and the frames between in one adjustment.
+  std::vector<BundleFrame> pair(2);
+  pair[0].wMc = origin.wMc;
+  pair[0].fixed = true;
+  pair[1].wMc = wMc;
   for (const auto &[id, xy_a] : origin.seen) {
     const auto found = seen.find(id);
     if (found == seen.end())
       continue;
-    double q = 0.05;
-    for (int iteration = 0; iteration < 5; ++iteration) {
-      Eigen::Vector2d J;
-      const Eigen::Vector2d e = motion::reprojection(origin.wMc, wMc, xy_a, q, found->second, nullptr, nullptr, &J);
-      q -= J.dot(e) / (J.squaredNorm() + 1e-12);
-    }
-    landmarks[id] = {origin.frame, xy_a, std::max(q, 0.0), 0, 0};
+    BundlePoint point;
+    point.xy = xy_a;
+    point.seen.push_back({1, found->second, 1});
+    motion::triangulate(point, pair);
+    landmarks[id] = {origin.frame, xy_a, point.inverse_depth, 0, 0};
   }
   const std::size_t now = records.size() - 1;
   window.push_back({now, wMc, seen, turned});
@@ -290,9 +290,6 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
   for (std::size_t k = 0; k + 1 < since_first.size(); ++k) {
     const std::size_t frame = now + 1 - since_first.size() + k;
     const double along = static_cast<double>(frame - origin.frame) / since_origin;
-    std::vector<BundleFrame> pair(2);
-    pair[0].wMc = origin.wMc;
-    pair[0].fixed = true;
     const Pose step = origin.wMc.inverse() * wMc;
     pair[1].wMc = origin.wMc * Pose(expSo3(along * logSo3(step.R)), along * step.t);
     std::vector<BundlePoint> seen_between;
@@ -324,29 +321,25 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
 void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                                     std::vector<std::uint64_t> &ids) const
 {
-  std::map<std::size_t, int> index;
-  const int held = window.size() <= 3 ? 1 : std::min<int>(kHeldKeyFrames, int(window.size()) - 2);
-  for (const KeyFrame &key : window) {
+  const auto addFrame = [&frames](const Pose &pose, const std::optional<GyroRotation> &since_before) {
     BundleFrame frame;
-    frame.wMc = key.wMc;
-    frame.fixed = static_cast<int>(frames.size()) < held;
-    if (key.turned && !frames.empty()) {
-      frame.previousRthis = key.turned->R;
-      frame.rotation_information = key.turned->covariance().inverse();
+    frame.wMc = pose;
+    if (since_before && !frames.empty()) {
+      frame.previousRthis = since_before->R;
+      frame.rotation_information = since_before->covariance().inverse();
     }
-    index[key.frame] = static_cast<int>(frames.size());
     frames.push_back(frame);
+  };
+  std::map<std::size_t, std::size_t> index;
+  const std::size_t held = window.size() <= 3 ? 1 : std::min(kHeldKeyFrames, window.size() - 2);
+  for (const KeyFrame &key : window) {
+    index[key.frame] = frames.size();
+    addFrame(key.wMc, key.turned);
+    frames.back().fixed = frames.size() <= held;
   }
   const bool current = window.back().frame + 1 != records.size();
-  if (current) {
-    BundleFrame frame;
-    frame.wMc = wMc;
-    if (turned) {
-      frame.previousRthis = turned->R;
-      frame.rotation_information = turned->covariance().inverse();
-    }
-    frames.push_back(frame);
-  }
+  if (current)
+    addFrame(wMc, turned);
   const double typical = typicalInverseDepth();
   for (const auto &[id, landmark] : landmarks) {
     BundlePoint point;
@@ -356,15 +349,13 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vecto
     point.prior = typical;
     point.prior_information = 1 / (kDepthPrior * kDepthPrior * typical * typical + kRestSigma * kRestSigma);
     for (std::size_t k = 0; k < window.size(); ++k) {
-      if (static_cast<int>(k) == point.anchor)
-        continue;
       const auto found = window[k].seen.find(id);
-      if (found != window[k].seen.end())
-        point.seen.push_back({static_cast<int>(k), found->second, 1});
+      if (k != point.anchor && found != window[k].seen.end())
+        point.seen.push_back({k, found->second, 1});
     }
     const auto found = seen.find(id);
     if (current && found != seen.end())
-      point.seen.push_back({static_cast<int>(frames.size()) - 1, found->second, 1});
+      point.seen.push_back({frames.size() - 1, found->second, 1});
     if (!point.seen.empty()) {
       points.push_back(point);
       ids.push_back(id);
@@ -399,8 +390,7 @@ void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames, c
 PointOdometryResult PointOdometry::State::place(bool turned_known)
 {
   PointOdometryResult result;
-  Pose step = velocity;
-  wMc = wMc * step;
+  wMc = wMc * velocity;
   int common = 0;
   for (const auto &[id, landmark] : landmarks)
     common += seen.count(id) > 0;
@@ -437,10 +427,8 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
   else {
     result.status = PointOdometryStatus::lost;
   }
-  if (wantsKeyFrame()) {
+  if (wantsKeyFrame())
     addKeyFrame();
-    result.key_frame = true;
-  }
   return result;
 }
 

@@ -49,10 +49,8 @@ struct PointOdometryResult
 {
   PointOdometryStatus status = PointOdometryStatus::starting;
   Pose wMc;
-  Pose previousMc; ///< motion since the frame before
-  /// Of previousMc, tangent (rho [unit], phi [rad]).
+  /// Of the motion since the frame before, tangent (rho [unit], phi [rad]).
   Matrix6d covariance = Matrix6d::Identity();
-  bool key_frame = false;
   int points = 0;      ///< of known depth in this frame
   double sigma_px = 0; ///< noise of the observations
 };

@@ -130,7 +130,7 @@ TEST(SolveBundle, FindsTheFocalLengthByWhichAllWasNormalised)
         point.inverse_depth = 1 / c.z();
       }
       else
-        point.seen.push_back({k, c.head<2>() / c.z() / kOff, 1});
+        point.seen.push_back({std::size_t(k), c.head<2>() / c.z() / kOff, 1});
     }
     points.push_back(point);
   }
