@@ -343,9 +343,7 @@ void Estimation::calibrateAttitude()
 
 void Estimation::calibrateOdometryClock()
 {
-  SensorCalibration tried = m_result;
-  tried.odometry_late_s = 0;
-  const std::vector<Frame> frames = corrected(m_frames, tried);
+  const std::vector<Frame> frames = corrected(m_frames, m_result);
   const GyroTurns gyro(samplesOf(frames));
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)

@@ -137,7 +137,6 @@ TEST(InertialScale, ABiasThatChangesInFlightTellsNoWrongScale)
     const auto scale = inertial.scale(0.03);
     ASSERT_TRUE(scale);
     EXPECT_LT(std::abs(scale->mean), 3 * scale->sigma) << bias.transpose();
-    EXPECT_FALSE(scale->contradicts_prior);
   }
 }
 
@@ -147,7 +146,6 @@ TEST(InertialScale, AnOdometryAThirdTooLongContradictsWhatWasExpected)
   made.factor = 1.33;
   const auto scale = fly(12, made).scale(0.03);
   ASSERT_TRUE(scale);
-  EXPECT_TRUE(scale->contradicts_prior);
   EXPECT_NEAR(scale->mean, std::log(1.33), 0.02);
 }
 
@@ -167,7 +165,7 @@ TEST(InertialScale, TwoSecondsWithoutOdometryAreBridgedWithinThreeStandardDeviat
     if (i >= 80) {
       frame.wMb_odometry.reset();
       const double from = 0.1 * static_cast<double>(i - 1), to = 0.1 * static_cast<double>(i);
-      const auto step = inertial.stepTo(frame, MadeFlight::nanoseconds(from));
+      const auto step = inertial.stepTo(frame, nsOf(from));
       ASSERT_TRUE(step) << i;
       const Pose a = made.truth(from), b = made.truth(to);
       const Eigen::Vector3d moved = (b.t - a.t).cwiseProduct(Eigen::Vector3d(made.factor, made.factor, 1));

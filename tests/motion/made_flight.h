@@ -4,6 +4,7 @@
 /// A flight from side to side that is made up: ten frames and 200 samples of gyro and accelerometer a second, an
 /// odometry with a scale, and what points would say.
 
+#include "geometry/constants.h"
 #include "motion/point_motion.h"
 
 #include <bole/open_source.h>
@@ -45,8 +46,6 @@ struct MadeFlight
              1.2 + 0.1 * std::sin(0.7 * t) + 0.06 * std::sin(1.9 * t)}};
   }
 
-  static std::int64_t nanoseconds(double t) { return static_cast<std::int64_t>(std::llround(t * 1e9)); }
-
   Eigen::Vector3d white()
   {
     std::normal_distribution<double> normal;
@@ -60,7 +59,7 @@ struct MadeFlight
     const Eigen::Vector3d acceleration = (truth(t + h).t - 2 * truth(t).t + truth(t - h).t) / (h * h);
     Eigen::Vector3d force = truth(t).R.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + force_bias;
     force += force_noise * white();
-    return {nanoseconds(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
+    return {nsOf(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
   }
 
   /// To be asked for in the order of time.
@@ -70,7 +69,7 @@ struct MadeFlight
     const int samples = static_cast<int>(std::lround(200 / frame_rate));
     Frame frame;
     frame.index = index;
-    frame.stamp_ns = nanoseconds(t);
+    frame.stamp_ns = nsOf(t);
     walked += odometry_noise * white().cwiseProduct(Eigen::Vector3d(1, 1, 0));
     frame.wMb_odometry = truth(t);
     frame.wMb_odometry->t.head<2>() *= factor;
@@ -93,8 +92,8 @@ struct MadeFlight
     motion.frames_back = static_cast<int>(back);
     motion.a_index = index - back;
     motion.b_index = index;
-    motion.a_ns = nanoseconds(from);
-    motion.b_ns = nanoseconds(to);
+    motion.a_ns = nsOf(from);
+    motion.b_ns = nsOf(to);
     motion.points.status = RelativePoseStatus::ok;
     motion.points.aRb = aMb.R;
     motion.points.direction = aMb.t.normalized();

@@ -31,7 +31,7 @@ SensorCalibration fly(
 {
   std::vector<Frame> frames;
   std::vector<RelativeMotion> motions;
-  const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
+  const std::int64_t gyro_late_ns = nsOf(gyro_late_s);
   std::mt19937 random(3);
   std::normal_distribution<double> turn(0, 0.003);
   std::vector<GyroSample> waiting;
@@ -192,7 +192,7 @@ TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFaul
 
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
 {
-  const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(5); };
+  const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= nsOf(5); };
   expectAsStated(fly(noisy(), [&](Frame &f) {
     if (isLate(f))
       turnRates(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); });

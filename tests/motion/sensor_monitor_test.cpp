@@ -36,7 +36,7 @@ void eachRate(Frame &frame, const std::function<Vector3d(const Vector3d &)> &cha
     sample.rate = change(sample.rate);
 }
 
-bool isLate(const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(kBegins_s); }
+bool isLate(const Frame &frame) { return frame.stamp_ns >= nsOf(kBegins_s); }
 
 struct Fault
 {
@@ -119,7 +119,7 @@ TEST(SensorMonitor, AnAccelerometerThatIsOffCostsTheOdometryNothing)
   const auto off = [](const Vector3d &bias, double until_s) {
     return [bias, until_s](Frame &f) {
       for (GyroSample &sample : f.gyro)
-        if (sample.stamp_ns < MadeFlight::nanoseconds(until_s))
+        if (sample.stamp_ns < nsOf(until_s))
           *sample.force += bias;
     };
   };
@@ -244,9 +244,7 @@ TEST(SensorMonitor, EachFaultIsNamedWithItsSensorWhichIsLeftOut)
 
 TEST(SensorMonitor, ASensorThatAgreesAgainAfterASilenceIsTrustedAgain)
 {
-  const auto isSilent = [](const Frame &frame) {
-    return frame.stamp_ns >= MadeFlight::nanoseconds(3) && frame.stamp_ns < MadeFlight::nanoseconds(5);
-  };
+  const auto isSilent = [](const Frame &frame) { return frame.stamp_ns >= nsOf(3) && frame.stamp_ns < nsOf(5); };
   const SensorMonitor gyro = fly([&](Frame &f) {
     if (isSilent(f))
       f.gyro.clear();
@@ -281,8 +279,7 @@ SensorMonitor flyByWrongStamps(double sigma_s, double late_s, double duration_s 
     std::vector<RelativeMotion> seen = flight.seen(i);
     if (0.1 * double(i) >= until_s)
       sigma_s = late_s = 0;
-    stamps.push_back(frame.stamp_ns +
-                     MadeFlight::nanoseconds(late_s + std::clamp(sigma_s * normal(random), -0.04, 0.04)));
+    stamps.push_back(frame.stamp_ns + nsOf(late_s + std::clamp(sigma_s * normal(random), -0.04, 0.04)));
     frame.stamp_ns = stamps.back();
     for (RelativeMotion &motion : seen) {
       motion.a_ns = stamps[i - 3];
@@ -297,7 +294,7 @@ SensorMonitor flyByWrongStamps(double sigma_s, double late_s, double duration_s 
 TEST(SensorMonitor, AGyroThatWasWrongForAMomentIsTrustedAgainAndOneThatStaysWrongIsNot)
 {
   const auto spiked = [](Frame &f) {
-    if (isLate(f) && f.stamp_ns < MadeFlight::nanoseconds(kBegins_s + 1))
+    if (isLate(f) && f.stamp_ns < nsOf(kBegins_s + 1))
       eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 30)); });
   };
   const SensorMonitor during = fly(spiked, 10, kBegins_s + 1);
