@@ -237,7 +237,7 @@ std::vector<PointMatch> PointOdometry::State::matchesWithFirst(const PointTracke
   const Seen &first = window.front().seen;
   for (const PointTrack &track : tracker.tracks())
     if (const auto found = first.find(track.id); found != first.end())
-      matches.push_back({camera.project(found->second.homogeneous()), track.current(), track.id});
+      matches.push_back({camera.project(found->second.homogeneous()), track.current()});
   return matches;
 }
 

@@ -42,7 +42,6 @@ struct PointTracker::State
   GreyPyramid pyramid, next; ///< of the last image and of the one before it
   std::vector<PointTrack> tracks;
   std::uint64_t next_id = 1;
-  std::size_t frames = 0;
   double brightness_change = 0;
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
@@ -136,7 +135,6 @@ void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matri
     m_state->follow(aRb);
   m_state->replenish(current);
   m_state->pyramid.swap(m_state->next);
-  ++m_state->frames;
 }
 
 /// Where each track is now, searched from \p start on; nothing where it ended. Second: how many go on.
@@ -251,7 +249,6 @@ void PointTracker::State::replenish(const cv::Mat &image)
           continue;
         PointTrack track;
         track.id = next_id++;
-        track.response = corner.response;
         track.positions_px.push_back(refined(response, corner.at));
         occupied.add(toCv(track.current()));
         tracks.push_back(std::move(track));
@@ -272,13 +269,11 @@ std::vector<PointMatch> PointTracker::matches(int frames_back) const
   std::vector<PointMatch> matches;
   for (const PointTrack &track : m_state->tracks)
     if (frames_back >= 1 && track.age() >= frames_back)
-      matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current(), track.id});
+      matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current()});
   return matches;
 }
 
 double PointTracker::brightnessChange() const { return m_state->brightness_change; }
-
-std::size_t PointTracker::frames() const { return m_state->frames; }
 
 void PointTracker::forgetLast()
 {
@@ -289,13 +284,5 @@ void PointTracker::forgetLast()
       std::remove_if(tracks.begin(), tracks.end(), [](const PointTrack &track) { return track.positions_px.empty(); }),
       tracks.end());
   m_state->pyramid.swap(m_state->next);
-  --m_state->frames;
-}
-
-void PointTracker::reset()
-{
-  m_state->tracks.clear();
-  m_state->pyramid.clear();
-  m_state->frames = 0;
 }
 } // namespace bole

