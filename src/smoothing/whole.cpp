@@ -11,10 +11,10 @@ Places Smoother::State::placeWhole() const
   Places places;
   places.first_pose = first_held;
   for (std::size_t i = first_held; i < poses.size(); ++i)
-    places.take({true, i}, trunks.size());
+    places.take({true, i});
   for (std::size_t j = 0; j < trunks.size(); ++j)
     if (!trunks[j].is_removed)
-      places.take({false, j}, trunks.size());
+      places.take({false, j});
   return places;
 }
 

@@ -7,12 +7,12 @@
 
 namespace bole
 {
-void Places::take(const Name &name, std::size_t trunk_count)
+void Places::take(const Name &name)
 {
-  trunk.resize(std::max(trunk.size(), trunk_count), -1);
-  if (name.is_pose && pose.size() <= name.number - first_pose)
-    pose.resize(name.number - first_pose + 1, -1);
-  int &at = name.is_pose ? pose[name.number - first_pose] : trunk[name.number];
+  std::vector<int> &list = name.is_pose ? pose : trunk;
+  const std::size_t number = name.is_pose ? name.number - first_pose : name.number;
+  list.resize(std::max(list.size(), number + 1), -1);
+  int &at = list[number];
   if (at >= 0)
     return;
   at = static_cast<int>(names.size());
@@ -26,12 +26,12 @@ void Smoother::State::placeWindow()
   window_places = Places();
   window_places.first_pose = first_open;
   for (std::size_t i = first_open; i < poses.size(); ++i)
-    window_places.take({true, i}, trunks.size());
+    window_places.take({true, i});
   for (const Name &name : prior.names)
-    window_places.take(name, trunks.size());
+    window_places.take(name);
   for (std::size_t j = 0; j < trunks.size(); ++j)
     if (isInWindow(trunks[j]))
-      window_places.take({false, j}, trunks.size());
+      window_places.take({false, j});
   if (window)
     window->reset(window_places.dims);
   else
@@ -178,18 +178,18 @@ void Smoother::State::absorb(std::size_t from, std::size_t until)
   Places places;
   places.first_pose = from;
   for (std::size_t i = from; i < until; ++i) {
-    places.take({true, i}, trunks.size());
+    places.take({true, i});
     for (const StepFactor &factor : factorsOf(i).steps)
-      places.take({true, std::max(factor.a, factor.b)}, trunks.size());
+      places.take({true, std::max(factor.a, factor.b)});
     for (const DirectionFactor &factor : factorsOf(i).directions)
-      places.take({true, std::max(factor.a, factor.b)}, trunks.size());
+      places.take({true, std::max(factor.a, factor.b)});
   }
   for (const Name &name : prior.names)
-    places.take(name, trunks.size());
+    places.take(name);
   for (std::size_t i = from; i < until; ++i)
     for (const ViewFactor &factor : factorsOf(i).views)
       if (trunks[factor.trunk].is_kept)
-        places.take({false, factor.trunk}, trunks.size());
+        places.take({false, factor.trunk});
   NormalEquations system(places.dims);
   addWindowPrior(places, &system, true);
   for (std::size_t i = from; i < until; ++i)
