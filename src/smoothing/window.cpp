@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // In flight: the poses of the window and the trunks that it sees, with a prior for all that left it.
+#include "geometry/failure.h"
 #include "smoothing/state.h"
 
 #include <algorithm>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -304,7 +304,7 @@ Matrix6d Smoother::State::poseCovariance(std::size_t pose) const
   if (isSolved({true, pose}))
     return window->covariance({{window_places.of({true, pose}), Matrix6d::Identity()}});
   if (pose >= pose_covariances.size())
-    throw vpException(vpException::notInitialized, "pose = %zu, must be in the window or taken in by optimize()", pose);
+    throw notInitialized("pose = {}, must be in the window or taken in by optimize()", pose);
   return pose_covariances[pose];
 }
 
@@ -316,7 +316,7 @@ Eigen::MatrixXd Smoother::State::relativeCovariance(std::size_t pose, std::size_
   Matrix45d J_trunk;
   relativeTrunk(poses[pose], options.bMc, trunks[trunk].value, &J_pose, &J_trunk);
   if (!J_pose.allFinite() || !J_trunk.allFinite())
-    throw vpException(vpException::badValue, "trunk = %zu, must not contain the camera", trunk);
+    throw badValue("trunk = {}, must not contain the camera", trunk);
   if (isSolved({true, pose}) && isSolved({false, trunk}))
     return window->covariance(
         {{window_places.of({true, pose}), which * J_pose}, {window_places.of({false, trunk}), which * J_trunk}});
