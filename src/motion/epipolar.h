@@ -22,6 +22,14 @@ constexpr double kKernel = 3;   ///< residuals lose half their weight near this 
 constexpr int kHypotheses = 48; ///< two-point directions tried without a prior
 constexpr unsigned kSeed = 1;   ///< of the draws
 
+/// A camera whose focal lengths are \p factor times those of \p camera.
+inline PinholeCamera withFocal(PinholeCamera camera, double factor)
+{
+  camera.fx *= factor;
+  camera.fy *= factor;
+  return camera;
+}
+
 /// Matches as (x, y, 1) of both frames.
 struct Rays
 {

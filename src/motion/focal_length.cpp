@@ -39,13 +39,6 @@ constexpr std::size_t kTurnMatches = 25;
 
 double logFactor(double step) { return kShortest + kStep * step; }
 
-PinholeCamera withFocal(PinholeCamera camera, double factor)
-{
-  camera.fx *= factor;
-  camera.fy *= factor;
-  return camera;
-}
-
 /// Cost of a frame by focal length: the log of the residual [px] for each point that is explained. Empty where the
 /// frame cannot tell: no start yet under most of them, or lost.
 std::vector<double> costsOf(const std::vector<PointOdometryResult> &placed)
@@ -97,7 +90,7 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &cost
 FocalFinder::FocalFinder(const PinholeCamera &guess) : m_guess(guess)
 {
   for (int k = 0; k < kSteps; ++k)
-    m_odometry.emplace_back(withFocal(guess, std::exp(logFactor(k))), kGuessedFocalSigma);
+    m_odometry.emplace_back(motion::withFocal(guess, std::exp(logFactor(k))), kGuessedFocalSigma);
 }
 
 void FocalFinder::add(const PointTracker &tracker)
@@ -128,7 +121,7 @@ void FocalFinder::addTurn(const PointTracker &tracker)
   ++m_moved;
   std::vector<double> costs;
   for (int k = 0; k < kSteps; ++k) {
-    const PinholeCamera camera = withFocal(m_guess, std::exp(logFactor(k)));
+    const PinholeCamera camera = motion::withFocal(m_guess, std::exp(logFactor(k)));
     const auto turn =
         motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx);
     costs.push_back(std::log(turn.sigma * camera.fx));

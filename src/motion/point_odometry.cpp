@@ -4,7 +4,6 @@
 #include "geometry/median.h"
 
 #include "geometry/constants.h"
-#include "geometry/names.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
 #include <Eigen/Dense>
@@ -99,8 +98,6 @@ struct PointOdometry::State
   int known() const;
   double typicalInverseDepth() const;
 };
-
-const char *toString(PointOdometryStatus status) { return nameOf(status, {"starting", "ok", "rotation_only", "lost"}); }
 
 PointOdometry::PointOdometry(const PinholeCamera &camera, double focal_sigma) : m_state(new State)
 {
@@ -220,11 +217,9 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
   double least = 1e9;
   for (int sigmas = -3; sigmas <= 3; ++sigmas) {
     const double factor = std::exp(sigmas * focal_sigma);
-    PinholeCamera other = camera;
-    other.fx *= factor;
-    other.fy *= factor;
     const double pixel = 1 / (factor * focal());
-    const auto fit = motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel);
+    const auto fit = motion::fitRotation(motion::Rays(matches, motion::withFocal(camera, factor)),
+                                         motion::MotionPrior({}), 0.05 * pixel);
     least = std::min(least, fit.sigma / pixel);
   }
   return least;

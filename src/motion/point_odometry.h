@@ -34,7 +34,6 @@ enum class PointOdometryStatus
   rotation_only, ///< too few points of known depth: the translation is held
   lost           ///< not enough points: nothing but the prediction
 };
-const char *toString(PointOdometryStatus status);
 
 /// Inverse depth of a point in the current image.
 struct PointDepth

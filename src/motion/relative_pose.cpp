@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/relative_pose.h"
 
-#include "geometry/names.h"
 #include "motion/epipolar.h"
 
 #include <Eigen/Dense>
@@ -84,11 +83,6 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
   return *best;
 }
 } // namespace
-
-const char *toString(RelativePoseStatus status)
-{
-  return nameOf(status, {"ok", "too_few_points", "no_parallax", "ambiguous", "inconsistent"});
-}
 
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
                                           const RelativePosePrior &given, double min_sigma_px)

@@ -54,7 +54,6 @@ enum class RelativePoseStatus
   ambiguous,      ///< two motions explain the matches equally well (a plane in view, no prior)
   inconsistent    ///< the matches do not agree on a motion: rotation and direction are the prior's
 };
-const char *toString(RelativePoseStatus status);
 
 struct RelativePoseEstimate
 {

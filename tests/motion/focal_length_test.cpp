@@ -4,6 +4,7 @@
 
 #include "geometry/so3.h"
 #include "motion/bundle.h"
+#include "motion/epipolar.h"
 #include "motion/focal_length.h"
 #include <bole/open_source.h>
 #include <bole/trunk.h>
@@ -14,18 +15,10 @@ using namespace bole;
 using namespace bole::test;
 using motion::reprojection;
 
-PinholeCamera guessOf(const PinholeCamera &camera, double factor)
-{
-  PinholeCamera guess = camera;
-  guess.fx *= factor;
-  guess.fy *= factor;
-  return guess;
-}
-
 /// Of a camera that sees drawn walls from each pose.
 template <typename PoseOf> FocalEstimate estimateOf(double off, PoseOf poseOf)
 {
-  const PinholeCamera camera, guess = guessOf(camera, off);
+  const PinholeCamera camera, guess = motion::withFocal(camera, off);
   PointTracker tracker(guess);
   FocalFinder focal(guess);
   for (int k = 0; k < 40; ++k) {
@@ -50,7 +43,7 @@ TEST(FocalLength, AFlightThroughAWoodTellsItFromAGuessThatIsOffByAThird)
 {
   for (const double off : {0.75, 1.33}) {
     const auto source = openSource(BOLE_SOURCE_DIR "/data/park-forward");
-    const PinholeCamera guess = guessOf(source->camera(), off);
+    const PinholeCamera guess = motion::withFocal(source->camera(), off);
     PointTracker tracker(guess);
     FocalFinder focal(guess);
     for (Frame frame; source->next(frame);) {

@@ -161,7 +161,7 @@ TEST(RelativePose, APlaneInViewNeedsTheGyro)
   // Without it one of the plane's two motions, and if both fit, the status says so.
   const auto without = estimateRelativePose(matches, kCamera);
   EXPECT_TRUE(without.status == RelativePoseStatus::ambiguous || directionErrorDeg(without.direction, aMb.t) < 8)
-      << toString(without.status) << " " << without.direction.transpose();
+      << without.direction.transpose();
 }
 
 RelativePosePrior gyroOf(const Pose &aMb)
