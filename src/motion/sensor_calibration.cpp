@@ -476,7 +476,7 @@ SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_
     motion.a_ns = frames[motion.a_index].stamp_ns;
     motion.b_ns = frame.stamp_ns;
     std::vector<PointMatch> matches = tracker.matches(back);
-    motion.points = motion.estimate = estimateRelativePose(matches, camera);
+    motion.points = estimateRelativePose(matches, camera);
     motions.push_back(motion);
     if (motions.size() % kLensEvery == 0 && motion.points.hasDirection())
       pairs.push_back(std::move(matches));
