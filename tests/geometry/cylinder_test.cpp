@@ -195,16 +195,6 @@ TEST(RelativeTrunk, PlusAndMinusAreInverse)
   EXPECT_LT(x.plus(Vector4d::Zero()).minus(x).norm(), 1e-12);
 }
 
-TEST(RelativeTrunk, LeftBorderIsLeftInTheImage)
-{
-  const PinholeCamera camera;
-  Trunk trunk;
-  trunk.xy = {4, 0.3};
-  const RelativeTrunk relative = relativeTrunk(Pose(Eigen::Matrix3d::Identity(), {0, 0, 1.2}), kBodyToCamera, trunk);
-  EXPECT_LT(camera.project(relative.borderDirection(Border::left, 0)).x(),
-            camera.project(relative.borderDirection(Border::right, 0)).x());
-}
-
 TEST(RelativeTrunk, RadiusGivesTheTrunkBack)
 {
   Trunk trunk = leaningTrunk();
