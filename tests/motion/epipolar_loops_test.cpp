@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/test.h"
+#include "support/differences.h"
 
 #include "motion/epipolar.h"
 
@@ -34,17 +34,12 @@ std::vector<double> residualsAt(const Rays &rays, const Motion &motion, double s
 /// Of all residuals, by rotation and direction: central differences at the step \p h.
 Eigen::MatrixXd derivatives(const Rays &rays, double h, double shear = 0)
 {
-  Eigen::MatrixXd J(rays.size(), 5);
-  for (int k = 0; k < 5; ++k) {
-    const auto at = [&](double step) {
-      const Vector5d xi = step * Vector5d::Unit(k);
-      const auto r = residualsAt(
-          rays, {kMotion.aRb * expSo3(xi.head<3>()), directionPlus(kMotion.direction, xi.tail<2>())}, shear);
-      return Eigen::VectorXd(Eigen::VectorXd::Map(r.data(), static_cast<Eigen::Index>(r.size())));
-    };
-    J.col(k) = (at(h) - at(-h)) / (2 * h);
-  }
-  return J;
+  const auto residuals = [&](const Vector5d &xi) {
+    const auto r =
+        residualsAt(rays, {kMotion.aRb * expSo3(xi.head<3>()), directionPlus(kMotion.direction, xi.tail<2>())}, shear);
+    return Eigen::VectorXd(Eigen::VectorXd::Map(r.data(), static_cast<Eigen::Index>(r.size())));
+  };
+  return test::differences(residuals, 5, h);
 }
 
 /// Near the epipole a line is drawn by noise.

@@ -46,6 +46,19 @@ void expectSound(const Saliency &saliency)
   EXPECT_TRUE(saliency.covariance.allFinite());
 }
 
+/// Of the post and of the wall behind it, as they are seen from \p wMc.
+std::pair<double, double> meanBackground(const Saliency &saliency, const WallAndPost &scene, const Pose &wMc)
+{
+  double post = 0, wall = 0, posts = 0, walls = 0;
+  for (int v = 20; v < 220; ++v)
+    for (int u = 20; u < 300; ++u) {
+      const bool on = scene.onPost(wMc, u, v);
+      (on ? post : wall) += saliency.p_background[v][u];
+      ++(on ? posts : walls);
+    }
+  return {post / posts, wall / walls};
+}
+
 TEST(Saliency, FindsARenderedRotationWithoutGyro)
 {
   const WallAndPost scene;
@@ -73,15 +86,9 @@ TEST(Saliency, LabelsAPatchThatMovesOtherwiseThanTheBackground)
 
   const Saliency saliency = estimator.update(scene.view(now), turned(turn));
 
-  double post = 0, wall = 0, posts = 0, walls = 0;
-  for (int v = 20; v < 220; ++v)
-    for (int u = 20; u < 300; ++u) {
-      const bool on = scene.onPost(now, u, v);
-      (on ? post : wall) += saliency.p_background[v][u];
-      ++(on ? posts : walls);
-    }
-  EXPECT_LT(post / posts, 0.55);
-  EXPECT_GT(wall / walls, 0.75);
+  const auto [post, wall] = meanBackground(saliency, scene, now);
+  EXPECT_LT(post, 0.55);
+  EXPECT_GT(wall, 0.75);
 }
 
 TEST(Saliency, LabelsANearPostByItsRangeWhereTheTranslationIsGiven)
@@ -97,15 +104,9 @@ TEST(Saliency, LabelsANearPostByItsRangeWhereTheTranslationIsGiven)
     saliency = estimator.update(scene.view(wMc), turned(Eigen::Matrix3d::Identity()), moved(step));
   }
 
-  double post = 0, wall = 0, posts = 0, walls = 0;
-  for (int v = 20; v < 220; ++v)
-    for (int u = 20; u < 300; ++u) {
-      const bool on = scene.onPost(wMc, u, v);
-      (on ? post : wall) += saliency.p_background[v][u];
-      ++(on ? posts : walls);
-    }
-  EXPECT_LT(post / posts, 0.1);
-  EXPECT_GT(wall / walls, 0.9);
+  const auto [post, wall] = meanBackground(saliency, scene, wMc);
+  EXPECT_LT(post, 0.1);
+  EXPECT_GT(wall, 0.9);
 }
 
 TEST(Saliency, NeverLeavesZeroToOneOnExtremeImages)
