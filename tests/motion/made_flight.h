@@ -10,6 +10,7 @@
 #include <bole/open_source.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 namespace bole::test
@@ -126,4 +127,19 @@ struct MadeFlight
     points.covariance += 1e-6 * Matrix5d::Identity();
   }
 };
+
+/// Odometry and accelerometer are as noisy as those of a small drone.
+inline MadeFlight noisyFlight()
+{
+  MadeFlight flight;
+  flight.odometry_noise = 0.012;
+  flight.force_noise = 0.1;
+  return flight;
+}
+
+inline void eachRate(Frame &frame, const std::function<Eigen::Vector3d(const Eigen::Vector3d &)> &change)
+{
+  for (GyroSample &sample : frame.gyro)
+    sample.rate = change(sample.rate);
+}
 } // namespace bole::test

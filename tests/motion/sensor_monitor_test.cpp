@@ -9,6 +9,7 @@ using namespace bole;
 namespace
 {
 using Eigen::Vector3d;
+using test::eachRate;
 using test::MadeFlight;
 constexpr double kBegins_s = 5;
 
@@ -16,11 +17,9 @@ constexpr double kBegins_s = 5;
 SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8,
                   double sway = 1.2)
 {
-  MadeFlight flight;
+  MadeFlight flight = test::noisyFlight();
   flight.sway = sway;
   flight.frame_rate = rate;
-  flight.odometry_noise = 0.012;
-  flight.force_noise = 0.1;
   SensorMonitor monitor(forwardCamera());
   for (std::size_t i = 0; i < static_cast<std::size_t>(duration_s * rate); ++i) {
     Frame frame = flight.frame(i);
@@ -28,12 +27,6 @@ SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, 
     monitor.process(frame, flight.seen(i));
   }
   return monitor;
-}
-
-void eachRate(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
-{
-  for (GyroSample &sample : frame.gyro)
-    sample.rate = change(sample.rate);
 }
 
 bool isLate(const Frame &frame) { return frame.stamp_ns >= nsOf(kBegins_s); }
