@@ -48,14 +48,11 @@ void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
 
 EpipolarTerms termsOf(const Motion &motion, double sigma)
 {
-  constexpr double kEpipole = 0.04; // [rad]: 4 px of a small camera
   EpipolarTerms terms;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.E) = skew(motion.direction) * motion.aRb;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.R) = motion.aRb;
   Matrix32d::Map(terms.B) = directionBasis(motion.direction);
   terms.sigma = sigma;
-  terms.kernel = kKernel;
-  terms.epipole = kEpipole;
   return terms;
 }
 
@@ -109,13 +106,12 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
   constexpr int kIterations = 15;
   RotationFit fit;
   fit.aRb = prior.aRb;
-  std::vector<double> residuals(2 * rays.size()), weights(rays.size());
+  std::vector<double> residuals(2 * rays.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const TransferTerms terms = {fit.aRb.data(), kKernel};
-    transferResiduals(rays.columns, terms, residuals.data());
+    transferResiduals(rays.columns, fit.aRb.data(), residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, weights.data());
+    const TransferSums sums = sumsOfTransfers(rays.columns, fit.aRb.data(), residuals.data(), variance);
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     H /= variance * kInflation;

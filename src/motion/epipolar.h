@@ -18,7 +18,6 @@ namespace bole::motion
 /// Covariance is multiplied by this: errors of neighbouring tracks are not independent. Chosen so that the normalised
 /// error squared of the rendered flights is near its degrees of freedom.
 constexpr double kInflation = 3;
-constexpr double kKernel = 3;   ///< residuals lose half their weight near this many sigmas
 constexpr int kHypotheses = 48; ///< two-point directions tried without a prior
 constexpr unsigned kSeed = 1;   ///< of the draws
 
