@@ -15,7 +15,6 @@ constexpr double kNearPrior = 0.3;      // p(nearer than near_range) before look
 constexpr float kOutside = 1;           // residual where the older image ends: as bad as any, so that it says nothing
 constexpr double kResidualSigma = 0.05; // 1 = full scale; above a pixel's noise: light, leaves, model
 constexpr float kDecay = 0.8f;          // share of the evidence that a frame inherits
-constexpr double kUnrelatedPx = 2.5;    // two unrelated places of the same texture differ as if so far apart
 
 std::size_t index(int i, int j, int width)
 {
@@ -149,10 +148,8 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   }
   // log of the likelihood of the window's residual, a Student's t, over that of an unrelated window; never below 0:
   // where no step matches (the place was hidden, or left the image) none is preferred.
-  constexpr float kWeight = 2.5f;
-  addLikelihoods({static_cast<float>(m_intensity_variance), static_cast<float>(kUnrelatedPx * kUnrelatedPx),
-                  flow_variance.data(), kWeight},
-                 g2, m_residuals.data(), pixels, m_evidence.data());
+  addLikelihoods(static_cast<float>(m_intensity_variance), flow_variance.data(), g2, m_residuals.data(), pixels,
+                 m_evidence.data());
 }
 
 vpImage<float> InverseDepthEvidence::logOddsNear() const

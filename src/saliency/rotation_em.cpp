@@ -12,12 +12,11 @@ namespace bole
 {
 namespace
 {
-constexpr double kConvergedStep = 1e-4;   // [rad], 0.02 px at f = 200 px
-constexpr float kTextureGradient = 0.01f; // [1/px]; below, intensity noise hides a pixel of motion
-constexpr double kSigmaIntensity = 0.02;  // noise of a pixel, 1 = full scale: 1 to 3 % in rendered and real video
-constexpr int kIterations = 5;            // of EM, a level
-constexpr double kPull = 0.004;           // how far near things pull the rotation [rad]: .1 to .3 degrees in forests
-constexpr double kCorrelation = 30;       // pixels that count as one independent measurement: neighbours share errors
+constexpr double kConvergedStep = 1e-4;  // [rad], 0.02 px at f = 200 px
+constexpr double kSigmaIntensity = 0.02; // noise of a pixel, 1 = full scale: 1 to 3 % in rendered and real video
+constexpr int kIterations = 5;           // of EM, a level
+constexpr double kPull = 0.004;          // how far near things pull the rotation [rad]: .1 to .3 degrees in forests
+constexpr double kCorrelation = 30;      // pixels that count as one independent measurement: neighbours share errors
 
 /// Gauss-Newton sums of one M-step.
 struct NormalEquations
@@ -75,7 +74,7 @@ public:
       row.current = imagesOf(m_current, row.row);
       row.y = static_cast<float>((row.row - camera.cy) / camera.fy);
       Eigen::Vector3f::Map(row.base) = static_cast<float>(row.row) * warp.H.col(1) + warp.H.col(2);
-      add(sumsOfRow(row, kTextureGradient, m_scratch, log_ratio ? (*log_ratio)[row.row] : nullptr), sums);
+      add(sumsOfRow(row, m_scratch, log_ratio ? (*log_ratio)[row.row] : nullptr), sums);
     }
     return sums;
   }

@@ -127,8 +127,9 @@ void sampleRow(const RotationRow &row, const float *x, const float *y, const flo
 }
 
 BOLE_VECTOR_CLONES
-RotationSums addPixels(const RotationRow &row, float texture_gradient, const float *columns, float *__restrict ratios)
+RotationSums addPixels(const RotationRow &row, const float *columns, float *__restrict ratios)
 {
+  constexpr float kTextureGradient = 0.01f; // [1/px]; below, intensity noise hides a pixel of motion
   const std::ptrdiff_t n = row.width;
   const int end = row.width - 1;
   const float *is_inside = columns + kInside * n;
@@ -138,7 +139,6 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
   const LevelNoise noise = row.noise;
   const float fx = row.fx, fy = row.fy, cx = row.cx, y = row.y;
   const float inverse_fx = 1 / fx;
-  const float texture2 = texture_gradient * texture_gradient;
   float h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0, used = 0, textured = 0;
 #pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2, used, textured)
   for (int j = 1; j < end; ++j) {
@@ -159,7 +159,7 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
     const float weight = inside * (p_b * of_b + (1 - p_b) * of_f);
     ratios[j] = inside * ratio;
     used += inside;
-    textured += square > texture2 ? inside : 0.f;
+    textured += square > kTextureGradient * kTextureGradient ? inside : 0.f;
     const float w0 = weight * j0, w1 = weight * j1, w2 = weight * j2;
     h00 += w0 * j0, h01 += w0 * j1, h02 += w0 * j2, h11 += w1 * j1, h12 += w1 * j2, h22 += w2 * j2;
     g0 += w0 * r, g1 += w1 * r, g2 += w2 * r;
@@ -168,7 +168,7 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
 }
 } // namespace
 
-RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vector<float> &scratch, float *log_ratio)
+RotationSums sumsOfRow(const RotationRow &row, std::vector<float> &scratch, float *log_ratio)
 {
   const std::ptrdiff_t n = row.width;
   scratch.resize(static_cast<std::size_t>(kColumns * n));
@@ -176,7 +176,7 @@ RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vect
   placesOfRow(row, columns + kX * n, columns + kY * n, columns + kInside * n);
   sampleRow(row, columns + kX * n, columns + kY * n, columns + kInside * n, columns + kGrey * n,
             columns + kGradientX * n, columns + kGradientY * n);
-  const RotationSums sums = addPixels(row, texture_gradient, columns, columns + kRatio * n);
+  const RotationSums sums = addPixels(row, columns, columns + kRatio * n);
   if (log_ratio)
     std::copy(columns + kRatio * n + 1, columns + kColumns * n - 1, log_ratio + 1);
   return sums;
@@ -310,21 +310,23 @@ void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, f
 }
 
 BOLE_VECTOR_CLONES
-void addLikelihoods(const LikelihoodTerms &terms, const float *g2, const float *r2, std::size_t pixels,
+void addLikelihoods(float intensity, const float *flow_variance, const float *g2, const float *r2, std::size_t pixels,
                     float *__restrict evidence)
 {
-  float flow_variance[kSteps];
-  std::copy_n(terms.flow_variance, kSteps, flow_variance);
-  const float intensity = terms.intensity, weight = terms.weight;
+  constexpr float kWeight = 2.5f;
+  constexpr float kUnrelated_px = 2.5f; // two unrelated places of the same texture differ as if so far apart
+  float flow[kSteps];
+  std::copy_n(flow_variance, kSteps, flow);
   for (std::size_t p = 0; p < pixels; ++p, r2 += kSteps, evidence += kSteps) {
-    const float square = g2[p], unrelated = intensity + square * terms.unrelated, to_unrelated = 1 / unrelated;
+    const float square = g2[p], unrelated = intensity + square * (kUnrelated_px * kUnrelated_px),
+                to_unrelated = 1 / unrelated;
 #pragma omp simd
     for (int k = 0; k < kSteps; ++k) {
-      const float variance = intensity + square * flow_variance[k];
+      const float variance = intensity + square * flow[k];
       // Without texture both variances are the same, and even a perfect match says nothing.
       const float gain = std::max(2 - variance * to_unrelated, 0.5f);
       const float ratio = gain * std::sqrt(unrelated * variance) / (variance + r2[k]);
-      evidence[k] += weight * std::max(0.f, fastLog(ratio));
+      evidence[k] += kWeight * std::max(0.f, fastLog(ratio));
     }
   }
 }

@@ -48,7 +48,7 @@ struct RotationSums
 
 /// The E-step of the pixels of a row (Eq. 10 and 11) and their share of the M-step (Eq. 16). \p scratch keeps its
 /// memory from row to row; \p log_ratio, where given, gets log p(r | background) - log p(r | foreground).
-RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vector<float> &scratch, float *log_ratio);
+RotationSums sumsOfRow(const RotationRow &row, std::vector<float> &scratch, float *log_ratio);
 
 // The loops of InverseDepthEvidence over one row of pixels, each pixel with all its steps of inverse depth.
 
@@ -67,7 +67,7 @@ void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, 
                            float outside, float *out);
 
 /// out[step] of each pixel: \p decay times the evidence of the place and depth that it was in the older frame; 0 where
-/// there was none. \p step_of_k: root of the inverse depth of each step, in steps.
+/// there was none.
 void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, float rows_per_pixel, int width,
                         float decay, float *out);
 
@@ -79,17 +79,9 @@ void meansDownColumns(const float *in, int rows, int columns, int window, float 
 
 void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, float *out);
 
-/// What the likelihood of a window's residual, against that of an unrelated window, is made of.
-struct LikelihoodTerms
-{
-  float intensity;            ///< variance
-  float unrelated;            ///< variance of the flow between unrelated windows [px^2]
-  const float *flow_variance; ///< of each step [px^2]
-  float weight;
-};
-
-/// Adds the log-likelihood of \p r2 to \p evidence of \p pixels pixels; \p g2: mean square gradients.
-void addLikelihoods(const LikelihoodTerms &terms, const float *g2, const float *r2, std::size_t pixels,
+/// Adds the log-likelihood of the windows' residuals \p r2, against that of unrelated windows, to \p evidence of \p
+/// pixels pixels. \p g2: mean square gradients, \p intensity: variance, \p flow_variance: of each step [px^2].
+void addLikelihoods(float intensity, const float *flow_variance, const float *g2, const float *r2, std::size_t pixels,
                     float *evidence);
 
 /// log p(near) - log p(far) of each pixel; \p is_near: 1 or 0 for each step.
