@@ -137,9 +137,26 @@ inline MadeFlight noisyFlight()
   return flight;
 }
 
-inline void eachRate(Frame &frame, const std::function<Eigen::Vector3d(const Eigen::Vector3d &)> &change)
+using Damage = std::function<void(Frame &)>;
+
+/// Changes each rate of the gyro.
+inline Damage rates(const std::function<void(Eigen::Vector3d &)> &change)
 {
-  for (GyroSample &sample : frame.gyro)
-    sample.rate = change(sample.rate);
+  return [change](Frame &frame) {
+    for (GyroSample &sample : frame.gyro)
+      change(sample.rate);
+  };
+}
+
+constexpr double kBegins_s = 5; ///< damage that is late
+
+inline bool isLate(const Frame &frame) { return frame.stamp_ns >= nsOf(kBegins_s); }
+
+inline Damage late(const Damage &damage)
+{
+  return [damage](Frame &frame) {
+    if (isLate(frame))
+      damage(frame);
+  };
 }
 } // namespace bole::test

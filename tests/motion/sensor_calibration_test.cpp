@@ -13,9 +13,10 @@ namespace
 {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using test::eachRate;
+using test::late;
 using test::MadeFlight;
 using test::noisyFlight;
+using test::rates;
 
 /// Eight seconds, the stamps of the sensors late by these times; \p damage changes a frame before it is looked at, \p
 /// look the rotation that points saw, in the axes of the camera.
@@ -90,8 +91,7 @@ TEST(SensorCalibration, SensorsInOrderAreReadAsStated)
 TEST(SensorCalibration, ABiasOfTheGyroIsFoundWithItsSigma)
 {
   for (const Vector3d &bias : {Vector3d(0, 0, 0.05), Vector3d(0.1, -0.05, 0.02)}) {
-    const SensorCalibration calibration =
-        fly(noisyFlight(), [&](Frame &f) { eachRate(f, [&](const Vector3d &w) { return Vector3d(w + bias); }); });
+    const SensorCalibration calibration = fly(noisyFlight(), rates([&](Vector3d &w) { w += bias; }));
     const CalibratedConstant *found = constant(calibration, "gyro_bias");
     ASSERT_TRUE(found && found->used);
     EXPECT_LT((calibration.gyro_bias - bias).norm(), 3 * std::sqrt(3.0) * found->sigma + 1e-3);
@@ -181,15 +181,8 @@ TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFaul
 
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
 {
-  const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= nsOf(5); };
-  expectAsStated(fly(noisyFlight(), [&](Frame &f) {
-    if (isLate(f))
-      eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); });
-  }));
-  expectAsStated(fly(noisyFlight(), [&](Frame &f) {
-    if (isLate(f))
-      eachRate(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
-  }));
+  expectAsStated(fly(noisyFlight(), late(rates([](Vector3d &w) { w.z() += 0.05; }))));
+  expectAsStated(fly(noisyFlight(), late(rates([](Vector3d &w) { w.setZero(); }))));
 }
 
 TEST(SensorCalibration, ACameraFileOfAnotherFocalLengthIsNamed)
@@ -224,8 +217,7 @@ TEST(SensorCalibration, ACameraThatStandsOtherwiseOnTheBodyIsNamed)
 TEST(SensorCalibration, AScaleOfTheGyroIsNamedAndNoCameraBlamed)
 {
   for (const double factor : {0.8, 1.1, 1.3}) {
-    const SensorCalibration calibration =
-        fly(noisyFlight(), [&](Frame &f) { eachRate(f, [&](const Vector3d &w) { return Vector3d(factor * w); }); });
+    const SensorCalibration calibration = fly(noisyFlight(), rates([&](Vector3d &w) { w *= factor; }));
     ASSERT_EQ(calibration.verdicts.size(), 1u) << factor;
     EXPECT_EQ(calibration.verdicts[0].sensor, "gyro") << factor;
     EXPECT_EQ(calibration.verdicts[0].kind, "scale") << calibration.verdicts[0].text;
@@ -235,9 +227,8 @@ TEST(SensorCalibration, AScaleOfTheGyroIsNamedAndNoCameraBlamed)
 TEST(SensorCalibration, CameraAndGyroWithinWhatTheyAreStatedToAreNotNamed)
 {
   const Matrix3d R = expSo3({0.012, -0.012, 0.012});
-  const SensorCalibration calibration = fly(
-      noisyFlight(), [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(1.01 * w); }); }, 0, 0,
-      [&](const Matrix3d &aRb) {
+  const SensorCalibration calibration =
+      fly(noisyFlight(), rates([](Vector3d &w) { w *= 1.01; }), 0, 0, [&](const Matrix3d &aRb) {
         const Vector3d angle = logSo3(R.transpose() * aRb * R);
         return expSo3({angle.x() / 1.01, angle.y() / 1.01, angle.z()});
       });
@@ -246,8 +237,7 @@ TEST(SensorCalibration, CameraAndGyroWithinWhatTheyAreStatedToAreNotNamed)
 
 TEST(SensorCalibration, AxesThatAreExchangedAreNoConstant)
 {
-  expectAsStated(fly(noisyFlight(),
-                     [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); }));
+  expectAsStated(fly(noisyFlight(), rates([](Vector3d &w) { w.z() *= -1; })));
 }
 
 namespace

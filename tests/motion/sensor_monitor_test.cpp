@@ -9,13 +9,14 @@ using namespace bole;
 namespace
 {
 using Eigen::Vector3d;
-using test::eachRate;
+using test::isLate;
+using test::kBegins_s;
+using test::late;
 using test::MadeFlight;
-constexpr double kBegins_s = 5;
+using test::rates;
 
 /// \p damage changes a frame before the monitor sees it.
-SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8,
-                  double sway = 1.2)
+SensorMonitor fly(const test::Damage &damage, double rate = 10, double duration_s = 8, double sway = 1.2)
 {
   MadeFlight flight = test::noisyFlight();
   flight.sway = sway;
@@ -29,12 +30,10 @@ SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, 
   return monitor;
 }
 
-bool isLate(const Frame &frame) { return frame.stamp_ns >= nsOf(kBegins_s); }
-
 struct Fault
 {
   const char *name;
-  std::function<void(Frame &)> damage;
+  test::Damage damage;
   Sensor sensor;
   const char *kind;
 };
@@ -43,36 +42,14 @@ std::vector<Fault> faults()
 {
   const auto pitched = [](double angle) { return expSo3({0, angle, 0}); };
   return {
-      {"bias", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); }); },
-       Sensor::gyro, "bias"},
-      {"sign", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); },
-       Sensor::gyro, "rotation"},
-      {"swapped", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.y(), w.x(), w.z()); }); },
-       Sensor::gyro, nullptr}, // in a flight that hardly rolls it looks like a bias
-      {"zero",
-       [](Frame &f) {
-         if (isLate(f))
-           eachRate(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
-       },
-       Sensor::gyro, nullptr},
-      {"silent",
-       [](Frame &f) {
-         if (isLate(f))
-           f.gyro.clear();
-       },
-       Sensor::gyro, "ended"},
-      {"ends",
-       [](Frame &f) {
-         if (isLate(f))
-           f.wMb_odometry.reset();
-       },
-       Sensor::odometry, "ended"},
-      {"jumps",
-       [](Frame &f) {
-         if (isLate(f))
-           f.wMb_odometry->t.y() += 1;
-       },
-       Sensor::odometry, "jump"},
+      {"bias", rates([](Vector3d &w) { w.z() += 0.05; }), Sensor::gyro, "bias"},
+      {"sign", rates([](Vector3d &w) { w.z() *= -1; }), Sensor::gyro, "rotation"},
+      {"swapped", rates([](Vector3d &w) { std::swap(w.x(), w.y()); }), Sensor::gyro,
+       nullptr}, // in a flight that hardly rolls it looks like a bias
+      {"zero", late(rates([](Vector3d &w) { w.setZero(); })), Sensor::gyro, nullptr},
+      {"silent", late([](Frame &f) { f.gyro.clear(); }), Sensor::gyro, "ended"},
+      {"ends", late([](Frame &f) { f.wMb_odometry.reset(); }), Sensor::odometry, "ended"},
+      {"jumps", late([](Frame &f) { f.wMb_odometry->t.y() += 1; }), Sensor::odometry, "jump"},
       {"counts from the sea", [](Frame &f) { f.wMb_odometry->t.z() += 500; }, Sensor::odometry, "height"},
       {"counts down", [](Frame &f) { f.wMb_odometry->t.z() *= -10; }, Sensor::odometry, "height"},
       {"freezes",
@@ -288,7 +265,7 @@ TEST(SensorMonitor, AGyroThatWasWrongForAMomentIsTrustedAgainAndOneThatStaysWron
 {
   const auto spiked = [](Frame &f) {
     if (isLate(f) && f.stamp_ns < nsOf(kBegins_s + 1))
-      eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 30)); });
+      rates([](Vector3d &w) { w.z() += 30; })(f);
   };
   const SensorMonitor during = fly(spiked, 10, kBegins_s + 1);
   EXPECT_FALSE(during.trusts(Sensor::gyro));
@@ -351,7 +328,7 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
   for (std::size_t i = 0; i < 31; ++i) {
     Frame frame = flight.frame(i);
     if (i == 30)
-      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 1)); });
+      rates([](Vector3d &w) { w.z() += 1; })(frame);
     monitor.process(frame, flight.seen(i));
     EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30) << i;
     Frame scratch;
@@ -384,7 +361,7 @@ TEST(SensorMonitor, ATurnThatCannotBeIsLeftOutBeforeThePointsAreLookedFor)
     frame.wMb_odometry->R = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix() * frame.wMb_odometry->R;
   };
   EXPECT_EQ(leftOut([](Frame &) {}), std::make_pair(0, 0));
-  const auto wild = [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); }); };
+  const auto wild = rates([](Vector3d &w) { w.x() += 30; });
   EXPECT_EQ(leftOut(wild), std::make_pair(10, 0));
   EXPECT_EQ(leftOut([&](Frame &f) { turned(f, 0.5); }), std::make_pair(0, 1)) << "a heading that is corrected once";
 }
@@ -398,7 +375,7 @@ TEST(SensorMonitor, WithoutAnOdometryNoBodyBeginsToTurnAsFastAsAWildGyroSays)
     frame.wMb_odometry.reset();
     const bool is_wild = i >= 30 && i < 40;
     if (is_wild)
-      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); });
+      rates([](Vector3d &w) { w.x() += 30; })(frame);
     EXPECT_EQ(monitor.withoutRejectedSensors(frame, scratch).gyro.empty(),
               i == 0 || is_wild || !monitor.trusts(Sensor::gyro))
         << i;
