@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
+#include "geometry/failure.h"
 #include "geometry/median.h"
 #include "motion/coarse_shift.h"
 #include "motion/image_view.h"
@@ -11,9 +12,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fmt/format.h>
 #include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -124,11 +123,9 @@ PointTracker &PointTracker::operator=(PointTracker &&) noexcept = default;
 void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matrix3d &aRb)
 {
   const cv::Mat current = viewOf(image);
-  if (current.cols != m_state->camera.width || current.rows != m_state->camera.height) {
-    throw vpException(vpException::dimensionError,
-                      fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
-                                  m_state->camera.width, m_state->camera.height));
-  }
+  if (current.cols != m_state->camera.width || current.rows != m_state->camera.height)
+    throw dimensionError("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
+                         m_state->camera.width, m_state->camera.height);
   buildPyramid(current, kLevels, m_state->next);
   m_state->brightness_change = 0;
   if (!m_state->pyramid.empty() && !m_state->tracks.empty())
