@@ -12,9 +12,7 @@ namespace bole
 namespace
 {
 constexpr double kNearPrior = 0.3;      // p(nearer than near_range) before looking
-constexpr float kOutside = 1;           // residual where the older image ends: as bad as any, so that it says nothing
 constexpr double kResidualSigma = 0.05; // 1 = full scale; above a pixel's noise: light, leaves, model
-constexpr float kDecay = 0.8f;          // share of the evidence that a frame inherits
 
 std::size_t index(int i, int j, int width)
 {
@@ -82,7 +80,7 @@ void InverseDepthEvidence::predict(const Pose &pMc)
 {
   RowsSeen seen(m_camera, pMc, m_rho);
   for (int i = 0; i < m_rows; ++i)
-    movedEvidenceOfRow(seen(i * kRowStep), m_evidence.data(), m_rows, 1.f / kRowStep, m_camera.width, kDecay,
+    movedEvidenceOfRow(seen(i * kRowStep), m_evidence.data(), m_rows, 1.f / kRowStep, m_camera.width,
                        &m_scratch[index(i, 0, m_camera.width)]);
   m_evidence.swap(m_scratch);
 }
@@ -118,7 +116,7 @@ void InverseDepthEvidence::compare(const PyramidLevel &older, const PyramidLevel
   m_line.resize(index(0, width + window, width));
   for (int i = 0; i < m_rows; ++i) {
     squaredResidualsOfRow(seen(i * kRowStep), older.image.bitmap, static_cast<int>(older.image.getWidth()),
-                          current.image[static_cast<unsigned>(i * kRowStep)], width, kOutside * kOutside,
+                          current.image[static_cast<unsigned>(i * kRowStep)], width,
                           m_line.data() + window / 2 * kInverseDepths);
     meansOfRow(m_line, width, kInverseDepths, window, &m_scratch[index(i, 0, width)]);
   }

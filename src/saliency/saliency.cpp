@@ -103,7 +103,6 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   if (isStale(image)) {
     Saliency result;
     fill(m_labels, result);
-    result.status = SaliencyStatus::stale;
     result.covariance.setZero();
     return result;
   }
@@ -175,16 +174,11 @@ RotationEm SaliencyEstimator::refineRotation(const ImagePyramid &current, Salien
 {
   const RotationEm rotation =
       estimateRotation(m_views.front().pyramid, current, m_gyro, m_last_turn, m_options, !asksForRange());
-  const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
   result.pRc = rotation.pRc;
   result.covariance = rotation.covariance;
-  result.status = m_gyro ? SaliencyStatus::with_gyro : SaliencyStatus::without_gyro;
+  const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
   const bool off_gyro = m_gyro && logSo3(fallback.transpose() * rotation.pRc).norm() > kMaxTurnOffGyro;
-  if (rotation.texture < kLeastTexture)
-    result.status = SaliencyStatus::no_texture;
-  else if (!rotation.pRc.allFinite() || !rotation.covariance.allFinite() || off_gyro)
-    result.status = SaliencyStatus::not_converged;
-  if (result.status == SaliencyStatus::no_texture || result.status == SaliencyStatus::not_converged) {
+  if (rotation.texture < kLeastTexture || !rotation.pRc.allFinite() || !rotation.covariance.allFinite() || off_gyro) {
     result.pRc = fallback;
     result.covariance = m_gyro ? m_gyro->covariance : Eigen::Matrix3d(Eigen::Matrix3d::Identity() * 0.1);
   }

@@ -9,7 +9,9 @@
 /// than the background. Pixels that no frame has told anything about are "unknown".
 ///
 /// Frames: p previous camera, c current camera. Images are rectified, all of the size of the camera.
-/// Errors: an image of another size throws vpException; everything else that may happen to a frame is a status.
+/// Errors: an image of another size throws vpException. Where the images do not tell the rotation it is that of the
+/// gyro, or none. The first frame is unknown everywhere; the same image once more changes no label, and its motion is
+/// kept for the next frame.
 /// Cost: 2 ms a frame of 320x240 (src/doc/saliency.md). Not thread-safe; no globals.
 ///
 ///     SaliencyEstimator estimator(camera);
@@ -177,21 +179,10 @@ struct TranslationPrior
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity() * 1e-4; ///< [m^2]
 };
 
-enum class SaliencyStatus
-{
-  first_frame,  ///< nothing to compare with: all unknown
-  with_gyro,    ///< rotation from gyro and images
-  without_gyro, ///< rotation from images alone, with robust weights: may be pulled by near things
-  no_texture,   ///< rotation is the prior's (or none); labels say unknown
-  stale,        ///< the same image again: labels of the frame before, motion kept for the next frame
-  not_converged ///< the images did not agree on a rotation: the prior's is returned
-};
-
 constexpr float kUnknownBelow = 0.7f; ///< confidence under which a pixel is unknown
 
 struct Saliency
 {
-  SaliencyStatus status = SaliencyStatus::first_frame;
   vpImage<float> p_background;                              ///< lambda = 1 means background
   vpImage<float> confidence;                                ///< |change of the log odds| by the images; small = unknown
   Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity();        ///< refined rotation from the image before

@@ -213,8 +213,9 @@ inline void locate(const RowWarp &warp, int column, StepPlaces &at)
 
 BOLE_VECTOR_CLONES
 void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, const float *here, int width,
-                           float outside, float *out)
+                           float *out)
 {
+  constexpr float kOutside = 1;
   StepPlaces at;
   int offset[kSteps];
   for (int j = 0; j < width; ++j, out += kSteps) {
@@ -232,15 +233,16 @@ void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, 
       const float p0 = older[offset[k]], p1 = older[offset[k] + 1], q0 = lower[offset[k]], q1 = lower[offset[k] + 1];
       const float upper = p0 + at.x[k] * (p1 - p0), under = q0 + at.x[k] * (q1 - q0);
       const float r = grey - upper - at.y[k] * (under - upper);
-      out[k] = at.is_inside[k] > 0 ? r * r : outside;
+      out[k] = at.is_inside[k] > 0 ? r * r : kOutside;
     }
   }
 }
 
 BOLE_VECTOR_CLONES
 void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, float rows_per_pixel, int width,
-                        float decay, float *out)
+                        float *out)
 {
+  constexpr float kDecay = 0.8f; // what a frame inherits
   constexpr float kLastStep = kSteps - 1.001f;
   StepPlaces at;
   int offset[kSteps];
@@ -256,7 +258,7 @@ void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, fl
       offset[k] = (row * width + column) * kSteps + step;
       share[k] = position - static_cast<float>(step);
       at.x[k] -= static_cast<float>(column);
-      at.is_inside[k] *= decay;
+      at.is_inside[k] *= kDecay;
     }
 #pragma omp simd
     for (int k = 0; k < kSteps; ++k) {

@@ -62,14 +62,15 @@ struct RowWarp
   float max_x, max_y; ///< of a bilinear sample in the older image
 };
 
-/// out[step] of each pixel: squared difference of \p here and \p older; \p outside where the older image ends.
+/// out[step] of each pixel: squared difference of \p here and \p older; where the older image ends as bad as any, so
+/// that it says nothing.
 void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, const float *here, int width,
-                           float outside, float *out);
+                           float *out);
 
-/// out[step] of each pixel: \p decay times the evidence of the place and depth that it was in the older frame; 0 where
+/// out[step] of each pixel: a share of the evidence of the place and depth that it was in the older frame; 0 where
 /// there was none.
 void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, float rows_per_pixel, int width,
-                        float decay, float *out);
+                        float *out);
 
 /// out[i] = mean of the \p window numbers in[i], in[i + lag], ...
 void slidingMeans(const float *in, int n, int lag, int window, float *out);

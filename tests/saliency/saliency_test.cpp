@@ -68,7 +68,6 @@ TEST(Saliency, FindsARenderedRotationWithoutGyro)
 
   const Saliency saliency = estimator.update(scene.view(Pose(turn, {0, 0, 0})));
 
-  EXPECT_EQ(saliency.status, SaliencyStatus::without_gyro);
   EXPECT_LT(errorDegrees(turn, saliency.pRc), 0.03);
 }
 
@@ -134,7 +133,6 @@ TEST(Saliency, KnowsNothingOfABlankImage)
   const Saliency saliency =
       estimator.update(paint(kCamera, [](int, int) { return 0.51; }), turned(turn), moved({0.1, 0, 0}));
 
-  EXPECT_EQ(saliency.status, SaliencyStatus::no_texture);
   EXPECT_LT(*std::max_element(saliency.confidence.bitmap, saliency.confidence.bitmap + saliency.confidence.getSize()),
             kUnknownBelow);
   EXPECT_LT(errorDegrees(turn, saliency.pRc), 1e-6);
@@ -153,7 +151,6 @@ TEST(Saliency, KeepsItsLabelsOnAFrozenFrameAndItsMotionForTheNext)
   const Saliency after = estimator.update(scene.view(Pose(turn * turn, {0.15, 0, 0})), turned(turn),
                                           moved(turn.transpose() * Eigen::Vector3d(0.05, 0, 0)));
 
-  EXPECT_EQ(frozen.status, SaliencyStatus::stale);
   EXPECT_TRUE(std::equal(before.p_background.bitmap, before.p_background.bitmap + before.p_background.getSize(),
                          frozen.p_background.bitmap));
   EXPECT_LT(errorDegrees(turn * turn, after.pRc), 0.05);
