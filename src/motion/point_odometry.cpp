@@ -520,8 +520,9 @@ std::vector<PlacedFrame> PointOdometry::trajectory() const
   return placed;
 }
 
-std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
+std::vector<PointDepth> PointOdometry::depths() const
 {
+  constexpr double kMostRelativeSigma = 0.3;
   std::vector<PointDepth> depths;
   for (const auto &[id, landmark] : m_state->landmarks) {
     const auto seen = m_state->seen.find(id);
@@ -534,7 +535,7 @@ std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
       continue;
     const double sigma = 1 / std::sqrt(landmark.information) / y.z();
     const double inverse_depth = landmark.inverse_depth / y.z();
-    if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma)
+    if (sigma < kMostRelativeSigma * inverse_depth || std::abs(inverse_depth) < sigma)
       depths.push_back({m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
   }
   std::sort(depths.begin(), depths.end(), [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });

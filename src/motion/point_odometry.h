@@ -77,9 +77,9 @@ public:
 
   /// All frames so far; those before the start are placed once the first baseline is known.
   std::vector<PlacedFrame> trajectory() const;
-  /// Points of the current frame whose inverse depth is known to better than \p max_relative_sigma
-  /// (or, being far, indistinguishable from zero).
-  std::vector<PointDepth> depths(double max_relative_sigma = 0.3) const;
+  /// Points of the current frame whose inverse depth is known to better than 30 % (or, being far, indistinguishable
+  /// from zero).
+  std::vector<PointDepth> depths() const;
 
 private:
   struct State;

@@ -96,7 +96,7 @@ TEST(BorderLine, RunsThroughTheProjectedDirectionsOfItsBorder)
 TEST(BorderLine, StaysInsideTheImageLessItsMargin)
 {
   // rolled so far that the line leaves through the side
-  const BorderLine line = borderLine(kCamera, seen(0.6, 4, 2.4), Border::left, {-2, 2}, 4);
+  const BorderLine line = borderLine(kCamera, seen(0.6, 4, 2.4), Border::left, {-2, 2});
   ASSERT_GT(line.rows(), 0);
   for (int v = line.row_begin; v < line.row_end; ++v) {
     EXPECT_GE(line.xAt(v), 4 - 1e-9);

@@ -34,14 +34,14 @@ TEST(PointOdometry, KeepsItsUnitOfLengthAlongThePath)
     EXPECT_LT(logSo3(path[k].wMc.R.transpose() * truth[k].R).norm(), 0.006) << k;
   }
   int near = 0;
-  for (const PointDepth &point : odometry.depths(0.1)) {
+  for (const PointDepth &point : odometry.depths()) {
     const double depth = unit / point.inverse_depth;
     double best = 1e9;
     for (const double z : {5.0, 8.0, 14.0}) {
       const Eigen::Vector3d ray = truth.back().R * kCamera.ray(point.pixel);
       best = std::min(best, std::abs(depth * ray.z() + truth.back().t.z() - z) / z);
     }
-    near += best < 0.1;
+    near += point.sigma < 0.1 * point.inverse_depth && best < 0.1;
   }
   EXPECT_GT(near, 30);
 }
@@ -329,7 +329,7 @@ TEST(GroundPlane, ScaleIsARobustMeanOverFrames)
 {
   ScaleFromHeight scale;
   for (int k = 0; k < 30; ++k)
-    scale.add({true, k % 6 == 0 ? 0.4 : 0.7 + 0.01 * (k % 3 - 1), 0.02, 20}, 1.4, 0.02);
+    scale.add({true, k % 6 == 0 ? 0.4 : 0.7 + 0.01 * (k % 3 - 1), 0.02}, 1.4, 0.02);
   ASSERT_TRUE(scale.known());
   EXPECT_NEAR(scale.metresPerUnit(), 2.0, 0.06);
   EXPECT_GT(scale.relativeSigma(), 0.03);
