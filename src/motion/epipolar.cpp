@@ -15,35 +15,24 @@ namespace bole::motion
 {
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
 {
-  reserve(matches.size());
+  for (auto *column : {&ax, &ay, &bx, &by})
+    column->reserve(matches.size());
   for (const PointMatch &match : matches)
     add(camera.ray(match.a_px), camera.ray(match.b_px));
 }
 
-void Rays::reserve(std::size_t n)
-{
-  a.reserve(n);
-  b.reserve(n);
-  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
-    column->reserve(n);
-}
-
 void Rays::clear()
 {
-  a.clear();
-  b.clear();
-  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
+  for (auto *column : {&ax, &ay, &bx, &by})
     column->clear();
 }
 
 void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
 {
-  a.push_back(in_a);
-  b.push_back(in_b);
-  columns.ax.push_back(in_a.x());
-  columns.ay.push_back(in_a.y());
-  columns.bx.push_back(in_b.x());
-  columns.by.push_back(in_b.y());
+  ax.push_back(in_a.x());
+  ay.push_back(in_a.y());
+  bx.push_back(in_b.x());
+  by.push_back(in_b.y());
 }
 
 EpipolarTerms termsOf(const Motion &motion, double sigma)
@@ -108,10 +97,10 @@ RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_s
   fit.aRb = prior.aRb;
   std::vector<double> residuals(2 * rays.size());
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    transferResiduals(rays.columns, fit.aRb.data(), residuals.data());
+    transferResiduals(rays, fit.aRb.data(), residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    const TransferSums sums = sumsOfTransfers(rays.columns, fit.aRb.data(), residuals.data(), variance);
+    const TransferSums sums = sumsOfTransfers(rays, fit.aRb.data(), residuals.data(), variance);
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
     H /= variance * kInflation;
@@ -149,7 +138,7 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
 
 double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma)
 {
-  const double cost = costOfMatches(rays.columns, termsOf(motion, sigma));
+  const double cost = costOfMatches(rays, termsOf(motion, sigma));
   return cost / kInflation + priorCost(motion, prior);
 }
 
@@ -158,7 +147,7 @@ namespace
 /// Information and gradient of the matches at \p motion, inflation not applied.
 void linearize(const Rays &rays, const Motion &motion, double sigma, Matrix5d &H, Vector5d &g)
 {
-  const EpipolarSums sums = sumsOfMatches(rays.columns, termsOf(motion, sigma));
+  const EpipolarSums sums = sumsOfMatches(rays, termsOf(motion, sigma));
   const double *entry = sums.H;
   for (int i = 0; i < 5; ++i)
     for (int j = i; j < 5; ++j)
@@ -217,7 +206,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
     descend(rays, fit, prior, kIterations);
-    residualsOfMatches(rays.columns, termsOf(fit.motion, fit.sigma), residuals.data());
+    residualsOfMatches(rays, termsOf(fit.motion, fit.sigma), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
     if (std::abs(fit.sigma - before) < 0.02 * before)
@@ -231,7 +220,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
 
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma)
 {
-  const FlowSums flow = flowSumsOfMatches(rays.columns, termsOf(motion, sigma), motion.direction.data());
+  const FlowSums flow = flowSumsOfMatches(rays, termsOf(motion, sigma), motion.direction.data());
   Parallax parallax;
   if (flow.sum <= 0)
     return parallax;
@@ -245,9 +234,9 @@ double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb)
   std::vector<double> lengths;
   lengths.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Eigen::Vector3d p = aRb * rays.b[i];
+    const Eigen::Vector3d p = aRb * rays.b(i);
     if (p.z() >= 0.05)
-      lengths.push_back((rays.a[i].head<2>() - p.head<2>() / p.z()).norm());
+      lengths.push_back((rays.a(i).head<2>() - p.head<2>() / p.z()).norm());
   }
   return lengths.empty() ? 0 : medianOf(std::move(lengths));
 }
@@ -258,7 +247,7 @@ namespace
 std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i, std::size_t j,
                                                  const Eigen::Matrix3d &aRb)
 {
-  const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]), normal_j = rays.a[j].cross(aRb * rays.b[j]);
+  const Eigen::Vector3d normal_i = rays.a(i).cross(aRb * rays.b(i)), normal_j = rays.a(j).cross(aRb * rays.b(j));
   const Eigen::Vector3d d = normal_i.cross(normal_j);
   if (d.norm() < 1e-12)
     return std::nullopt;
@@ -271,7 +260,7 @@ void drawFrom(const Rays &rays, std::mt19937 &random, std::size_t n, Rays &sampl
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = draw(random);
-    sample.add(rays.a[k], rays.b[k]);
+    sample.add(rays.a(k), rays.b(k));
   }
 }
 } // namespace
@@ -288,7 +277,6 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
   std::vector<std::pair<double, Motion>> scored;
   scored.reserve(kHypotheses + 1);
   Rays sample;
-  sample.reserve(kSample);
   for (int hypothesis = 0; hypothesis < (rotation_known ? (kHypotheses + 1) / 2 : kHypotheses); ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb))

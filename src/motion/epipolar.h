@@ -30,17 +30,15 @@ inline PinholeCamera withFocal(PinholeCamera camera, double factor)
 }
 
 /// Matches as (x, y, 1) of both frames.
-struct Rays
+struct Rays : RayColumns
 {
-  std::vector<Eigen::Vector3d> a, b;
-  RayColumns columns; ///< the same
-
   Rays() = default;
   Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera);
   void add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b);
-  void reserve(std::size_t n);
   void clear(); ///< keeps the memory
-  std::size_t size() const { return a.size(); }
+  std::size_t size() const { return ax.size(); }
+  Eigen::Vector3d a(std::size_t i) const { return {ax[i], ay[i], 1}; }
+  Eigen::Vector3d b(std::size_t i) const { return {bx[i], by[i], 1}; }
 };
 
 struct Motion

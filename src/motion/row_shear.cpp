@@ -28,9 +28,9 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     motion::EpipolarTerms terms = motion::termsOf(motion, 1);
     terms.shear = shear;
-    residualsOfMatches(rays.columns, terms, residuals.data());
+    residualsOfMatches(rays, terms, residuals.data());
     const double sigma = terms.sigma = std::max(min_sigma, motion::bulkSigma(residuals));
-    const motion::ShearSums sums = shearSumsOfMatches(rays.columns, terms);
+    const motion::ShearSums sums = shearSumsOfMatches(rays, terms);
     Matrix6d H;
     const double *entry = sums.H;
     for (int i = 0; i < 6; ++i)
@@ -82,7 +82,7 @@ double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, 
   const motion::Rays rays(matches, camera);
   motion::Rays upright;
   for (std::size_t i = 0; i < rays.size(); ++i)
-    upright.add(rays.a[i], rays.b[i] - row.shear * rays.b[i].y() * Eigen::Vector3d::UnitX());
+    upright.add(rays.a(i), rays.b(i) - row.shear * rays.b(i).y() * Eigen::Vector3d::UnitX());
   const double min_sigma = min_sigma_px / std::sqrt(camera.fx * camera.fy);
   const auto costFrom = [&](const motion::Rays &from, const Pose &start) {
     const motion::JointFit fit = motion::fitMotion(from, {start.R, start.t.normalized()}, prior, row.noise, min_sigma);

@@ -21,7 +21,7 @@ TEST(SampsonResidual, IsTheNoiseOfOneImageCoordinate)
   const auto matches = cloudMatches(kCamera, aMb, options);
   std::vector<double> residuals(matches.size());
   const motion::Rays rays(matches, kCamera);
-  residualsOfMatches(rays.columns, motion::termsOf({aMb.R, aMb.t.normalized()}, 1), residuals.data());
+  residualsOfMatches(rays, motion::termsOf({aMb.R, aMb.t.normalized()}, 1), residuals.data());
   double sum = 0;
   for (const double r : residuals)
     sum += r * r;
