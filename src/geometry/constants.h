@@ -3,6 +3,7 @@
 /// \file
 /// Constants and units that more than one stage needs.
 
+#include <cmath>
 #include <cstdint>
 
 namespace bole
@@ -12,4 +13,6 @@ constexpr double kGravity = 9.81;                        ///< of the Earth, to h
 
 /// [s] of a time in [ns]
 inline double secondsOf(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+/// [ns] of a time in [s]
+inline std::int64_t nsOf(double s) { return std::llround(1e9 * s); }
 } // namespace bole

@@ -74,10 +74,10 @@ BorderLine clippedLine(const PinholeCamera &camera, const Vector3d &cn, const Ve
 }
 
 BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,
-                      const ElevationRange &range, double margin_px)
+                      const ElevationRange &range)
 {
   return clippedLine(camera, relative.borderNormal(border), relative.borderDirection(border, range.low),
-                     relative.borderDirection(border, range.high), margin_px);
+                     relative.borderDirection(border, range.high));
 }
 
 Eigen::Matrix<double, 2, 4> borderJacobian(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,

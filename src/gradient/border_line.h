@@ -46,7 +46,7 @@ BorderLine clippedLine(const PinholeCamera &camera, const Eigen::Vector3d &cn, c
 
 /// The line of one border of a relative trunk.
 BorderLine borderLine(const PinholeCamera &camera, const RelativeTrunk &relative, Border border,
-                      const ElevationRange &range, double margin_px = 4);
+                      const ElevationRange &range);
 
 /// Jacobian (2x4) of the horizontal displacements [px] of the first and last row of \p line by the tangent
 /// of the relative trunk: what MeanGradient is differentiated by, carried to theta^r.

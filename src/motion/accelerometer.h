@@ -9,7 +9,6 @@ namespace bole
 struct LogScale
 {
   double mean = 0, sigma = 0;
-  bool contradicts_prior = false; ///< more than three standard deviations from the scale that was expected
 };
 
 namespace accelerometer

@@ -38,8 +38,34 @@ Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vect
   return focal * at - xy_b;
 }
 
+void triangulate(BundlePoint &point, const std::vector<BundleFrame> &frames)
+{
+  constexpr int kIterations = 5;
+  constexpr double kStart = 0.05; // of the first baseline's inverse
+  point.inverse_depth = kStart;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    double H = 1e-12, g = 0;
+    for (const BundleObservation &seen : point.seen) {
+      Eigen::Vector2d J;
+      const Eigen::Vector2d e = reprojection(frames[point.anchor].wMc, frames[seen.frame].wMc, point.xy,
+                                             point.inverse_depth, seen.xy, nullptr, nullptr, &J);
+      H += J.squaredNorm();
+      g += J.dot(e);
+    }
+    point.inverse_depth -= g / H;
+  }
+  point.inverse_depth = std::max(point.inverse_depth, 0.0);
+}
+
 namespace
 {
+Eigen::Vector2d residualOf(const std::vector<BundleFrame> &frames, const BundlePoint &point,
+                           const BundleObservation &seen, double focal)
+{
+  return reprojection(frames[point.anchor].wMc, frames[seen.frame].wMc, point.xy, point.inverse_depth, seen.xy, nullptr,
+                      nullptr, nullptr, focal);
+}
+
 struct System
 {
   Eigen::MatrixXd H;
@@ -131,14 +157,6 @@ public:
   }
 
 private:
-  static Eigen::Vector2d residualOf(const std::vector<BundleFrame> &frames, const BundlePoint &point,
-                                    const BundleObservation &seen, double focal)
-  {
-    return reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                        frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy, point.inverse_depth, seen.xy,
-                        nullptr, nullptr, nullptr, focal);
-  }
-
   static Eigen::Vector3d rotationResidual(const std::vector<BundleFrame> &frames, std::size_t i)
   {
     return logSo3(frames[i].previousRthis->transpose() * frames[i - 1].wMc.R.transpose() * frames[i].wMc.R);
@@ -155,14 +173,13 @@ private:
     Eigen::VectorXd cross = Eigen::VectorXd::Zero(m_size);
     double H_q = point.prior_information;
     double g_q = point.prior_information * (point.inverse_depth - point.prior);
-    const int a = m_offset[static_cast<std::size_t>(point.anchor)];
+    const int a = m_offset[point.anchor];
     const double focal = std::exp(m_log_focal);
     for (BundleObservation &seen : point.seen) {
-      const int b = m_offset[static_cast<std::size_t>(seen.frame)];
+      const int b = m_offset[seen.frame];
       Eigen::Matrix<double, 2, 6> J_a, J_b;
       Eigen::Vector2d J_q, J_f;
-      const Eigen::Vector2d e = reprojection(m_frames[static_cast<std::size_t>(point.anchor)].wMc,
-                                             m_frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
+      const Eigen::Vector2d e = reprojection(m_frames[point.anchor].wMc, m_frames[seen.frame].wMc, point.xy,
                                              point.inverse_depth, seen.xy, &J_a, &J_b, &J_q, focal, &J_f);
       seen.weight = weightOf(e.norm() / m_options.sigma, kKernel);
       const double w = seen.weight / (m_options.sigma * m_options.sigma);
@@ -257,9 +274,7 @@ double bulkOf(const std::vector<BundleFrame> &frames, const std::vector<BundlePo
   std::vector<double> all;
   for (const BundlePoint &point : points) {
     for (const BundleObservation &seen : point.seen) {
-      const Eigen::Vector2d e = reprojection(
-          frames[static_cast<std::size_t>(point.anchor)].wMc, frames[static_cast<std::size_t>(seen.frame)].wMc,
-          point.xy, point.inverse_depth, seen.xy, nullptr, nullptr, nullptr, std::exp(log_focal));
+      const Eigen::Vector2d e = residualOf(frames, point, seen, std::exp(log_focal));
       all.push_back(e.x());
       all.push_back(e.y());
     }

@@ -24,14 +24,14 @@ struct BundleFrame
 
 struct BundleObservation
 {
-  int frame = 0;
+  std::size_t frame = 0;
   Eigen::Vector2d xy; ///< normalised
   double weight = 1;  ///< robust, after solveBundle()
 };
 
 struct BundlePoint
 {
-  int anchor = 0;           ///< frame whose ray it is
+  std::size_t anchor = 0;   ///< frame whose ray it is
   Eigen::Vector2d xy;       ///< of the ray (x, y, 1) in the anchor
   double inverse_depth = 0; ///< along z of the anchor [1/unit]
   double prior = 0, prior_information = 0;
@@ -67,6 +67,9 @@ Eigen::Vector2d reprojection(const Pose &wMa, const Pose &wMb, const Eigen::Vect
                              const Eigen::Vector2d &xy_b, Eigen::Matrix<double, 2, 6> *J_a = nullptr,
                              Eigen::Matrix<double, 2, 6> *J_b = nullptr, Eigen::Vector2d *J_q = nullptr,
                              double focal = 1, Eigen::Vector2d *J_f = nullptr);
+
+/// The inverse depth of \p point, by all that see it; at least 0.
+void triangulate(BundlePoint &point, const std::vector<BundleFrame> &frames);
 
 BundleResult solveBundle(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                          const BundleOptions &options);

@@ -3,13 +3,13 @@
 /// \file
 /// Robust least squares over a few constants of a sensor, for the calibration.
 
+#include "geometry/constants.h"
 #include "geometry/median.h"
 
 #include <Eigen/Dense>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -24,7 +24,6 @@ inline constexpr double kMostFailing = 0.15; ///< of the measurements: more, and
 inline constexpr double kSoft = 9;           ///< squared error over its variance from which a measurement loses its say
 inline constexpr double kFails = 30;         ///< ... at which it contradicts what was fitted
 
-inline std::int64_t nsOf(double s) { return static_cast<std::int64_t>(std::llround(s * 1e9)); }
 inline double soft(double squares) { return kSoft * std::log1p(squares / kSoft); }
 inline double weightFor(double squares) { return 1 / (1 + squares / kSoft); }
 

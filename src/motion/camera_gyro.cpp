@@ -3,7 +3,7 @@
 
 #include "geometry/constants.h"
 #include "motion/calibration_fit.h"
-#include "motion/relative_pose.h"
+#include "motion/epipolar.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -140,9 +140,7 @@ std::optional<double> findDistortion(const std::vector<std::vector<PointMatch>> 
   using Costs = Eigen::Matrix<double, 2 * kSteps + 1, 1>;
   Costs costs = Costs::Zero(); // by distortion, at the focal length that fits best
   for (const double factor : is_focal_known ? std::vector{1.0} : std::vector{0.6, 0.8, 1.0, 1.25, 1.6}) {
-    PinholeCamera other = camera;
-    other.fx *= factor;
-    other.fy *= factor;
+    const PinholeCamera other = motion::withFocal(camera, factor);
     Costs here;
     bool is_best = false;
     for (int i = -kSteps; i <= kSteps; ++i) {

@@ -15,47 +15,33 @@ namespace bole::motion
 {
 Rays::Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera)
 {
-  reserve(matches.size());
+  for (auto *column : {&ax, &ay, &bx, &by})
+    column->reserve(matches.size());
   for (const PointMatch &match : matches)
     add(camera.ray(match.a_px), camera.ray(match.b_px));
 }
 
-void Rays::reserve(std::size_t n)
-{
-  a.reserve(n);
-  b.reserve(n);
-  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
-    column->reserve(n);
-}
-
 void Rays::clear()
 {
-  a.clear();
-  b.clear();
-  for (auto *column : {&columns.ax, &columns.ay, &columns.bx, &columns.by})
+  for (auto *column : {&ax, &ay, &bx, &by})
     column->clear();
 }
 
 void Rays::add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b)
 {
-  a.push_back(in_a);
-  b.push_back(in_b);
-  columns.ax.push_back(in_a.x());
-  columns.ay.push_back(in_a.y());
-  columns.bx.push_back(in_b.x());
-  columns.by.push_back(in_b.y());
+  ax.push_back(in_a.x());
+  ay.push_back(in_a.y());
+  bx.push_back(in_b.x());
+  by.push_back(in_b.y());
 }
 
 EpipolarTerms termsOf(const Motion &motion, double sigma)
 {
-  constexpr double kEpipole = 0.04; // [rad]: 4 px of a small camera
   EpipolarTerms terms;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.E) = skew(motion.direction) * motion.aRb;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor>::Map(terms.R) = motion.aRb;
   Matrix32d::Map(terms.B) = directionBasis(motion.direction);
   terms.sigma = sigma;
-  terms.kernel = kKernel;
-  terms.epipole = kEpipole;
   return terms;
 }
 
@@ -104,22 +90,21 @@ double bulkSigma(std::vector<double> residuals)
   return sigma;
 }
 
-RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
-                        const RelativePoseOptions &options)
+RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma)
 {
+  constexpr int kIterations = 15;
   RotationFit fit;
   fit.aRb = prior.aRb;
-  std::vector<double> residuals(2 * rays.size()), weights(rays.size());
-  for (int iteration = 0; iteration < options.iterations + 3; ++iteration) {
-    const TransferTerms terms = {fit.aRb.data(), kKernel};
-    transferResiduals(rays.columns, terms, residuals.data());
+  std::vector<double> residuals(2 * rays.size());
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    transferResiduals(rays, fit.aRb.data(), residuals.data());
     fit.sigma = std::max(min_sigma, bulkSigma(residuals) / std::sqrt(2.0));
     const double variance = 2 * fit.sigma * fit.sigma;
-    const TransferSums sums = sumsOfTransfers(rays.columns, terms, residuals.data(), variance, weights.data());
+    const TransferSums sums = sumsOfTransfers(rays, fit.aRb.data(), residuals.data(), variance);
     Eigen::Matrix3d H;
     H << sums.H[0], sums.H[1], sums.H[2], sums.H[1], sums.H[3], sums.H[4], sums.H[2], sums.H[4], sums.H[5];
-    H /= variance * options.inflation;
-    Eigen::Vector3d g = Eigen::Vector3d::Map(sums.g) / (variance * options.inflation);
+    H /= variance * kInflation;
+    Eigen::Vector3d g = Eigen::Vector3d::Map(sums.g) / (variance * kInflation);
     fit.information = H + prior.rotation_information;
     g += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.aRb);
     const Eigen::Vector3d step = -solveDefinite<3>(fit.information + 1e-9 * Eigen::Matrix3d::Identity(), g);
@@ -151,11 +136,10 @@ double priorCost(const Motion &motion, const MotionPrior &prior)
 
 } // namespace
 
-double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
-              const RelativePoseOptions &options)
+double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma)
 {
-  const double cost = costOfMatches(rays.columns, termsOf(motion, sigma));
-  return cost / options.inflation + priorCost(motion, prior);
+  const double cost = costOfMatches(rays, termsOf(motion, sigma));
+  return cost / kInflation + priorCost(motion, prior);
 }
 
 namespace
@@ -163,7 +147,7 @@ namespace
 /// Information and gradient of the matches at \p motion, inflation not applied.
 void linearize(const Rays &rays, const Motion &motion, double sigma, Matrix5d &H, Vector5d &g)
 {
-  const EpipolarSums sums = sumsOfMatches(rays.columns, termsOf(motion, sigma));
+  const EpipolarSums sums = sumsOfMatches(rays, termsOf(motion, sigma));
   const double *entry = sums.H;
   for (int i = 0; i < 5; ++i)
     for (int j = i; j < 5; ++j)
@@ -172,15 +156,15 @@ void linearize(const Rays &rays, const Motion &motion, double sigma, Matrix5d &H
 }
 
 /// Levenberg-Marquardt with a fixed sigma.
-void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const RelativePoseOptions &options)
+void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, int iterations)
 {
   double damping = 1e-4;
-  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
-  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma);
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     Vector5d g;
     linearize(rays, fit.motion, fit.sigma, fit.information, g);
-    Matrix5d H = fit.information / options.inflation;
-    g /= options.inflation;
+    Matrix5d H = fit.information / kInflation;
+    g /= kInflation;
     if (prior.has_rotation) {
       H.topLeftCorner<3, 3>() += prior.rotation_information;
       g.head<3>() += prior.rotation_information * logSo3(prior.aRb.transpose() * fit.motion.aRb);
@@ -198,7 +182,7 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
       if (step.tail<2>().norm() > 0.5)
         step *= 0.5 / step.tail<2>().norm();
       const Motion tried = moved(fit.motion, step);
-      const double cost = costOf(rays, tried, prior, fit.sigma, options);
+      const double cost = costOf(rays, tried, prior, fit.sigma);
       better = cost <= fit.cost;
       damping = better ? std::max(1e-7, damping * 0.2) : std::max(1e-3, damping * 10);
       if (better) {
@@ -213,22 +197,22 @@ void descend(const Rays &rays, JointFit &fit, const MotionPrior &prior, const Re
 }
 } // namespace
 
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
-                   const RelativePoseOptions &options)
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma)
 {
+  constexpr int kIterations = 12;
   JointFit fit;
   fit.motion = start;
   fit.sigma = sigma;
   std::vector<double> residuals(rays.size());
   for (int round = 0; round < 3; ++round) {
-    descend(rays, fit, prior, options);
-    residualsOfMatches(rays.columns, termsOf(fit.motion, fit.sigma), residuals.data());
+    descend(rays, fit, prior, kIterations);
+    residualsOfMatches(rays, termsOf(fit.motion, fit.sigma), residuals.data());
     const double before = fit.sigma;
     fit.sigma = std::max(min_sigma, bulkSigma(residuals));
     if (std::abs(fit.sigma - before) < 0.02 * before)
       break;
   }
-  fit.cost = costOf(rays, fit.motion, prior, fit.sigma, options);
+  fit.cost = costOf(rays, fit.motion, prior, fit.sigma);
   Vector5d g;
   linearize(rays, fit.motion, fit.sigma, fit.information, g);
   return fit;
@@ -236,7 +220,7 @@ JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &pri
 
 Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma)
 {
-  const FlowSums flow = flowSumsOfMatches(rays.columns, termsOf(motion, sigma), motion.direction.data());
+  const FlowSums flow = flowSumsOfMatches(rays, termsOf(motion, sigma), motion.direction.data());
   Parallax parallax;
   if (flow.sum <= 0)
     return parallax;
@@ -250,9 +234,9 @@ double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb)
   std::vector<double> lengths;
   lengths.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Eigen::Vector3d p = aRb * rays.b[i];
+    const Eigen::Vector3d p = aRb * rays.b(i);
     if (p.z() >= 0.05)
-      lengths.push_back((rays.a[i].head<2>() - p.head<2>() / p.z()).norm());
+      lengths.push_back((rays.a(i).head<2>() - p.head<2>() / p.z()).norm());
   }
   return lengths.empty() ? 0 : medianOf(std::move(lengths));
 }
@@ -263,7 +247,7 @@ namespace
 std::optional<Eigen::Vector3d> twoPointDirection(const Rays &rays, std::size_t i, std::size_t j,
                                                  const Eigen::Matrix3d &aRb)
 {
-  const Eigen::Vector3d normal_i = rays.a[i].cross(aRb * rays.b[i]), normal_j = rays.a[j].cross(aRb * rays.b[j]);
+  const Eigen::Vector3d normal_i = rays.a(i).cross(aRb * rays.b(i)), normal_j = rays.a(j).cross(aRb * rays.b(j));
   const Eigen::Vector3d d = normal_i.cross(normal_j);
   if (d.norm() < 1e-12)
     return std::nullopt;
@@ -276,26 +260,23 @@ void drawFrom(const Rays &rays, std::mt19937 &random, std::size_t n, Rays &sampl
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = draw(random);
-    sample.add(rays.a[k], rays.b[k]);
+    sample.add(rays.a(k), rays.b(k));
   }
 }
 } // namespace
 
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
-                                 const RelativePoseOptions &options)
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma)
 {
+  constexpr int kFew = 5;            // iterations
   constexpr std::size_t kSample = 6; // matches that a hypothesis is fitted to: five would do, one for the noise
   std::mt19937 random(kSeed);
   std::uniform_int_distribution<std::size_t> draw(0, rays.size() - 1);
   const bool rotation_known = prior.has_rotation;
-  RelativePoseOptions few = options;
-  few.iterations = 5;
   MotionPrior free = prior;
   free.direction_information = 0;
   std::vector<std::pair<double, Motion>> scored;
   scored.reserve(kHypotheses + 1);
   Rays sample;
-  sample.reserve(kSample);
   for (int hypothesis = 0; hypothesis < (rotation_known ? (kHypotheses + 1) / 2 : kHypotheses); ++hypothesis) {
     Motion motion{aRb, prior.direction};
     if (const auto d = twoPointDirection(rays, draw(random), draw(random), aRb))
@@ -305,13 +286,13 @@ std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, c
       fit.motion = motion;
       fit.sigma = 3 * sigma;
       drawFrom(rays, random, kSample, sample);
-      descend(sample, fit, free, few);
+      descend(sample, fit, free, kFew);
       motion = fit.motion;
     }
-    scored.emplace_back(costOf(rays, motion, free, sigma, options), motion);
+    scored.emplace_back(costOf(rays, motion, free, sigma), motion);
   }
   if (prior.has_direction)
-    scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma, options), Motion{aRb, prior.direction});
+    scored.emplace_back(costOf(rays, {aRb, prior.direction}, free, sigma), Motion{aRb, prior.direction});
   std::sort(scored.begin(), scored.end(), [](const auto &x, const auto &y) { return x.first < y.first; });
   std::vector<Motion> starts;
   for (const auto &[cost, motion] : scored) {

@@ -15,22 +15,30 @@
 
 namespace bole::motion
 {
-constexpr double kKernel = 3;   ///< residuals lose half their weight near this many sigmas
+/// Covariance is multiplied by this: errors of neighbouring tracks are not independent. Chosen so that the normalised
+/// error squared of the rendered flights is near its degrees of freedom.
+constexpr double kInflation = 3;
 constexpr int kHypotheses = 48; ///< two-point directions tried without a prior
 constexpr unsigned kSeed = 1;   ///< of the draws
 
-/// Matches as (x, y, 1) of both frames.
-struct Rays
+/// A camera whose focal lengths are \p factor times those of \p camera.
+inline PinholeCamera withFocal(PinholeCamera camera, double factor)
 {
-  std::vector<Eigen::Vector3d> a, b;
-  RayColumns columns; ///< the same
+  camera.fx *= factor;
+  camera.fy *= factor;
+  return camera;
+}
 
+/// Matches as (x, y, 1) of both frames.
+struct Rays : RayColumns
+{
   Rays() = default;
   Rays(const std::vector<PointMatch> &matches, const PinholeCamera &camera);
   void add(const Eigen::Vector3d &in_a, const Eigen::Vector3d &in_b);
-  void reserve(std::size_t n);
   void clear(); ///< keeps the memory
-  std::size_t size() const { return a.size(); }
+  std::size_t size() const { return ax.size(); }
+  Eigen::Vector3d a(std::size_t i) const { return {ax[i], ay[i], 1}; }
+  Eigen::Vector3d b(std::size_t i) const { return {bx[i], by[i], 1}; }
 };
 
 struct Motion
@@ -73,8 +81,7 @@ struct RotationFit
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero(); ///< with the prior [1/rad^2]
   double sigma = 0;                                      ///< of one coordinate of one image [normalised]
 };
-RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma,
-                        const RelativePoseOptions &options);
+RotationFit fitRotation(const Rays &rays, const MotionPrior &prior, double min_sigma);
 
 /// Rotation and direction together. \p sigma is refined on the way.
 struct JointFit
@@ -85,10 +92,8 @@ struct JointFit
 };
 /// Robust cost of the matches at the noise \p sigma, that of the prior with it: half the chi-squared of small
 /// residuals.
-double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma,
-              const RelativePoseOptions &options);
-JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma,
-                   const RelativePoseOptions &options);
+double costOf(const Rays &rays, const Motion &motion, const MotionPrior &prior, double sigma);
+JointFit fitMotion(const Rays &rays, const Motion &start, const MotionPrior &prior, double sigma, double min_sigma);
 
 /// Flow that is left when the rotation is taken out, along and across the epipolar lines
 /// [normalised].
@@ -102,6 +107,5 @@ Parallax parallaxOf(const Rays &rays, const Motion &motion, double sigma);
 double medianFlow(const Rays &rays, const Eigen::Matrix3d &aRb);
 
 /// Starts for fitMotion(): the prior's direction and the best of two-point directions.
-std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma,
-                                 const RelativePoseOptions &options);
+std::vector<Motion> motionStarts(const Rays &rays, const Eigen::Matrix3d &aRb, const MotionPrior &prior, double sigma);
 } // namespace bole::motion

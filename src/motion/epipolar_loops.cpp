@@ -16,8 +16,7 @@ double costOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
   const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
   const double *E = terms.E, e00 = E[0], e01 = E[1], e02 = E[2], e10 = E[3], e11 = E[4], e12 = E[5], e20 = E[6],
                e21 = E[7], e22 = E[8];
-  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
-  const double epipole2 = terms.epipole * terms.epipole;
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (kKernel * kKernel);
   double cost = 0;
 #pragma omp simd reduction(+ : cost)
   for (int i = 0; i < n; ++i) {
@@ -28,7 +27,7 @@ double costOfMatches(const RayColumns &rays, const EpipolarTerms &terms)
     const double S = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1 + 1e-24;
     const double algebraic = (ax[i] * l0 + ay[i] * l1 + l2) * by_sigma, u2 = algebraic * algebraic / S;
     const double sine2 = (m0 * m0 + m1 * m1 + m2 * m2) / (ax[i] * ax[i] + ay[i] * ay[i] + 1);
-    cost += sine2 / (sine2 + epipole2) * 0.5 * u2 / (1 + u2 * by_kernel2);
+    cost += sine2 / (sine2 + kEpipole * kEpipole) * 0.5 * u2 / (1 + u2 * by_kernel2);
   }
   return cost;
 }
@@ -47,8 +46,7 @@ template <bool kIsSheared>
   const double r00 = R[0], r01 = R[1], r02 = R[2], r10 = R[3], r11 = R[4], r12 = R[5], r20 = R[6], r21 = R[7],
                r22 = R[8];
   const double b00 = B[0], b10 = B[1], b20 = B[2], b01 = B[3], b11 = B[4], b21 = B[5];
-  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
-  const double epipole2 = terms.epipole * terms.epipole;
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (kKernel * kKernel);
   double h00 = 0, h01 = 0, h02 = 0, h03 = 0, h04 = 0, h11 = 0, h12 = 0, h13 = 0, h14 = 0, h22 = 0, h23 = 0, h24 = 0,
          h33 = 0, h34 = 0, h44 = 0, g0 = 0, g1 = 0, g2 = 0, g3 = 0, g4 = 0;
   double h05 = 0, h15 = 0, h25 = 0, h35 = 0, h45 = 0, h55 = 0, g5 = 0; // by the shear
@@ -63,7 +61,7 @@ template <bool kIsSheared>
     const double algebraic = xa * l0 + ya * l1 + l2, share = algebraic * inverse;
     const double scale = by_sigma * std::sqrt(inverse), u = algebraic * scale;
     const double sine2 = (m0 * m0 + m1 * m1 + m2 * m2) / (xa * xa + ya * ya + 1);
-    const double root = 1 / (1 + u * u * by_kernel2), w = sine2 / (sine2 + epipole2) * root * root;
+    const double root = 1 / (1 + u * u * by_kernel2), w = sine2 / (sine2 + kEpipole * kEpipole) * root * root;
     // by the direction: p x (a - share flat l) - share (R flat m) x a, with p = R b
     const double p0 = r00 * xb + r01 * yb + r02, p1 = r10 * xb + r11 * yb + r12, p2 = r20 * xb + r21 * yb + r22;
     const double c0 = xa - share * l0, c1 = ya - share * l1;
@@ -142,7 +140,7 @@ FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, c
   const double r00 = R[0], r01 = R[1], r02 = R[2], r10 = R[3], r11 = R[4], r12 = R[5], r20 = R[6], r21 = R[7],
                r22 = R[8];
   const double t0 = t[0], t1 = t[1], t2 = t[2];
-  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (terms.kernel * terms.kernel);
+  const double by_sigma = 1 / terms.sigma, by_kernel2 = 1 / (kKernel * kKernel);
   double along = 0, across = 0, sum = 0, agreement = 0, squares = 0;
 #pragma omp simd reduction(+ : along, across, sum, agreement, squares)
   for (int i = 0; i < n; ++i) {
@@ -176,10 +174,10 @@ constexpr double kLeastDepth = 1e-3; // of a ray of b in a
 } // namespace
 
 BOLE_VECTOR_CLONES
-void transferResiduals(const RayColumns &rays, const TransferTerms &terms, double *__restrict residuals)
+void transferResiduals(const RayColumns &rays, const double *R, double *__restrict residuals)
 {
   const int n = static_cast<int>(rays.ax.size());
-  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data(), *R = terms.R;
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
   const double r00 = R[0], r10 = R[1], r20 = R[2], r01 = R[3], r11 = R[4], r21 = R[5], r02 = R[6], r12 = R[7],
                r22 = R[8];
 #pragma omp simd
@@ -191,21 +189,19 @@ void transferResiduals(const RayColumns &rays, const TransferTerms &terms, doubl
 }
 
 BOLE_VECTOR_CLONES
-TransferSums sumsOfTransfers(const RayColumns &rays, const TransferTerms &terms, const double *residuals,
-                             double variance, double *__restrict weights)
+TransferSums sumsOfTransfers(const RayColumns &rays, const double *R, const double *residuals, double variance)
 {
   const int n = static_cast<int>(rays.ax.size());
-  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data(), *R = terms.R;
+  const double *ax = rays.ax.data(), *ay = rays.ay.data(), *bx = rays.bx.data(), *by = rays.by.data();
   const double r00 = R[0], r10 = R[1], r20 = R[2], r01 = R[3], r11 = R[4], r21 = R[5], r02 = R[6], r12 = R[7],
                r22 = R[8];
-  const double by_variance = 1 / (variance * terms.kernel * terms.kernel);
+  const double by_variance = 1 / (variance * kKernel * kKernel);
   double h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0;
 #pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2)
   for (int i = 0; i < n; ++i) {
     const double xb = bx[i], yb = by[i], ex = residuals[i], ey = residuals[n + i], x = ax[i] - ex, y = ay[i] - ey;
     const double inverse = 1 / std::max(r20 * xb + r21 * yb + r22, kLeastDepth);
     const double root = 1 / (1 + (ex * ex + ey * ey) * by_variance), w = root * root;
-    weights[i] = w;
     // rows of the projection, turned into b: times the skew of the ray their cross product with it
     const double u0 = inverse * (r00 - x * r20), u1 = inverse * (r01 - x * r21), u2 = inverse * (r02 - x * r22);
     const double v0 = inverse * (r10 - y * r20), v1 = inverse * (r11 - y * r21), v2 = inverse * (r12 - y * r22);

@@ -6,6 +6,10 @@
 
 namespace bole::motion
 {
+constexpr double kKernel = 3;     ///< residuals lose half their weight near this many sigmas
+constexpr double kEpipole = 0.04; ///< angle from the epipole within which a match has little say [rad]: 4 px of a small
+                                  ///< camera
+
 /// Matches as (x, y, 1) of both frames, number by number.
 struct RayColumns
 {
@@ -17,8 +21,7 @@ struct RayColumns
 struct EpipolarTerms
 {
   double E[9], R[9], B[6];
-  double sigma, kernel;
-  double epipole;   ///< tan of the angle from the epipole within which a match has little say
+  double sigma;
   double shear = 0; ///< of the rows of b: x is less by so much of y
 };
 
@@ -51,22 +54,15 @@ struct FlowSums
 };
 FlowSums flowSumsOfMatches(const RayColumns &rays, const EpipolarTerms &terms, const double *t);
 
-/// A rotation that takes b to a, column by column.
-struct TransferTerms
-{
-  const double *R;
-  double kernel;
-};
-
-/// Flow of each match that the rotation leaves, in the image of a: all x, then all y.
-void transferResiduals(const RayColumns &rays, const TransferTerms &terms, double *residuals);
+/// Flow of each match that a rotation leaves, in the image of a: all x, then all y. \p R: takes b to a, column by
+/// column.
+void transferResiduals(const RayColumns &rays, const double *R, double *residuals);
 
 /// Sums of the weighted products of the derivatives of those residuals by the rotation, upper triangle by rows, and of
-/// derivative and residual. \p variance: of the length of a residual. \p weights: of each match.
+/// derivative and residual. \p variance: of the length of a residual.
 struct TransferSums
 {
   double H[6], g[3];
 };
-TransferSums sumsOfTransfers(const RayColumns &rays, const TransferTerms &terms, const double *residuals,
-                             double variance, double *weights);
+TransferSums sumsOfTransfers(const RayColumns &rays, const double *R, const double *residuals, double variance);
 } // namespace bole::motion

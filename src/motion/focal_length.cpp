@@ -39,13 +39,6 @@ constexpr std::size_t kTurnMatches = 25;
 
 double logFactor(double step) { return kShortest + kStep * step; }
 
-PinholeCamera withFocal(PinholeCamera camera, double factor)
-{
-  camera.fx *= factor;
-  camera.fy *= factor;
-  return camera;
-}
-
 /// Cost of a frame by focal length: the log of the residual [px] for each point that is explained. Empty where the
 /// frame cannot tell: no start yet under most of them, or lost.
 std::vector<double> costsOf(const std::vector<PointOdometryResult> &placed)
@@ -92,33 +85,12 @@ std::optional<double> bestLogFactor(const std::vector<std::vector<double>> &cost
     return std::nullopt;
   return logFactor(best + vertex);
 }
-
-/// The inverse depth of \p point, by all that see it.
-void triangulate(motion::BundlePoint &point, const std::vector<motion::BundleFrame> &frames)
-{
-  constexpr int kIterations = 5;
-  constexpr double kStart = 0.05; // of the first baseline's inverse
-  point.inverse_depth = kStart;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    double H = 1e-12, g = 0;
-    for (const motion::BundleObservation &seen : point.seen) {
-      Eigen::Vector2d J;
-      const Eigen::Vector2d e = motion::reprojection(frames[static_cast<std::size_t>(point.anchor)].wMc,
-                                                     frames[static_cast<std::size_t>(seen.frame)].wMc, point.xy,
-                                                     point.inverse_depth, seen.xy, nullptr, nullptr, &J);
-      H += J.squaredNorm();
-      g += J.dot(e);
-    }
-    point.inverse_depth -= g / H;
-  }
-  point.inverse_depth = std::max(point.inverse_depth, 0.0);
-}
 } // namespace
 
 FocalFinder::FocalFinder(const PinholeCamera &guess) : m_guess(guess)
 {
   for (int k = 0; k < kSteps; ++k)
-    m_odometry.emplace_back(withFocal(guess, std::exp(logFactor(k))), kGuessedFocalSigma);
+    m_odometry.emplace_back(motion::withFocal(guess, std::exp(logFactor(k))), kGuessedFocalSigma);
 }
 
 void FocalFinder::add(const PointTracker &tracker)
@@ -149,9 +121,9 @@ void FocalFinder::addTurn(const PointTracker &tracker)
   ++m_moved;
   std::vector<double> costs;
   for (int k = 0; k < kSteps; ++k) {
-    const PinholeCamera camera = withFocal(m_guess, std::exp(logFactor(k)));
-    const auto turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx,
-                                          RelativePoseOptions());
+    const PinholeCamera camera = motion::withFocal(m_guess, std::exp(logFactor(k)));
+    const auto turn =
+        motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeast_px / camera.fx);
     costs.push_back(std::log(turn.sigma * camera.fx));
   }
   if (*std::min_element(costs.begin(), costs.end()) < std::log(kTurnResidual * flow_px))
@@ -211,17 +183,17 @@ FocalEstimate FocalFinder::adjusted(double log_factor) const
     for (const auto &[id, xy] : m_seen[frame]) {
       const auto [track, is_new] = tracks.try_emplace(id);
       if (is_new) {
-        track->second.anchor = static_cast<int>(k);
+        track->second.anchor = k;
         track->second.xy = scale * xy;
       }
       else
-        track->second.seen.push_back({static_cast<int>(k), scale * xy, 1});
+        track->second.seen.push_back({k, scale * xy, 1});
     }
   }
   std::vector<motion::BundlePoint> points;
   for (auto &[id, point] : tracks)
     if (point.seen.size() + 1 >= kLeastSeen) {
-      triangulate(point, frames);
+      motion::triangulate(point, frames);
       points.push_back(std::move(point));
     }
   const double pixel = scale / m_guess.fx;

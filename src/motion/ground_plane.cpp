@@ -74,11 +74,12 @@ GroundHeight heightOverGround(const std::vector<PointDepth> &points, const Pinho
     }
   }
   double variance = 0;
+  int used = 0; // on the ground
   for (int round = 0; round < 4; ++round) {
     const double roughness = kRoughness * centre;
-    centre = weightedMean(heights, centre, 2, roughness * roughness, variance, ground.points);
+    centre = weightedMean(heights, centre, 2, roughness * roughness, variance, used);
   }
-  ground.known = ground.points >= kMinPoints;
+  ground.known = used >= kMinPoints;
   ground.height = centre;
   // Neighbouring points share a bump: four of them count as one.
   ground.sigma = 2 * std::sqrt(variance);

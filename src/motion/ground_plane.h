@@ -20,7 +20,6 @@ struct GroundHeight
   bool known = false;
   double height = 0; ///< of the camera over the ground [units of the points]
   double sigma = 0;  ///< [units]
-  int points = 0;    ///< on the ground
 };
 
 /// \param up unit vector in the camera frame of the points.

@@ -302,14 +302,10 @@ std::optional<LogScale> InertialScale::scale(double prior_sigma) const
   if (m_compared == 0 || 4 * m_directions < m_compared || !m_force_varies)
     return std::nullopt;
   const double variance = m_covariance(kScale, kScale), prior2 = prior_sigma * prior_sigma;
-  LogScale result;
-  result.contradicts_prior = m_log_scale * m_log_scale > 9 * (variance + prior2);
-  if (result.contradicts_prior)
-    return LogScale{m_log_scale, std::sqrt(variance), true};
+  if (m_log_scale * m_log_scale > 9 * (variance + prior2)) // it contradicts the prior
+    return LogScale{m_log_scale, std::sqrt(variance)};
   const double measured = std::max(0.0, 1 / variance - std::pow(m_start_sigma, -2)); // without its own prior
   const double information = measured + 1 / std::max(1e-12, prior2);
-  result.mean = m_log_scale / variance / information;
-  result.sigma = 1 / std::sqrt(information);
-  return result;
+  return LogScale{m_log_scale / variance / information, 1 / std::sqrt(information)};
 }
 } // namespace bole

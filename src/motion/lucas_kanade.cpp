@@ -40,9 +40,10 @@ const cv::Point2f kHalf(0.5f * (kWindow_px - 1), 0.5f * (kWindow_px - 1)); // fr
 
 /// One level: moves \p to, the first pixel of the window; false where the window has no texture, is less round than
 /// \p least_roundness or leaves the image.
-bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to, int iterations,
+bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f &from, cv::Point2f &to,
               double least_roundness)
 {
+  constexpr int kIterations = 10; // at most
   if (!reaches(first, from))
     return false;
   Window window;
@@ -55,7 +56,7 @@ bool refineAt(const GreyPlane &first, const GreyPlane &second, const cv::Point2f
     return false;
   const float inverse = 1 / determinant;
   cv::Point2f before(0, 0);
-  for (int i = 0; i < iterations; ++i) {
+  for (int i = 0; i < kIterations; ++i) {
     if (!reaches(second, to))
       return false;
     float by_x, by_y;
@@ -112,14 +113,13 @@ double roundness(const cv::Mat &image, const cv::Point2f &at)
 bool followWindow(const GreyPyramid &first, const GreyPyramid &second, const cv::Point2f &from, cv::Point2f &to,
                   int levels)
 {
-  constexpr int kIterations = 10; // a level, at most
   const int top = std::min({levels, static_cast<int>(first.size()) - 1, static_cast<int>(second.size()) - 1});
   bool is_found = false;
   to *= std::ldexp(1.f, -top);
   for (int level = top; level >= 0; --level) {
     const std::size_t l = static_cast<std::size_t>(level);
     cv::Point2f corner = to - kHalf;
-    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - kHalf, corner, kIterations,
+    is_found = refineAt(plane(first[l]), plane(second[l]), from * std::ldexp(1.f, -level) - kHalf, corner,
                         level == 0 ? kLeastRoundness : 0);
     to = corner + kHalf;
     if (level > 0)

@@ -98,9 +98,9 @@ RelativeMotion PointMotion::relativeTo(int frames_back) const
   RelativeMotion step;
   const RelativePosePrior prior = expect(step, frames_back, false);
   const std::vector<PointMatch> matches = m_tracker.matches(frames_back);
-  step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
+  step.estimate = estimateRelativePose(matches, m_camera, prior, m_options.min_sigma_px);
   if (frames_back == m_options.widest())
-    step.points = prior.aRb ? estimateRelativePose(matches, m_camera, {}, m_options.relative_pose) : step.estimate;
+    step.points = prior.aRb ? estimateRelativePose(matches, m_camera, {}, m_options.min_sigma_px) : step.estimate;
   return step;
 }
 
@@ -123,13 +123,13 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   const auto seen = std::find_if(motions.begin(), motions.end(), [](const auto &m) { return m.frames_back == 1; });
   const std::vector<PointMatch> matches = m_tracker.matches(1);
   const RelativePoseEstimate rigid =
-      seen != motions.end() ? seen->estimate : estimateRelativePose(matches, m_camera, prior, m_options.relative_pose);
+      seen != motions.end() ? seen->estimate : estimateRelativePose(matches, m_camera, prior, m_options.min_sigma_px);
   const Pose seen_start(rigid.aRb, rigid.direction);
   const std::optional<Eigen::Vector3d> ahead = prior.translation ? prior.translation : m_ahead;
   const bool has_start = ahead && ahead->norm() > 0;
   const Pose start = has_start ? Pose(prior.aRb.value_or(rigid.aRb), *ahead) : seen_start;
   const auto find = [&](const std::vector<Pose> &starts) {
-    return estimateRowShear(matches, m_camera, prior, starts, m_options.relative_pose);
+    return estimateRowShear(matches, m_camera, prior, starts, m_options.min_sigma_px);
   };
   const auto matters = [&](const RowShear &row) { return std::abs(row.shear) > std::max(kLean, kSigmas * row.sigma); };
   RowShear found = find({start});
@@ -138,7 +138,7 @@ void PointMotion::judgeShear(const std::vector<RelativeMotion> &motions)
   const std::int64_t now_ns = m_seen.back().stamp_ns;
   const bool is_likely = m_sheared_ns && now_ns - *m_sheared_ns < kLasts_ns;
   const bool is_sheared = matters(found) && gainOfShear(found, matches, m_camera, prior, {start, seen_start},
-                                                        m_options.relative_pose) > (is_likely ? kGain : kFirstGain);
+                                                        m_options.min_sigma_px) > (is_likely ? kGain : kFirstGain);
   if (!is_sheared || m_refused == kMostRefused) {
     m_refused = 0;
     if (rigid.hasDirection())

@@ -33,7 +33,7 @@ namespace bole
 {
 struct PointMotionOptions
 {
-  RelativePoseOptions relative_pose;
+  double min_sigma_px = kMatchSigma_px; ///< floor of the noise of a match, > 0
   GyroOptions gyro;
   std::vector<int> frames_back{1, 3}; ///< each 1 to PointTracker::kHistory - 1
   int widest() const { return *std::max_element(frames_back.begin(), frames_back.end()); }

@@ -4,7 +4,6 @@
 #include "geometry/median.h"
 
 #include "geometry/constants.h"
-#include "geometry/names.h"
 #include "motion/bundle.h"
 #include "motion/epipolar.h"
 #include <Eigen/Dense>
@@ -56,7 +55,7 @@ constexpr double kHeldSigma = 1.0; // of a translation that was not seen, in uni
 constexpr double kDepthPrior = 10;
 constexpr double kRestSigma = 1e-2;
 constexpr std::size_t kKeyFrames = 8;           // of the window
-constexpr int kHeldKeyFrames = 3;               // oldest of them, not moved any more
+constexpr std::size_t kHeldKeyFrames = 3;       // oldest of them, not moved any more
 constexpr double kKeyParallax = 1.2 * kDegree;  // median flow without rotation that makes a new key frame
 constexpr double kKeyShared = 0.5;              // share of the last one's tracks below which a new one is made
 constexpr double kStartParallax = 1 * kDegree;  // of the first baseline
@@ -64,14 +63,12 @@ constexpr double kStartDirection = 3 * kDegree; // standard deviation of its dir
 constexpr int kPlacingPoints = 12;              // of known depth that place a frame, at least
 constexpr int kPlacingIterations = 6;           // of the bundle adjustment a frame
 constexpr double kLeastNoise_px = 0.1;          // floor of the observation noise
-constexpr double kPlacingInflation = 3;         // as RelativePoseOptions::inflation
 } // namespace
 
 struct PointOdometry::State
 {
   PinholeCamera camera;
-  double focal_sigma = 0;            ///< of its log
-  RelativePoseOptions relative_pose; ///< of the start
+  double focal_sigma = 0; ///< of its log
   std::deque<KeyFrame> window;
   std::map<std::size_t, Pose> key_poses; ///< of all key frames, by frame index
   std::unordered_map<std::uint64_t, Landmark> landmarks;
@@ -102,8 +99,6 @@ struct PointOdometry::State
   double typicalInverseDepth() const;
 };
 
-const char *toString(PointOdometryStatus status) { return nameOf(status, {"starting", "ok", "rotation_only", "lost"}); }
-
 PointOdometry::PointOdometry(const PinholeCamera &camera, double focal_sigma) : m_state(new State)
 {
   m_state->camera = camera;
@@ -131,9 +126,8 @@ PointOdometryResult PointOdometry::process(const PointTracker &tracker, const st
     state.expectTurn(tracker.matches(1));
   PointOdometryResult result = state.started ? state.place(turned.has_value()) : state.begin(tracker);
   result.wMc = state.wMc;
-  result.previousMc = before.inverse() * state.wMc;
   if (state.started && result.status == PointOdometryStatus::ok)
-    state.velocity = result.previousMc;
+    state.velocity = before.inverse() * state.wMc;
   Record &last = state.records.back();
   last.status = result.status;
   if (state.started) {
@@ -172,15 +166,15 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
     prior.aRb = turned->R;
     prior.rotation_covariance = turned->covariance();
   }
-  const auto estimate = estimateRelativePose(matches, camera, prior, relative_pose);
+  const auto estimate = estimateRelativePose(matches, camera, prior);
   const double wanted_px = kStartParallax * focal();
   const bool translates =
       focal_sigma == 0 || unexplainedByTurning(matches) > std::max(0.25 * wanted_px, 3 * estimate.sigma_px);
   if ((!translates || !estimate.hasRotation()) && matches.size() >= 6) {
     // What looks like a flight past a wall is taken for a pan, and so is what cannot be told from one.
-    wMc.R = window.front().wMc.R * motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior),
-                                                       kLeastNoise_px / focal(), relative_pose)
-                                       .aRb;
+    wMc.R =
+        window.front().wMc.R *
+        motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior(prior), kLeastNoise_px / focal()).aRb;
   }
   else if (estimate.hasRotation()) {
     wMc.R = window.front().wMc.R * estimate.aRb;
@@ -195,7 +189,6 @@ PointOdometryResult PointOdometry::State::begin(const PointTracker &tracker)
       start(estimate)) {
     result.status = PointOdometryStatus::ok;
     result.points = known();
-    result.key_frame = true;
     return result;
   }
   // Too little is left of what the first key frame saw: go on from here.
@@ -211,9 +204,8 @@ void PointOdometry::State::expectTurn(const std::vector<PointMatch> &matches)
   constexpr double kSurprise = 2 * kDegree;
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return;
-  const Eigen::Matrix3d turn = motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}),
-                                                   kLeastNoise_px / focal(), relative_pose)
-                                   .aRb;
+  const Eigen::Matrix3d turn =
+      motion::fitRotation(motion::Rays(matches, camera), motion::MotionPrior({}), kLeastNoise_px / focal()).aRb;
   if (logSo3(velocity.R.transpose() * turn).norm() > kSurprise)
     velocity.R = turn;
 }
@@ -225,12 +217,9 @@ double PointOdometry::State::unexplainedByTurning(const std::vector<PointMatch> 
   double least = 1e9;
   for (int sigmas = -3; sigmas <= 3; ++sigmas) {
     const double factor = std::exp(sigmas * focal_sigma);
-    PinholeCamera other = camera;
-    other.fx *= factor;
-    other.fy *= factor;
     const double pixel = 1 / (factor * focal());
-    const auto fit =
-        motion::fitRotation(motion::Rays(matches, other), motion::MotionPrior({}), 0.05 * pixel, relative_pose);
+    const auto fit = motion::fitRotation(motion::Rays(matches, motion::withFocal(camera, factor)),
+                                         motion::MotionPrior({}), 0.05 * pixel);
     least = std::min(least, fit.sigma / pixel);
   }
   return least;
@@ -243,7 +232,7 @@ std::vector<PointMatch> PointOdometry::State::matchesWithFirst(const PointTracke
   const Seen &first = window.front().seen;
   for (const PointTrack &track : tracker.tracks())
     if (const auto found = first.find(track.id); found != first.end())
-      matches.push_back({camera.project(found->second.homogeneous()), track.current(), track.id});
+      matches.push_back({camera.project(found->second.homogeneous()), track.current()});
   return matches;
 }
 
@@ -253,17 +242,19 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
   wMc = origin.wMc * Pose(first.aRb, first.direction);
   landmarks.clear();
   // Inverse depths from the two frames, then both and the frames between in one adjustment.
+  std::vector<BundleFrame> pair(2);
+  pair[0].wMc = origin.wMc;
+  pair[0].fixed = true;
+  pair[1].wMc = wMc;
   for (const auto &[id, xy_a] : origin.seen) {
     const auto found = seen.find(id);
     if (found == seen.end())
       continue;
-    double q = 0.05;
-    for (int iteration = 0; iteration < 5; ++iteration) {
-      Eigen::Vector2d J;
-      const Eigen::Vector2d e = motion::reprojection(origin.wMc, wMc, xy_a, q, found->second, nullptr, nullptr, &J);
-      q -= J.dot(e) / (J.squaredNorm() + 1e-12);
-    }
-    landmarks[id] = {origin.frame, xy_a, std::max(q, 0.0), 0, 0};
+    BundlePoint point;
+    point.xy = xy_a;
+    point.seen.push_back({1, found->second, 1});
+    motion::triangulate(point, pair);
+    landmarks[id] = {origin.frame, xy_a, point.inverse_depth, 0, 0};
   }
   const std::size_t now = records.size() - 1;
   window.push_back({now, wMc, seen, turned});
@@ -294,9 +285,6 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
   for (std::size_t k = 0; k + 1 < since_first.size(); ++k) {
     const std::size_t frame = now + 1 - since_first.size() + k;
     const double along = static_cast<double>(frame - origin.frame) / since_origin;
-    std::vector<BundleFrame> pair(2);
-    pair[0].wMc = origin.wMc;
-    pair[0].fixed = true;
     const Pose step = origin.wMc.inverse() * wMc;
     pair[1].wMc = origin.wMc * Pose(expSo3(along * logSo3(step.R)), along * step.t);
     std::vector<BundlePoint> seen_between;
@@ -328,29 +316,25 @@ bool PointOdometry::State::start(const RelativePoseEstimate &first)
 void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vector<BundlePoint> &points,
                                     std::vector<std::uint64_t> &ids) const
 {
-  std::map<std::size_t, int> index;
-  const int held = window.size() <= 3 ? 1 : std::min<int>(kHeldKeyFrames, int(window.size()) - 2);
-  for (const KeyFrame &key : window) {
+  const auto addFrame = [&frames](const Pose &pose, const std::optional<GyroRotation> &since_before) {
     BundleFrame frame;
-    frame.wMc = key.wMc;
-    frame.fixed = static_cast<int>(frames.size()) < held;
-    if (key.turned && !frames.empty()) {
-      frame.previousRthis = key.turned->R;
-      frame.rotation_information = key.turned->covariance().inverse();
+    frame.wMc = pose;
+    if (since_before && !frames.empty()) {
+      frame.previousRthis = since_before->R;
+      frame.rotation_information = since_before->covariance().inverse();
     }
-    index[key.frame] = static_cast<int>(frames.size());
     frames.push_back(frame);
+  };
+  std::map<std::size_t, std::size_t> index;
+  const std::size_t held = window.size() <= 3 ? 1 : std::min(kHeldKeyFrames, window.size() - 2);
+  for (const KeyFrame &key : window) {
+    index[key.frame] = frames.size();
+    addFrame(key.wMc, key.turned);
+    frames.back().fixed = frames.size() <= held;
   }
   const bool current = window.back().frame + 1 != records.size();
-  if (current) {
-    BundleFrame frame;
-    frame.wMc = wMc;
-    if (turned) {
-      frame.previousRthis = turned->R;
-      frame.rotation_information = turned->covariance().inverse();
-    }
-    frames.push_back(frame);
-  }
+  if (current)
+    addFrame(wMc, turned);
   const double typical = typicalInverseDepth();
   for (const auto &[id, landmark] : landmarks) {
     BundlePoint point;
@@ -360,15 +344,13 @@ void PointOdometry::State::assemble(std::vector<BundleFrame> &frames, std::vecto
     point.prior = typical;
     point.prior_information = 1 / (kDepthPrior * kDepthPrior * typical * typical + kRestSigma * kRestSigma);
     for (std::size_t k = 0; k < window.size(); ++k) {
-      if (static_cast<int>(k) == point.anchor)
-        continue;
       const auto found = window[k].seen.find(id);
-      if (found != window[k].seen.end())
-        point.seen.push_back({static_cast<int>(k), found->second, 1});
+      if (k != point.anchor && found != window[k].seen.end())
+        point.seen.push_back({k, found->second, 1});
     }
     const auto found = seen.find(id);
     if (current && found != seen.end())
-      point.seen.push_back({static_cast<int>(frames.size()) - 1, found->second, 1});
+      point.seen.push_back({frames.size() - 1, found->second, 1});
     if (!point.seen.empty()) {
       points.push_back(point);
       ids.push_back(id);
@@ -403,8 +385,7 @@ void PointOdometry::State::disassemble(const std::vector<BundleFrame> &frames, c
 PointOdometryResult PointOdometry::State::place(bool turned_known)
 {
   PointOdometryResult result;
-  Pose step = velocity;
-  wMc = wMc * step;
+  wMc = wMc * velocity;
   int common = 0;
   for (const auto &[id, landmark] : landmarks)
     common += seen.count(id) > 0;
@@ -434,17 +415,15 @@ PointOdometryResult PointOdometry::State::place(bool turned_known)
     disassemble(frames, points, ids);
     result.points = known();
     result.status = result.points >= kPlacingPoints ? PointOdometryStatus::ok : PointOdometryStatus::rotation_only;
-    result.covariance = kPlacingInflation * solved.last_covariance;
+    result.covariance = motion::kInflation * solved.last_covariance;
     if (result.status == PointOdometryStatus::rotation_only)
       result.covariance.topLeftCorner<3, 3>() += kHeldSigma * kHeldSigma * Eigen::Matrix3d::Identity();
   }
   else {
     result.status = PointOdometryStatus::lost;
   }
-  if (wantsKeyFrame()) {
+  if (wantsKeyFrame())
     addKeyFrame();
-    result.key_frame = true;
-  }
   return result;
 }
 
@@ -541,8 +520,9 @@ std::vector<PlacedFrame> PointOdometry::trajectory() const
   return placed;
 }
 
-std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
+std::vector<PointDepth> PointOdometry::depths() const
 {
+  constexpr double kMostRelativeSigma = 0.3;
   std::vector<PointDepth> depths;
   for (const auto &[id, landmark] : m_state->landmarks) {
     const auto seen = m_state->seen.find(id);
@@ -555,7 +535,7 @@ std::vector<PointDepth> PointOdometry::depths(double max_relative_sigma) const
       continue;
     const double sigma = 1 / std::sqrt(landmark.information) / y.z();
     const double inverse_depth = landmark.inverse_depth / y.z();
-    if (sigma < max_relative_sigma * inverse_depth || std::abs(inverse_depth) < sigma)
+    if (sigma < kMostRelativeSigma * inverse_depth || std::abs(inverse_depth) < sigma)
       depths.push_back({m_state->camera.project(seen->second.homogeneous()), inverse_depth, sigma, id});
   }
   std::sort(depths.begin(), depths.end(), [](const PointDepth &x, const PointDepth &y) { return x.id < y.id; });

@@ -34,7 +34,6 @@ enum class PointOdometryStatus
   rotation_only, ///< too few points of known depth: the translation is held
   lost           ///< not enough points: nothing but the prediction
 };
-const char *toString(PointOdometryStatus status);
 
 /// Inverse depth of a point in the current image.
 struct PointDepth
@@ -49,10 +48,8 @@ struct PointOdometryResult
 {
   PointOdometryStatus status = PointOdometryStatus::starting;
   Pose wMc;
-  Pose previousMc; ///< motion since the frame before
-  /// Of previousMc, tangent (rho [unit], phi [rad]).
+  /// Of the motion since the frame before, tangent (rho [unit], phi [rad]).
   Matrix6d covariance = Matrix6d::Identity();
-  bool key_frame = false;
   int points = 0;      ///< of known depth in this frame
   double sigma_px = 0; ///< noise of the observations
 };
@@ -80,9 +77,9 @@ public:
 
   /// All frames so far; those before the start are placed once the first baseline is known.
   std::vector<PlacedFrame> trajectory() const;
-  /// Points of the current frame whose inverse depth is known to better than \p max_relative_sigma
-  /// (or, being far, indistinguishable from zero).
-  std::vector<PointDepth> depths(double max_relative_sigma = 0.3) const;
+  /// Points of the current frame whose inverse depth is known to better than 30 % (or, being far, indistinguishable
+  /// from zero).
+  std::vector<PointDepth> depths() const;
 
 private:
   struct State;

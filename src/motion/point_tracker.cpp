@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/point_tracker.h"
 
+#include "geometry/failure.h"
 #include "geometry/median.h"
 #include "motion/coarse_shift.h"
 #include "motion/image_view.h"
@@ -11,9 +12,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fmt/format.h>
 #include <optional>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -42,7 +41,6 @@ struct PointTracker::State
   GreyPyramid pyramid, next; ///< of the last image and of the one before it
   std::vector<PointTrack> tracks;
   std::uint64_t next_id = 1;
-  std::size_t frames = 0;
   double brightness_change = 0;
   cv::Mat response; ///< kept for its memory
   CornerScratch scratch;
@@ -125,18 +123,15 @@ PointTracker &PointTracker::operator=(PointTracker &&) noexcept = default;
 void PointTracker::track(const vpImage<unsigned char> &image, const Eigen::Matrix3d &aRb)
 {
   const cv::Mat current = viewOf(image);
-  if (current.cols != m_state->camera.width || current.rows != m_state->camera.height) {
-    throw vpException(vpException::dimensionError,
-                      fmt::format("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
-                                  m_state->camera.width, m_state->camera.height));
-  }
+  if (current.cols != m_state->camera.width || current.rows != m_state->camera.height)
+    throw dimensionError("point tracker: image {} x {}, must be {} x {}", current.cols, current.rows,
+                         m_state->camera.width, m_state->camera.height);
   buildPyramid(current, kLevels, m_state->next);
   m_state->brightness_change = 0;
   if (!m_state->pyramid.empty() && !m_state->tracks.empty())
     m_state->follow(aRb);
   m_state->replenish(current);
   m_state->pyramid.swap(m_state->next);
-  ++m_state->frames;
 }
 
 /// Where each track is now, searched from \p start on; nothing where it ended. Second: how many go on.
@@ -251,7 +246,6 @@ void PointTracker::State::replenish(const cv::Mat &image)
           continue;
         PointTrack track;
         track.id = next_id++;
-        track.response = corner.response;
         track.positions_px.push_back(refined(response, corner.at));
         occupied.add(toCv(track.current()));
         tracks.push_back(std::move(track));
@@ -272,13 +266,11 @@ std::vector<PointMatch> PointTracker::matches(int frames_back) const
   std::vector<PointMatch> matches;
   for (const PointTrack &track : m_state->tracks)
     if (frames_back >= 1 && track.age() >= frames_back)
-      matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current(), track.id});
+      matches.push_back({*(track.positions_px.rbegin() + frames_back), track.current()});
   return matches;
 }
 
 double PointTracker::brightnessChange() const { return m_state->brightness_change; }
-
-std::size_t PointTracker::frames() const { return m_state->frames; }
 
 void PointTracker::forgetLast()
 {
@@ -289,13 +281,5 @@ void PointTracker::forgetLast()
       std::remove_if(tracks.begin(), tracks.end(), [](const PointTrack &track) { return track.positions_px.empty(); }),
       tracks.end());
   m_state->pyramid.swap(m_state->next);
-  --m_state->frames;
-}
-
-void PointTracker::reset()
-{
-  m_state->tracks.clear();
-  m_state->pyramid.clear();
-  m_state->frames = 0;
 }
 } // namespace bole

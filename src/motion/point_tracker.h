@@ -28,7 +28,6 @@ struct PointTrack
 {
   std::uint64_t id = 0;                      ///< never used twice
   std::vector<Eigen::Vector2d> positions_px; ///< oldest first; the last one is in the current frame
-  double response = 0;                       ///< of the corner where it was found
 
   const Eigen::Vector2d &current() const { return positions_px.back(); }
   /// Number of frames back to which the track reaches: 0 for a new one.
@@ -39,7 +38,6 @@ struct PointTrack
 struct PointMatch
 {
   Eigen::Vector2d a_px, b_px;
-  std::uint64_t id = 0;
 };
 
 /// Example:
@@ -70,13 +68,9 @@ public:
   std::vector<PointMatch> matches(int frames_back) const;
   /// Logarithm of the brightness of the current image over that of the one before it: the camera's exposure.
   double brightnessChange() const;
-  /// Frames seen since the start or the last reset().
-  std::size_t frames() const;
   /// Forgets the last image: the next one is tracked from the one before it. Tracks that it ended stay ended. Once
   /// after each track().
   void forgetLast();
-  /// Forgets all tracks: after a jump of the video.
-  void reset();
 
 private:
   struct State;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "motion/relative_pose.h"
 
-#include "geometry/names.h"
 #include "motion/epipolar.h"
 
 #include <Eigen/Dense>
@@ -46,12 +45,12 @@ void takeRotation(RelativePoseEstimate &estimate, const RotationFit &fit)
 /// The covariance of the joint fit. A flow of pure noise also seems to know its direction: the
 /// share of the flow along the lines that is no noise, 1 - 1/ratio, is the share of the direction's
 /// information that is real.
-Matrix5d covarianceOf(const JointFit &fit, const MotionPrior &prior, double ratio, double inflation)
+Matrix5d covarianceOf(const JointFit &fit, const MotionPrior &prior, double ratio)
 {
   Vector5d scale = Vector5d::Ones();
   scale.tail<2>().setConstant(std::sqrt(std::max(0.01, 1 - 1 / std::max(ratio, 1.0))));
   Matrix5d information = scale.asDiagonal() * fit.information * scale.asDiagonal();
-  information /= inflation;
+  information /= motion::kInflation;
   information.topLeftCorner<3, 3>() += prior.rotation_information;
   information(3, 3) += prior.direction_information;
   information(4, 4) += prior.direction_information;
@@ -62,13 +61,13 @@ Matrix5d covarianceOf(const JointFit &fit, const MotionPrior &prior, double rati
 /// Best of the fits from all starts, signs of the directions settled by the depths; and whether
 /// another is as good.
 JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const MotionPrior &prior, double sigma,
-                 double min_sigma, const RelativePoseOptions &options, bool &ambiguous)
+                 double min_sigma, bool &ambiguous)
 {
   std::vector<JointFit> fits;
   for (Motion start : starts) {
     if (motion::parallaxOf(rays, start, sigma).score < 0)
       start.direction = -start.direction;
-    fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma, options));
+    fits.push_back(motion::fitMotion(rays, start, prior, sigma, min_sigma));
   }
   // Costs count in sigmas of the best fit's noise.
   const auto best = std::min_element(fits.begin(), fits.end(), [](const JointFit &x, const JointFit &y) {
@@ -85,13 +84,8 @@ JointFit bestFit(const Rays &rays, const std::vector<Motion> &starts, const Moti
 }
 } // namespace
 
-const char *toString(RelativePoseStatus status)
-{
-  return nameOf(status, {"ok", "too_few_points", "no_parallax", "ambiguous", "inconsistent"});
-}
-
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
-                                          const RelativePosePrior &given, const RelativePoseOptions &options)
+                                          const RelativePosePrior &given, double min_sigma_px)
 {
   RelativePoseEstimate estimate;
   const MotionPrior prior(given);
@@ -99,14 +93,14 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return estimate;
   const double focal = std::sqrt(camera.fx * camera.fy);
-  const double min_sigma = options.min_sigma_px / focal;
+  const double min_sigma = min_sigma_px / focal;
   const Rays rays(matches, camera);
   const Eigen::Matrix3d start_rotation =
-      prior.has_rotation ? prior.aRb : motion::fitRotation(rays, prior, min_sigma, options).aRb;
+      prior.has_rotation ? prior.aRb : motion::fitRotation(rays, prior, min_sigma).aRb;
   const double start_sigma = std::max(min_sigma, 0.4 / focal);
-  const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma, options);
+  const auto starts = motion::motionStarts(rays, start_rotation, prior, start_sigma);
   bool ambiguous = false;
-  JointFit fit = bestFit(rays, starts, prior, start_sigma, min_sigma, options, ambiguous);
+  JointFit fit = bestFit(rays, starts, prior, start_sigma, min_sigma, ambiguous);
   Parallax parallax = motion::parallaxOf(rays, fit.motion, fit.sigma);
   if (parallax.score < -3) {
     fit.motion.direction = -fit.motion.direction;
@@ -121,13 +115,13 @@ RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches
   }
   if (parallax.ratio < kLeastParallaxRatio || parallax.score < 3) {
     estimate.status = RelativePoseStatus::no_parallax;
-    takeRotation(estimate, motion::fitRotation(rays, prior, min_sigma, options));
+    takeRotation(estimate, motion::fitRotation(rays, prior, min_sigma));
     return estimate;
   }
   estimate.status = ambiguous && !prior.has_rotation ? RelativePoseStatus::ambiguous : RelativePoseStatus::ok;
   estimate.aRb = fit.motion.aRb;
   estimate.direction = fit.motion.direction;
-  estimate.covariance = covarianceOf(fit, prior, parallax.ratio, options.inflation);
+  estimate.covariance = covarianceOf(fit, prior, parallax.ratio);
   // However many the points: errors that they share do not average below a tenth of noise over
   // parallax.
   const double shared = kSharedError * fit.sigma / std::max(flow, fit.sigma);

@@ -34,14 +34,7 @@
 
 namespace bole
 {
-struct RelativePoseOptions
-{
-  double min_sigma_px = 0.05; ///< floor of the residual noise, > 0
-  /// Covariance is multiplied by this, >= 1: errors of neighbouring tracks are not independent. Chosen so that the
-  /// normalised error squared of the rendered flights is near its degrees of freedom.
-  double inflation = 3;
-  int iterations = 12; ///< of Gauss-Newton
-};
+constexpr double kMatchSigma_px = 0.05; ///< floor of the noise of a match, one coordinate
 
 /// What is known before the matches are looked at.
 struct RelativePosePrior
@@ -61,7 +54,6 @@ enum class RelativePoseStatus
   ambiguous,      ///< two motions explain the matches equally well (a plane in view, no prior)
   inconsistent    ///< the matches do not agree on a motion: rotation and direction are the prior's
 };
-const char *toString(RelativePoseStatus status);
 
 struct RelativePoseEstimate
 {
@@ -80,5 +72,5 @@ struct RelativePoseEstimate
 
 /// The motion between the frames of \p matches. Never throws on data; see the status.
 RelativePoseEstimate estimateRelativePose(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
-                                          const RelativePosePrior &prior = {}, const RelativePoseOptions &options = {});
+                                          const RelativePosePrior &prior = {}, double min_sigma_px = kMatchSigma_px);
 } // namespace bole

@@ -16,15 +16,9 @@ namespace
 {
 constexpr double kWideShear = 1; // sigma of the shear before anything is seen
 
-/// Noise of a match that is believed at the least [normalised].
-double leastNoise(const PinholeCamera &camera, const RelativePoseOptions &options)
-{
-  return options.min_sigma_px / std::sqrt(camera.fx * camera.fy);
-}
-
 /// Gauss-Newton with redescending weights, their scale that of the bulk in each step.
 std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion, const motion::MotionPrior &prior,
-                                 double min_sigma, double inflation)
+                                 double min_sigma)
 {
   constexpr int kIterations = 8;
   constexpr double kSettled = 1e-5; // of a step: a hundredth of a pixel over 1000 rows
@@ -34,15 +28,15 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     motion::EpipolarTerms terms = motion::termsOf(motion, 1);
     terms.shear = shear;
-    residualsOfMatches(rays.columns, terms, residuals.data());
+    residualsOfMatches(rays, terms, residuals.data());
     const double sigma = terms.sigma = std::max(min_sigma, motion::bulkSigma(residuals));
-    const motion::ShearSums sums = shearSumsOfMatches(rays.columns, terms);
+    const motion::ShearSums sums = shearSumsOfMatches(rays, terms);
     Matrix6d H;
     const double *entry = sums.H;
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j)
-        H(i, j) = H(j, i) = *entry++ / inflation;
-    Vector6d g = Vector6d::Map(sums.g) / inflation;
+        H(i, j) = H(j, i) = *entry++ / motion::kInflation;
+    Vector6d g = Vector6d::Map(sums.g) / motion::kInflation;
     const double wide = 1 / (kWideShear * kWideShear);
     H.topLeftCorner<3, 3>() += prior.rotation_information;
     H.diagonal().array() += 1e-9;
@@ -65,17 +59,16 @@ std::optional<RowShear> fitShear(const motion::Rays &rays, motion::Motion motion
 } // namespace
 
 RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
-                          const RelativePosePrior &given, const std::vector<Pose> &starts,
-                          const RelativePoseOptions &options)
+                          const RelativePosePrior &given, const std::vector<Pose> &starts, double min_sigma_px)
 {
   if (matches.size() < RelativePoseEstimate::kLeastMatches)
     return {};
   const motion::MotionPrior prior(given);
   const motion::Rays rays(matches, camera);
-  const double min_sigma = leastNoise(camera, options);
+  const double min_sigma = min_sigma_px / std::sqrt(camera.fx * camera.fy);
   std::optional<RowShear> best;
   for (const Pose &start : starts) {
-    const auto fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma, options.inflation);
+    const auto fit = fitShear(rays, {start.R, start.t.normalized()}, prior, min_sigma);
     if (fit && (!best || fit->noise < best->noise))
       best = fit;
   }
@@ -83,18 +76,17 @@ RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeC
 }
 
 double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, const PinholeCamera &camera,
-                   const RelativePosePrior &given, const std::vector<Pose> &starts, const RelativePoseOptions &options)
+                   const RelativePosePrior &given, const std::vector<Pose> &starts, double min_sigma_px)
 {
   const motion::MotionPrior prior(given);
   const motion::Rays rays(matches, camera);
   motion::Rays upright;
   for (std::size_t i = 0; i < rays.size(); ++i)
-    upright.add(rays.a[i], rays.b[i] - row.shear * rays.b[i].y() * Eigen::Vector3d::UnitX());
-  const double min_sigma = leastNoise(camera, options);
+    upright.add(rays.a(i), rays.b(i) - row.shear * rays.b(i).y() * Eigen::Vector3d::UnitX());
+  const double min_sigma = min_sigma_px / std::sqrt(camera.fx * camera.fy);
   const auto costFrom = [&](const motion::Rays &from, const Pose &start) {
-    const motion::JointFit fit =
-        motion::fitMotion(from, {start.R, start.t.normalized()}, prior, row.noise, min_sigma, options);
-    return motion::costOf(from, fit.motion, prior, row.noise, options);
+    const motion::JointFit fit = motion::fitMotion(from, {start.R, start.t.normalized()}, prior, row.noise, min_sigma);
+    return motion::costOf(from, fit.motion, prior, row.noise);
   };
   double without = costFrom(rays, row.aMb);
   for (const Pose &start : starts)

@@ -34,12 +34,12 @@ struct RowShear
 /// to begin with, of which the one that explains most wins. Sheared matches lead estimateRelativePose() far astray.
 RowShear estimateRowShear(const std::vector<PointMatch> &matches, const PinholeCamera &camera,
                           const RelativePosePrior &prior, const std::vector<Pose> &starts,
-                          const RelativePoseOptions &options = {});
+                          double min_sigma_px = kMatchSigma_px);
 
 /// Chi-squared (one degree of freedom where nothing is sheared) by which \p row explains the matches better than the
 /// best motion without a shear that is found from \p starts and its own: the ratio of likelihoods holds where the sigma
 /// of a linear fit does not, as in a flight sideways above the ground, of which another direction explains as much.
 double gainOfShear(const RowShear &row, const std::vector<PointMatch> &matches, const PinholeCamera &camera,
                    const RelativePosePrior &prior, const std::vector<Pose> &starts,
-                   const RelativePoseOptions &options = {});
+                   double min_sigma_px = kMatchSigma_px);
 } // namespace bole

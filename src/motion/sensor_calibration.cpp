@@ -343,9 +343,7 @@ void Estimation::calibrateAttitude()
 
 void Estimation::calibrateOdometryClock()
 {
-  SensorCalibration tried = m_result;
-  tried.odometry_late_s = 0;
-  const std::vector<Frame> frames = corrected(m_frames, tried);
+  const std::vector<Frame> frames = corrected(m_frames, m_result);
   const GyroTurns gyro(samplesOf(frames));
   std::vector<Frame> usable; // that every offset can be tried on
   for (const Frame &frame : frames)
@@ -478,7 +476,7 @@ SensorCalibration calibrateSensors(FrameSource &source, bool use_gyro, bool use_
     motion.a_ns = frames[motion.a_index].stamp_ns;
     motion.b_ns = frame.stamp_ns;
     std::vector<PointMatch> matches = tracker.matches(back);
-    motion.points = motion.estimate = estimateRelativePose(matches, camera);
+    motion.points = estimateRelativePose(matches, camera);
     motions.push_back(motion);
     if (motions.size() % kLensEvery == 0 && motion.points.hasDirection())
       pairs.push_back(std::move(matches));

@@ -21,16 +21,14 @@ using Eigen::Vector3d;
 namespace
 {
 constexpr double kMemory_s = 4;
-constexpr double kAgreed_s = 3;           // after which a gyro that contradicted the points is trusted again
-constexpr int kWindow = 6, kOfWindow = 4; // comparisons that are remembered, and those that make an alarm
+constexpr double kAgreed_s = 3;                   // after which a gyro that contradicted the points is trusted again
+constexpr std::size_t kWindow = 6, kOfWindow = 4; // comparisons that are remembered, and those that make an alarm
 constexpr double kLimitPoints = 25;   // of a squared difference with the points, 3 degrees of freedom; measured on 15
                                       // flights: at most 10 without a fault, 20 to 2000 with one
 constexpr double kLimitOdometry = 30; // of one with the odometry; at most 17 without a fault
 constexpr double kLimitOdds = 3;      // of the log-likelihood ratio that the points err and not the gyro: 20 to 1
 constexpr double kBiasSigma = 0.008;  // that a gyro may have [rad/s]
 constexpr double kStuck_s = 0.5;      // with one value
-
-std::int64_t nanoseconds(double s) { return static_cast<std::int64_t>(std::llround(1e9 * s)); }
 
 double squared(const Matrix3d &aRb, const Matrix3d &aRb_other, const Matrix3d &covariance)
 {
@@ -157,7 +155,7 @@ void SensorMonitor::recover(Sensor sensor, double time_s)
 bool SensorMonitor::hasGyroAgreedInTurns() const
 {
   constexpr double kTurned = 100; // squared turns about an axis over their variance
-  const std::int64_t from_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
+  const std::int64_t from_ns = m_comparisons.back().b_ns - nsOf(kAgreed_s);
   Vector3d turned = Vector3d::Zero();
   for (const Comparison &c : m_comparisons) {
     if (c.b_ns <= from_ns)
@@ -174,24 +172,23 @@ bool SensorMonitor::hasGyroAgreedInTurns() const
 void SensorMonitor::checkRecovery(Sensor sensor)
 {
   const std::optional<std::size_t> verdict = of(sensor).may_recover;
-  const auto window = static_cast<std::size_t>(kWindow);
-  if (!verdict || m_comparisons.size() < window)
+  if (!verdict || m_comparisons.size() < kWindow)
     return;
   const std::string &kind = m_verdicts[*verdict].kind;
   if (kind != "ended" && kind != "stuck" && !hasGyroAgreedInTurns())
     return;
   const bool is_gyro = sensor == Sensor::gyro;
-  for (auto c = m_comparisons.end() - static_cast<std::ptrdiff_t>(window); c != m_comparisons.end(); ++c)
+  for (auto c = windowBegin(); c != m_comparisons.end(); ++c)
     if (is_gyro ? !c->gyro || c->gyro_points > 0.5 * kLimitPoints
                 : !c->odometry || c->odometry_points > 0.5 * kLimitOdometry)
       return;
-  const std::int64_t back_ns = (m_comparisons.end() - static_cast<std::ptrdiff_t>(window))->a_ns;
+  const std::int64_t back_ns = windowBegin()->a_ns;
   if (is_gyro && (!m_gyro_changed_ns || secondsOf(m_last_gyro_ns - *m_gyro_changed_ns) > 0.5 * kStuck_s))
     return;
   if (!is_gyro && std::any_of(m_steps.begin(), m_steps.end(),
                               [back_ns](const Step &step) { return step.stamp_ns > back_ns && step.is_held; }))
     return;
-  const std::int64_t agreed_ns = m_comparisons.back().b_ns - nanoseconds(kAgreed_s);
+  const std::int64_t agreed_ns = m_comparisons.back().b_ns - nsOf(kAgreed_s);
   while (is_gyro && m_comparisons.front().b_ns <= agreed_ns) // what was before is judged
     m_comparisons.pop_front();
   recover(sensor, secondsOf(back_ns));
@@ -214,7 +211,7 @@ void SensorMonitor::rejectOutvoted(const Frame &frame)
 void SensorMonitor::collect(const Frame &frame)
 {
   m_samples.insert(m_samples.end(), frame.gyro.begin(), frame.gyro.end());
-  const std::int64_t oldest = frame.stamp_ns - nanoseconds(kMemory_s);
+  const std::int64_t oldest = frame.stamp_ns - nsOf(kMemory_s);
   m_samples.erase(m_samples.begin(),
                   std::find_if(m_samples.begin(), m_samples.end(),
                                [oldest](const GyroSample &sample) { return sample.stamp_ns >= oldest; }));
@@ -288,7 +285,7 @@ void SensorMonitor::checkLostSamples(std::int64_t now_ns)
   const double long_s = kUsual * medianOf(spacings_s);
   double lost_s = 0, longest_s = 0;
   for (std::size_t i = 0; i < spacings_s.size(); ++i)
-    if (now_ns - m_samples[i + 1].stamp_ns < nanoseconds(1) && spacings_s[i] > long_s && spacings_s[i] < kSilence_s) {
+    if (now_ns - m_samples[i + 1].stamp_ns < nsOf(1) && spacings_s[i] > long_s && spacings_s[i] < kSilence_s) {
       lost_s += spacings_s[i];
       longest_s = std::max(longest_s, spacings_s[i]);
     }
@@ -367,7 +364,7 @@ void SensorMonitor::compare(const Frame &frame, const RelativeMotion &motion)
 
 std::deque<SensorMonitor::Comparison>::const_iterator SensorMonitor::windowBegin() const
 {
-  return m_comparisons.end() - std::min<std::ptrdiff_t>(kWindow, std::ptrdiff_t(m_comparisons.size()));
+  return m_comparisons.end() - static_cast<std::ptrdiff_t>(std::min(kWindow, m_comparisons.size()));
 }
 
 /// Log-likelihood ratio that the points err and not the gyro, by all of the window where these two differ: 0 without an
@@ -386,9 +383,9 @@ double SensorMonitor::logOddsOfPoints() const
 /// Raises a verdict on the sensor that is in all failing pairs.
 void SensorMonitor::checkRotations()
 {
-  if (static_cast<int>(m_comparisons.size()) < kOfWindow)
+  if (m_comparisons.size() < kOfWindow)
     return;
-  int gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
+  std::size_t gyro_points = 0, gyro_odometry = 0, odometry_points = 0;
   double since_s = secondsOf(m_comparisons.back().a_ns);
   for (auto c = windowBegin(); c != m_comparisons.end(); ++c) {
     gyro_points += c->gyro_points > kLimitPoints;
@@ -397,9 +394,8 @@ void SensorMonitor::checkRotations()
     if (c->gyro_points > kLimitPoints || c->odometry_points > kLimitOdometry)
       since_s = std::min(since_s, secondsOf(c->a_ns));
   }
-  const int enough = kOfWindow;
-  const bool gyro_failed = gyro_points >= enough && trusts(Sensor::gyro);
-  const bool odometry_failed = odometry_points >= enough && trusts(Sensor::odometry);
+  const bool gyro_failed = gyro_points >= kOfWindow && trusts(Sensor::gyro);
+  const bool odometry_failed = odometry_points >= kOfWindow && trusts(Sensor::odometry);
   if (gyro_failed && odometry_points * 2 >= gyro_points && odometry_points > 0 && gyro_odometry == 0)
     raise(Sensor::images, "rotation", since_s,
           fmt::format("images: contradict gyro and odometry since {:.1f} s (late, skewed or of another camera)",
@@ -428,7 +424,7 @@ void SensorMonitor::diagnoseGyro()
       continue;
     const double white = std::pow(1e-3 * secondsOf(c.b_ns - c.a_ns), 2); // of the gyro
     turns.push_back({c.a_ns, c.b_ns, *c.points, (c.points_covariance + white * Matrix3d::Identity()).inverse()});
-    const std::int64_t most_ns = nanoseconds(calibration::kMostLate_s);
+    const std::int64_t most_ns = nsOf(calibration::kMostLate_s);
     if (gyro.between(c.a_ns - most_ns, c.b_ns + most_ns))
       at_any_time.push_back(turns.back());
   }

@@ -114,8 +114,7 @@ VerticalEstimate fitUp(const std::vector<VerticalEdge> &edges, const Eigen::Vect
   estimate.share = std::max(0.0, 1 - kChance * static_cast<double>(edges.size()) / std::max(1, estimate.edges));
   estimate.information *= estimate.share * estimate.share;
   estimate.gradient *= estimate.share * estimate.share;
-  if (estimate.edges >= kLeastEdges && estimate.share > kLeastShare)
-    estimate.status = VerticalStatus::ok;
+  estimate.known = estimate.edges >= kLeastEdges && estimate.share > kLeastShare;
   return estimate;
 }
 } // namespace
@@ -146,7 +145,7 @@ void VerticalFilter::add(const Eigen::Matrix3d &wRc, const VerticalEstimate &est
 {
   constexpr double kDrift = 1e-3; // standard deviation by which the rotation of a path errs from frame to frame [rad]
   constexpr int kIterations = 3;
-  if (estimate.status != VerticalStatus::ok)
+  if (!estimate.known)
     return;
   const Eigen::Vector3d seen = wRc * estimate.up;
   if (m_n == 0) { // cameras are held upright, more or less

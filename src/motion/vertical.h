@@ -15,7 +15,7 @@
 /// open: the covariance says so.
 ///
 /// Laws (each a test): edges that run through the image of the zenith give the zenith; an image
-/// without edges gives the expected direction and the status too_few_edges.
+/// without edges gives the expected direction, which is not known then.
 ///
 /// Cost: about 0.4 ms at 320x240.
 
@@ -29,15 +29,9 @@
 
 namespace bole
 {
-enum class VerticalStatus
-{
-  ok,
-  too_few_edges
-};
-
 struct VerticalEstimate
 {
-  VerticalStatus status = VerticalStatus::too_few_edges;
+  bool known = false;                             ///< by edges enough
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY(); ///< unit vector in the camera frame, with the prior
   /// What the edges alone say, in directionBasis(up): information [1/rad^2] and gradient [1/rad] of their
   /// log-likelihood at up, where the prior balances it.
@@ -46,7 +40,7 @@ struct VerticalEstimate
   int edges = 0;    ///< patches that agree
   double share = 0; ///< of them beyond those that would agree by chance, 0 to 1
 
-  bool isSure() const { return status == VerticalStatus::ok && share > 0.5; }
+  bool isSure() const { return known && share > 0.5; }
 };
 
 /// A straight edge that may be vertical, in the frame of a camera or of a path.

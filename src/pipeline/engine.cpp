@@ -45,7 +45,7 @@ std::optional<SaliencyField> fieldOf(std::optional<Saliency> saliency)
 {
   if (!saliency)
     return std::nullopt;
-  return SaliencyField{std::move(saliency->p_background), std::move(saliency->confidence), saliency->unknown_below};
+  return SaliencyField{std::move(saliency->p_background), std::move(saliency->confidence), kUnknownBelow};
 }
 
 /// Whether two detections are of one trunk: their axes are nearer than the smaller radius, and their radii differ by

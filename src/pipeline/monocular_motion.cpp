@@ -89,7 +89,7 @@ PointOdometryResult MonocularMotion::placeFrame(const Frame &frame, const std::o
   m_placed.push_back(m_frame);
   const VerticalEstimate vertical = m_verticals.find(frame.image, m_camera, placed.wMc.R, up());
   m_vertical.add(placed.wMc.R, vertical);
-  m_frames_with_up += vertical.status == VerticalStatus::ok;
+  m_frames_with_up += vertical.known;
   if (vertical.isSure())
     m_first_up = vertical.up;
   if (!m_has_unit && placed.status == PointOdometryStatus::ok)

@@ -140,7 +140,7 @@ StageOptions stageOptions(const Options &options, const PinholeCamera &camera)
   o.camera_height = options.camera.height;
   o.focal_sigma = options.camera.focal_sigma;
   if (options.camera.compressed)
-    o.points.relative_pose.min_sigma_px = kCompressedSigma_px;
+    o.points.min_sigma_px = kCompressedSigma_px;
   scaleToRate(o, rateOf(options) / Options::kUsualRate_hz);
   setTrunks(o, options.trunks);
   setRange(o, options.range);

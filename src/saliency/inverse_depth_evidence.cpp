@@ -11,9 +11,8 @@ namespace bole
 {
 namespace
 {
-constexpr double kNearPrior = 0.3;   // p(nearer than near_range) before looking
-constexpr float kOutside = 1;        // residual where the older image ends: as bad as any, so that it says nothing
-constexpr double kUnrelatedPx = 2.5; // two unrelated places of the same texture differ as if so far apart
+constexpr double kNearPrior = 0.3;      // p(nearer than near_range) before looking
+constexpr double kResidualSigma = 0.05; // 1 = full scale; above a pixel's noise: light, leaves, model
 
 std::size_t index(int i, int j, int width)
 {
@@ -28,7 +27,7 @@ InverseDepthEvidence::InverseDepthEvidence(const PinholeCamera &camera, int leve
       m_rows((camera.height + kRowStep - 1) / kRowStep),
       m_window_rows(options.window_height_px / kRowStep | 1)
 {
-  const double sigma = options.sigma_residual * std::max(std::ldexp(1.0, -level), 0.25);
+  const double sigma = kResidualSigma * std::max(std::ldexp(1.0, -level), 0.25);
   m_intensity_variance = 2 * sigma * sigma;
   const double rho_max = 1 / options.min_range;
   for (int k = 0; k < kInverseDepths; ++k) {
@@ -82,7 +81,7 @@ void InverseDepthEvidence::predict(const Pose &pMc)
   RowsSeen seen(m_camera, pMc, m_rho);
   for (int i = 0; i < m_rows; ++i)
     movedEvidenceOfRow(seen(i * kRowStep), m_evidence.data(), m_rows, 1.f / kRowStep, m_camera.width,
-                       static_cast<float>(m_options.evidence_decay), &m_scratch[index(i, 0, m_camera.width)]);
+                       &m_scratch[index(i, 0, m_camera.width)]);
   m_evidence.swap(m_scratch);
 }
 
@@ -117,7 +116,7 @@ void InverseDepthEvidence::compare(const PyramidLevel &older, const PyramidLevel
   m_line.resize(index(0, width + window, width));
   for (int i = 0; i < m_rows; ++i) {
     squaredResidualsOfRow(seen(i * kRowStep), older.image.bitmap, static_cast<int>(older.image.getWidth()),
-                          current.image[static_cast<unsigned>(i * kRowStep)], width, kOutside * kOutside,
+                          current.image[static_cast<unsigned>(i * kRowStep)], width,
                           m_line.data() + window / 2 * kInverseDepths);
     meansOfRow(m_line, width, kInverseDepths, window, &m_scratch[index(i, 0, width)]);
   }
@@ -147,10 +146,8 @@ void InverseDepthEvidence::addLikelihood(const PyramidLevel &current, const Pose
   }
   // log of the likelihood of the window's residual, a Student's t, over that of an unrelated window; never below 0:
   // where no step matches (the place was hidden, or left the image) none is preferred.
-  constexpr float kWeight = 2.5f;
-  addLikelihoods({static_cast<float>(m_intensity_variance), static_cast<float>(kUnrelatedPx * kUnrelatedPx),
-                  flow_variance.data(), kWeight},
-                 g2, m_residuals.data(), pixels, m_evidence.data());
+  addLikelihoods(static_cast<float>(m_intensity_variance), flow_variance.data(), g2, m_residuals.data(), pixels,
+                 m_evidence.data());
 }
 
 vpImage<float> InverseDepthEvidence::logOddsNear() const

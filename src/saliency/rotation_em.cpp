@@ -12,8 +12,11 @@ namespace bole
 {
 namespace
 {
-constexpr double kConvergedStep = 1e-4;   // [rad], 0.02 px at f = 200 px
-constexpr float kTextureGradient = 0.01f; // [1/px]; below, intensity noise hides a pixel of motion
+constexpr double kConvergedStep = 1e-4;  // [rad], 0.02 px at f = 200 px
+constexpr double kSigmaIntensity = 0.02; // noise of a pixel, 1 = full scale: 1 to 3 % in rendered and real video
+constexpr int kIterations = 5;           // of EM, a level
+constexpr double kPull = 0.004;          // how far near things pull the rotation [rad]: .1 to .3 degrees in forests
+constexpr double kCorrelation = 30;      // pixels that count as one independent measurement: neighbours share errors
 
 /// Gauss-Newton sums of one M-step.
 struct NormalEquations
@@ -31,10 +34,10 @@ LevelNoise levelNoise(const SaliencyOptions &options, int level, bool wide)
   const double background = std::max(options.sigma_background_px * scale, floor_px);
   const double foreground = std::max(options.sigma_foreground_px * scale, 2 * background);
   // The mean of four pixels has half the noise.
-  const double intensity = options.sigma_intensity * std::max(scale, 0.25);
+  const double intensity = kSigmaIntensity * std::max(scale, 0.25);
   return {static_cast<float>(background * background), static_cast<float>(foreground * foreground),
           static_cast<float>(intensity * intensity),
-          static_cast<float>(std::log(options.background_prior / (1 - options.background_prior)))};
+          static_cast<float>(std::log(kBackgroundPrior / (1 - kBackgroundPrior)))};
 }
 
 LevelImages imagesOf(const PyramidLevel &level, int row)
@@ -71,7 +74,7 @@ public:
       row.current = imagesOf(m_current, row.row);
       row.y = static_cast<float>((row.row - camera.cy) / camera.fy);
       Eigen::Vector3f::Map(row.base) = static_cast<float>(row.row) * warp.H.col(1) + warp.H.col(2);
-      add(sumsOfRow(row, kTextureGradient, m_scratch, log_ratio ? (*log_ratio)[row.row] : nullptr), sums);
+      add(sumsOfRow(row, m_scratch, log_ratio ? (*log_ratio)[row.row] : nullptr), sums);
     }
     return sums;
   }
@@ -111,24 +114,21 @@ RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &cu
   NormalEquations sums;
   for (int level = coarsest; level >= finest; --level) {
     const LevelPass pass(previous[level], current[level], options, level, wide);
-    for (int iteration = 0; iteration < options.iterations; ++iteration) {
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
       sums = pass(result.pRc, nullptr);
       const Eigen::Vector3d off_prior = prior ? logSo3(prior->pRc.transpose() * result.pRc) : Eigen::Vector3d::Zero();
       // The images' own step, trusted no further than near things may pull it.
       const Eigen::Matrix3d H = sums.H + 1e-3 * Eigen::Matrix3d::Identity();
       const Eigen::Vector3d image_step = H.ldlt().solve(sums.g);
-      const double pull = options.sigma_rotation_pull;
       const Eigen::Matrix3d image_information =
-          inverseOf(inverseOf(H) * options.sample_correlation + pull * pull * Eigen::Matrix3d::Identity());
+          inverseOf(inverseOf(H) * kCorrelation + kPull * kPull * Eigen::Matrix3d::Identity());
       information = image_information + prior_information;
       const Eigen::Vector3d step =
           -information.ldlt().solve(image_information * image_step + prior_information * off_prior);
       if (!step.allFinite() || step.norm() > 0.5)
         break;
       result.pRc = orthonormalized(result.pRc * expSo3(step));
-      ++result.iterations;
-      result.converged = step.norm() < kConvergedStep;
-      if (result.converged)
+      if (step.norm() < kConvergedStep)
         break;
     }
   }

@@ -13,7 +13,6 @@ namespace bole
 namespace
 {
 constexpr double kLeastTexture = 0.002;  // share of textured pixels that a rotation needs
-constexpr float kUnknownBelow = 0.7f;    // |change of the log-odds| under which a pixel is unknown
 constexpr double kEnoughParallax_px = 3; // a pair of frames suffices when a point at near_range moves so much
 constexpr double kTranslationNoiseScale =
     0.5;                                 // of the prior's deviation in the sweep: its error moves all depths alike
@@ -53,13 +52,13 @@ ColumnsBetween between(int size, int small_size, float scale, int step)
 }
 
 /// Mean over a square window, clipped at the border of the image.
-vpImage<float> windowMean(const vpImage<float> &image, int window)
+vpImage<float> windowMean(const vpImage<float> &image)
 {
-  if (window == 1)
-    return image;
-  const int half = window / 2, height = static_cast<int>(image.getHeight()), width = static_cast<int>(image.getWidth());
+  constexpr int kWindow = 7; // [px at the working level]
+  const int half = kWindow / 2, height = static_cast<int>(image.getHeight()),
+            width = static_cast<int>(image.getWidth());
   vpImage<float> across(image.getHeight(), image.getWidth()), result(image.getHeight(), image.getWidth());
-  const float scale = 1.f / window;
+  const float scale = 1.f / kWindow;
   for (int i = 0; i < height; ++i)
     for (int j = 0; j < width; ++j) {
       float sum = 0;
@@ -90,7 +89,6 @@ void SaliencyEstimator::reset()
   m_views.clear();
   m_evidence.clear();
   m_last_image.resize(0, 0);
-  m_last = {};
   m_last_turn.setIdentity();
   m_has_pending_motion = false;
 }
@@ -103,15 +101,12 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
                          m_camera.width, m_camera.height);
   addMotion(gyro, translation);
   if (isStale(image)) {
-    Saliency result = m_last;
+    Saliency result;
     fill(m_labels, result);
-    result.status = SaliencyStatus::stale;
-    result.pRc.setIdentity();
     result.covariance.setZero();
     return result;
   }
   Saliency result;
-  result.unknown_below = kUnknownBelow;
   View view{ImagePyramid(image, m_camera, m_options.levels, m_options.finest_level), {}};
   if (m_views.empty()) {
     const float prior = m_evidence.priorLogOdds();
@@ -136,10 +131,8 @@ Saliency SaliencyEstimator::update(const vpImage<unsigned char> &image, const st
   while (static_cast<int>(m_views.size()) > m_options.max_frames_apart + 1)
     m_views.pop_back();
   m_last_image = image;
-  m_last = result;
   m_has_pending_motion = false;
   fill(m_labels, result);
-  m_last.unknown_share = result.unknown_share;
   return result;
 }
 
@@ -181,47 +174,38 @@ RotationEm SaliencyEstimator::refineRotation(const ImagePyramid &current, Salien
 {
   const RotationEm rotation =
       estimateRotation(m_views.front().pyramid, current, m_gyro, m_last_turn, m_options, !asksForRange());
-  const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
-  result.iterations = rotation.iterations;
   result.pRc = rotation.pRc;
   result.covariance = rotation.covariance;
-  result.status = m_gyro ? SaliencyStatus::with_gyro : SaliencyStatus::without_gyro;
+  const Eigen::Matrix3d fallback = m_gyro ? m_gyro->pRc : Eigen::Matrix3d::Identity();
   const bool off_gyro = m_gyro && logSo3(fallback.transpose() * rotation.pRc).norm() > kMaxTurnOffGyro;
-  if (rotation.texture < kLeastTexture)
-    result.status = SaliencyStatus::no_texture;
-  else if (!rotation.pRc.allFinite() || !rotation.covariance.allFinite() || off_gyro)
-    result.status = SaliencyStatus::not_converged;
-  if (result.status == SaliencyStatus::no_texture || result.status == SaliencyStatus::not_converged) {
+  if (rotation.texture < kLeastTexture || !rotation.pRc.allFinite() || !rotation.covariance.allFinite() || off_gyro) {
     result.pRc = fallback;
     result.covariance = m_gyro ? m_gyro->covariance : Eigen::Matrix3d(Eigen::Matrix3d::Identity() * 0.1);
   }
   return rotation;
 }
 
-SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByRange(const ImagePyramid &current, Saliency &result)
+SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByRange(const ImagePyramid &current, const Saliency &result)
 {
   const int level = workingLevel(m_camera, m_options);
   const PyramidLevel &now = current[level];
   m_evidence.predict(m_views[1].vMc.inverse() * m_views[0].vMc);
   for (std::size_t apart = 1; apart < m_views.size(); ++apart) {
     const Pose oMc = m_views[apart].vMc.inverse() * m_views[0].vMc;
-    result.parallax_px = medianParallax(m_camera, oMc, m_options.near_range);
-    if (result.parallax_px < kEnoughParallax_px && apart + 1 < m_views.size())
+    if (medianParallax(m_camera, oMc, m_options.near_range) < kEnoughParallax_px && apart + 1 < m_views.size())
       continue;
     const MotionNoise noise{meanDeviation(result.covariance) * std::sqrt(static_cast<double>(apart)),
                             kTranslationNoiseScale * meanDeviation(m_translation->covariance)};
     m_evidence.add(m_views[apart].pyramid[level], now, oMc, noise);
     break;
   }
-  result.asks_for_range = true;
   return {m_evidence.logOddsNear(), level, InverseDepthEvidence::kRowStep, m_evidence.priorLogOdds()};
 }
 
 SaliencyEstimator::CoarseLabels SaliencyEstimator::labelByMotion(const RotationEm &rotation) const
 {
-  const double prior = m_options.background_prior;
-  const float prior_log_odds = static_cast<float>(std::log((1 - prior) / prior));
-  vpImage<float> log_odds = windowMean(rotation.log_ratio, m_options.label_window_px);
+  const float prior_log_odds = static_cast<float>(std::log((1 - kBackgroundPrior) / kBackgroundPrior));
+  vpImage<float> log_odds = windowMean(rotation.log_ratio);
   for (unsigned p = 0; p < log_odds.getSize(); ++p)
     log_odds.bitmap[p] = prior_log_odds - log_odds.bitmap[p];
   return {std::move(log_odds), workingLevel(m_camera, m_options), 1, prior_log_odds};
@@ -237,12 +221,10 @@ void SaliencyEstimator::fill(const CoarseLabels &labels, Saliency &result) const
   const float scale = std::ldexp(1.f, -labels.level);
   const ColumnsBetween columns = between(m_camera.width, static_cast<int>(log_odds.getWidth()), scale, 1);
   const ColumnsBetween rows = between(m_camera.height, static_cast<int>(log_odds.getHeight()), scale, labels.row_step);
-  int unknown = 0;
   for (unsigned i = 0; i < height; ++i) {
     const int above = rows.left[i];
-    unknown += labelsOfRow(log_odds[above], log_odds[above + 1], rows.share[i], columns, labels.prior,
-                           result.unknown_below, result.p_background[i], result.confidence[i]);
+    labelsOfRow(log_odds[above], log_odds[above + 1], rows.share[i], columns, labels.prior, result.p_background[i],
+                result.confidence[i]);
   }
-  result.unknown_share = static_cast<double>(unknown) / std::max(1u, height * width);
 }
 } // namespace bole

@@ -9,12 +9,14 @@
 /// than the background. Pixels that no frame has told anything about are "unknown".
 ///
 /// Frames: p previous camera, c current camera. Images are rectified, all of the size of the camera.
-/// Errors: an image of another size throws vpException; everything else that may happen to a frame is a status.
+/// Errors: an image of another size throws vpException. Where the images do not tell the rotation it is that of the
+/// gyro, or none. The first frame is unknown everywhere; the same image once more changes no label, and its motion is
+/// kept for the next frame.
 /// Cost: 2 ms a frame of 320x240 (src/doc/saliency.md). Not thread-safe; no globals.
 ///
 ///     SaliencyEstimator estimator(camera);
 ///     const Saliency saliency = estimator.update(image, RotationPrior{pRc, covariance}, TranslationPrior{pt});
-///     if (saliency.isKnown(v, u) && saliency.p_background[v][u] < 0.5f) { ... near ... }
+///     if (saliency.confidence[v][u] >= kUnknownBelow && saliency.p_background[v][u] < 0.5f) { ... near ... }
 ///
 /// Laws (each a test): p_background is within [0, 1] and finite on any image; an image seen twice in a row changes no
 /// label; a blank image is unknown everywhere.
@@ -45,12 +47,10 @@ struct PyramidLevel
 class ImagePyramid
 {
 public:
-  ImagePyramid() = default;
-  ImagePyramid(const vpImage<unsigned char> &image, const PinholeCamera &camera, int levels, int finest_level = 0);
+  ImagePyramid(const vpImage<unsigned char> &image, const PinholeCamera &camera, int levels, int finest_level);
 
   int levels() const { return static_cast<int>(m_levels.size()); }
   const PyramidLevel &operator[](int level) const { return m_levels[static_cast<std::size_t>(level)]; }
-  bool empty() const { return m_levels.empty(); }
 
 private:
   std::vector<PyramidLevel> m_levels;
@@ -96,13 +96,13 @@ struct RotationPrior
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity() * 1e-6;
 };
 
+constexpr double kBackgroundPrior = 0.7; ///< p(lambda = 1) before looking: most of a forest is far
+
 struct RotationEm
 {
   Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< right perturbation [rad^2]
-  int iterations = 0;
-  double texture = 0;     ///< share of the pixels of the finest level whose gradient tells them apart
-  bool converged = false; ///< the last step was under 1e-4 rad
+  double texture = 0; ///< share of the pixels of the finest level whose gradient tells them apart
   /// log p(background) - log p(foreground) without the prior of the labels, at the finest level worked on.
   /// Empty where nobody asked for labels.
   vpImage<float> log_ratio;
@@ -112,7 +112,7 @@ struct RotationEm
 /// \param with_labels one more pass makes the log ratios.
 RotationEm estimateRotation(const ImagePyramid &previous, const ImagePyramid &current,
                             const std::optional<RotationPrior> &prior, const Eigen::Matrix3d &start,
-                            const SaliencyOptions &options, bool with_labels = true);
+                            const SaliencyOptions &options, bool with_labels);
 
 // Evidence per pixel for each of a few inverse depths, gathered over frames.
 //
@@ -179,30 +179,14 @@ struct TranslationPrior
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity() * 1e-4; ///< [m^2]
 };
 
-enum class SaliencyStatus
-{
-  first_frame,  ///< nothing to compare with: all unknown
-  with_gyro,    ///< rotation from gyro and images
-  without_gyro, ///< rotation from images alone, with robust weights: may be pulled by near things
-  no_texture,   ///< rotation is the prior's (or none); labels say unknown
-  stale,        ///< the same image again: labels of the frame before, motion kept for the next frame
-  not_converged ///< the images did not agree on a rotation: the prior's is returned
-};
+constexpr float kUnknownBelow = 0.7f; ///< confidence under which a pixel is unknown
 
 struct Saliency
 {
-  SaliencyStatus status = SaliencyStatus::first_frame;
   vpImage<float> p_background;                              ///< lambda = 1 means background
   vpImage<float> confidence;                                ///< |change of the log odds| by the images; small = unknown
   Eigen::Matrix3d pRc = Eigen::Matrix3d::Identity();        ///< refined rotation from the image before
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< right perturbation of pRc [rad^2]
-  bool asks_for_range = false; ///< labels mean "nearer than near_range"; else "moves unlike the background"
-  double parallax_px = 0;      ///< of the pair of frames used, at near_range
-  int iterations = 0;
-  double unknown_share = 1; ///< of the pixels
-  float unknown_below = 0;  ///< confidence under which a pixel is unknown
-
-  bool isKnown(unsigned row, unsigned column) const { return confidence[row][column] >= unknown_below; }
 };
 
 class SaliencyEstimator
@@ -235,7 +219,7 @@ private:
   bool asksForRange() const { return m_translation.has_value(); }
   void addMotion(const std::optional<RotationPrior> &gyro, const std::optional<TranslationPrior> &translation);
   RotationEm refineRotation(const ImagePyramid &current, Saliency &result) const;
-  CoarseLabels labelByRange(const ImagePyramid &current, Saliency &result);
+  CoarseLabels labelByRange(const ImagePyramid &current, const Saliency &result);
   CoarseLabels labelByMotion(const RotationEm &rotation) const;
   void fill(const CoarseLabels &labels, Saliency &result) const;
 
@@ -244,7 +228,6 @@ private:
   InverseDepthEvidence m_evidence;
   std::deque<View> m_views; ///< newest first
   vpImage<unsigned char> m_last_image;
-  Saliency m_last; ///< without its images, which m_labels gives again
   CoarseLabels m_labels;
   Eigen::Matrix3d m_last_turn = Eigen::Matrix3d::Identity();
   std::optional<RotationPrior> m_gyro; ///< since the last image used

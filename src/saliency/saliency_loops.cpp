@@ -127,8 +127,9 @@ void sampleRow(const RotationRow &row, const float *x, const float *y, const flo
 }
 
 BOLE_VECTOR_CLONES
-RotationSums addPixels(const RotationRow &row, float texture_gradient, const float *columns, float *__restrict ratios)
+RotationSums addPixels(const RotationRow &row, const float *columns, float *__restrict ratios)
 {
+  constexpr float kTextureGradient = 0.01f; // [1/px]; below, intensity noise hides a pixel of motion
   const std::ptrdiff_t n = row.width;
   const int end = row.width - 1;
   const float *is_inside = columns + kInside * n;
@@ -138,7 +139,6 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
   const LevelNoise noise = row.noise;
   const float fx = row.fx, fy = row.fy, cx = row.cx, y = row.y;
   const float inverse_fx = 1 / fx;
-  const float texture2 = texture_gradient * texture_gradient;
   float h00 = 0, h01 = 0, h02 = 0, h11 = 0, h12 = 0, h22 = 0, g0 = 0, g1 = 0, g2 = 0, used = 0, textured = 0;
 #pragma omp simd reduction(+ : h00, h01, h02, h11, h12, h22, g0, g1, g2, used, textured)
   for (int j = 1; j < end; ++j) {
@@ -159,7 +159,7 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
     const float weight = inside * (p_b * of_b + (1 - p_b) * of_f);
     ratios[j] = inside * ratio;
     used += inside;
-    textured += square > texture2 ? inside : 0.f;
+    textured += square > kTextureGradient * kTextureGradient ? inside : 0.f;
     const float w0 = weight * j0, w1 = weight * j1, w2 = weight * j2;
     h00 += w0 * j0, h01 += w0 * j1, h02 += w0 * j2, h11 += w1 * j1, h12 += w1 * j2, h22 += w2 * j2;
     g0 += w0 * r, g1 += w1 * r, g2 += w2 * r;
@@ -168,7 +168,7 @@ RotationSums addPixels(const RotationRow &row, float texture_gradient, const flo
 }
 } // namespace
 
-RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vector<float> &scratch, float *log_ratio)
+RotationSums sumsOfRow(const RotationRow &row, std::vector<float> &scratch, float *log_ratio)
 {
   const std::ptrdiff_t n = row.width;
   scratch.resize(static_cast<std::size_t>(kColumns * n));
@@ -176,7 +176,7 @@ RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vect
   placesOfRow(row, columns + kX * n, columns + kY * n, columns + kInside * n);
   sampleRow(row, columns + kX * n, columns + kY * n, columns + kInside * n, columns + kGrey * n,
             columns + kGradientX * n, columns + kGradientY * n);
-  const RotationSums sums = addPixels(row, texture_gradient, columns, columns + kRatio * n);
+  const RotationSums sums = addPixels(row, columns, columns + kRatio * n);
   if (log_ratio)
     std::copy(columns + kRatio * n + 1, columns + kColumns * n - 1, log_ratio + 1);
   return sums;
@@ -213,8 +213,9 @@ inline void locate(const RowWarp &warp, int column, StepPlaces &at)
 
 BOLE_VECTOR_CLONES
 void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, const float *here, int width,
-                           float outside, float *out)
+                           float *out)
 {
+  constexpr float kOutside = 1;
   StepPlaces at;
   int offset[kSteps];
   for (int j = 0; j < width; ++j, out += kSteps) {
@@ -232,15 +233,16 @@ void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, 
       const float p0 = older[offset[k]], p1 = older[offset[k] + 1], q0 = lower[offset[k]], q1 = lower[offset[k] + 1];
       const float upper = p0 + at.x[k] * (p1 - p0), under = q0 + at.x[k] * (q1 - q0);
       const float r = grey - upper - at.y[k] * (under - upper);
-      out[k] = at.is_inside[k] > 0 ? r * r : outside;
+      out[k] = at.is_inside[k] > 0 ? r * r : kOutside;
     }
   }
 }
 
 BOLE_VECTOR_CLONES
 void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, float rows_per_pixel, int width,
-                        float decay, float *out)
+                        float *out)
 {
+  constexpr float kDecay = 0.8f; // what a frame inherits
   constexpr float kLastStep = kSteps - 1.001f;
   StepPlaces at;
   int offset[kSteps];
@@ -256,7 +258,7 @@ void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, fl
       offset[k] = (row * width + column) * kSteps + step;
       share[k] = position - static_cast<float>(step);
       at.x[k] -= static_cast<float>(column);
-      at.is_inside[k] *= decay;
+      at.is_inside[k] *= kDecay;
     }
 #pragma omp simd
     for (int k = 0; k < kSteps; ++k) {
@@ -310,21 +312,23 @@ void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, f
 }
 
 BOLE_VECTOR_CLONES
-void addLikelihoods(const LikelihoodTerms &terms, const float *g2, const float *r2, std::size_t pixels,
+void addLikelihoods(float intensity, const float *flow_variance, const float *g2, const float *r2, std::size_t pixels,
                     float *__restrict evidence)
 {
-  float flow_variance[kSteps];
-  std::copy_n(terms.flow_variance, kSteps, flow_variance);
-  const float intensity = terms.intensity, weight = terms.weight;
+  constexpr float kWeight = 2.5f;
+  constexpr float kUnrelated_px = 2.5f; // two unrelated places of the same texture differ as if so far apart
+  float flow[kSteps];
+  std::copy_n(flow_variance, kSteps, flow);
   for (std::size_t p = 0; p < pixels; ++p, r2 += kSteps, evidence += kSteps) {
-    const float square = g2[p], unrelated = intensity + square * terms.unrelated, to_unrelated = 1 / unrelated;
+    const float square = g2[p], unrelated = intensity + square * (kUnrelated_px * kUnrelated_px),
+                to_unrelated = 1 / unrelated;
 #pragma omp simd
     for (int k = 0; k < kSteps; ++k) {
-      const float variance = intensity + square * flow_variance[k];
+      const float variance = intensity + square * flow[k];
       // Without texture both variances are the same, and even a perfect match says nothing.
       const float gain = std::max(2 - variance * to_unrelated, 0.5f);
       const float ratio = gain * std::sqrt(unrelated * variance) / (variance + r2[k]);
-      evidence[k] += weight * std::max(0.f, fastLog(ratio));
+      evidence[k] += kWeight * std::max(0.f, fastLog(ratio));
     }
   }
 }
@@ -352,23 +356,19 @@ void logOddsOfEvidence(const float *evidence, const float *log_prior, const floa
 }
 
 BOLE_VECTOR_CLONES
-int labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
-                float prior_log_odds, float unknown_below, float *__restrict p_background, float *__restrict confidence)
+void labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
+                 float prior_log_odds, float *__restrict p_background, float *__restrict confidence)
 {
   const int n = static_cast<int>(columns.left.size()), *left = columns.left.data();
   const float *between = columns.share.data();
-  int unknown = 0;
-#pragma omp simd reduction(+ : unknown)
+#pragma omp simd
   for (int j = 0; j < n; ++j) {
     const int c = left[j];
     const float above = upper[c] + between[j] * (upper[c + 1] - upper[c]);
     const float below = lower[c] + between[j] * (lower[c + 1] - lower[c]);
     const float odds = above + share * (below - above);
-    const float change = std::abs(odds - prior_log_odds);
     p_background[j] = 1 / (1 + fastExp(odds));
-    confidence[j] = change;
-    unknown += change < unknown_below ? 1 : 0;
+    confidence[j] = std::abs(odds - prior_log_odds);
   }
-  return unknown;
 }
 } // namespace bole

@@ -48,7 +48,7 @@ struct RotationSums
 
 /// The E-step of the pixels of a row (Eq. 10 and 11) and their share of the M-step (Eq. 16). \p scratch keeps its
 /// memory from row to row; \p log_ratio, where given, gets log p(r | background) - log p(r | foreground).
-RotationSums sumsOfRow(const RotationRow &row, float texture_gradient, std::vector<float> &scratch, float *log_ratio);
+RotationSums sumsOfRow(const RotationRow &row, std::vector<float> &scratch, float *log_ratio);
 
 // The loops of InverseDepthEvidence over one row of pixels, each pixel with all its steps of inverse depth.
 
@@ -62,14 +62,15 @@ struct RowWarp
   float max_x, max_y; ///< of a bilinear sample in the older image
 };
 
-/// out[step] of each pixel: squared difference of \p here and \p older; \p outside where the older image ends.
+/// out[step] of each pixel: squared difference of \p here and \p older; where the older image ends as bad as any, so
+/// that it says nothing.
 void squaredResidualsOfRow(const RowWarp &warp, const float *older, int stride, const float *here, int width,
-                           float outside, float *out);
+                           float *out);
 
-/// out[step] of each pixel: \p decay times the evidence of the place and depth that it was in the older frame; 0 where
-/// there was none. \p step_of_k: root of the inverse depth of each step, in steps.
+/// out[step] of each pixel: a share of the evidence of the place and depth that it was in the older frame; 0 where
+/// there was none.
 void movedEvidenceOfRow(const RowWarp &warp, const float *evidence, int rows, float rows_per_pixel, int width,
-                        float decay, float *out);
+                        float *out);
 
 /// out[i] = mean of the \p window numbers in[i], in[i + lag], ...
 void slidingMeans(const float *in, int n, int lag, int window, float *out);
@@ -79,17 +80,9 @@ void meansDownColumns(const float *in, int rows, int columns, int window, float 
 
 void squaresOfRow(const float *gradient_x, const float *gradient_y, int width, float *out);
 
-/// What the likelihood of a window's residual, against that of an unrelated window, is made of.
-struct LikelihoodTerms
-{
-  float intensity;            ///< variance
-  float unrelated;            ///< variance of the flow between unrelated windows [px^2]
-  const float *flow_variance; ///< of each step [px^2]
-  float weight;
-};
-
-/// Adds the log-likelihood of \p r2 to \p evidence of \p pixels pixels; \p g2: mean square gradients.
-void addLikelihoods(const LikelihoodTerms &terms, const float *g2, const float *r2, std::size_t pixels,
+/// Adds the log-likelihood of the windows' residuals \p r2, against that of unrelated windows, to \p evidence of \p
+/// pixels pixels. \p g2: mean square gradients, \p intensity: variance, \p flow_variance: of each step [px^2].
+void addLikelihoods(float intensity, const float *flow_variance, const float *g2, const float *r2, std::size_t pixels,
                     float *evidence);
 
 /// log p(near) - log p(far) of each pixel; \p is_near: 1 or 0 for each step.
@@ -105,8 +98,7 @@ struct ColumnsBetween
   std::vector<float> share;
 };
 
-/// \p upper and \p lower: the rows of log odds above and below, \p share: how far from the upper one. Returns how many
-/// pixels changed less than \p unknown_below from \p prior_log_odds.
-int labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
-                float prior_log_odds, float unknown_below, float *p_background, float *confidence);
+/// \p upper and \p lower: the rows of log odds above and below, \p share: how far from the upper one.
+void labelsOfRow(const float *upper, const float *lower, float share, const ColumnsBetween &columns,
+                 float prior_log_odds, float *p_background, float *confidence);
 } // namespace bole

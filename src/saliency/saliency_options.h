@@ -8,29 +8,19 @@ namespace bole
 struct SaliencyOptions
 {
   // --- the model of Eq. 12 and 13
-  double sigma_intensity = 0.02; ///< noise of a pixel, 1 = full scale; (0, 1]. Rendered and real video: 1-3 %
   double sigma_background_px =
       2; ///< flow of the background about V w [px, full resolution]; (0, 20]. What counts as parallax
   double sigma_foreground_px = 10; ///< the same for the foreground [px]; (sigma_background_px, 200]
-  int label_window_px = 7;         ///< log ratios are averaged over this square [px at the working level]; odd, [1, 31]
-  double background_prior = 0.7;   ///< p(lambda = 1) before looking; (0, 1). Most of a forest is far
 
   // --- EM of Eq. 16 and 17
-  int iterations = 5;   ///< EM iterations a level; [1, 50]
   int levels = 4;       ///< levels of the pyramid, each half the size of the one before; [1, 8]
   int finest_level = 1; ///< 0 works at full resolution, 1 at half; [0, levels - 1]. Half is 4 times as fast
-  double sigma_rotation_pull =
-      0.004; ///< how far near things pull the rotation [rad]; [0, 1]. 0.1 to 0.3 degrees in forests
-  double sample_correlation =
-      30; ///< pixels that count as one independent measurement; [1, 1e4]. Neighbours share their errors
 
   // --- labels that ask about inverse depth, where the translation is given
-  double sigma_residual = 0.05; ///< noise of a residual, 1 = full scale; (0, 1]. Above a pixel's: light, leaves, model
-  double near_range = 10.5;     ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
-  double min_range = 2;         ///< nearest range of the sweep [m]; (0.05, near_range)
-  int window_width_px = 3;      ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
-  int window_height_px = 9;     ///< trunks are upright: taller than wide; odd, [1, 31]
-  int max_frames_apart = 5;     ///< oldest frame that is tried; [1, 20]
-  double evidence_decay = 0.8;  ///< share of the evidence that a frame inherits; [0, 1]. 0: one pair of frames alone
+  double near_range = 10.5; ///< nearer than this is foreground [m]; (0.1, 1000]. What matters for planning
+  double min_range = 2;     ///< nearest range of the sweep [m]; (0.05, near_range)
+  int window_width_px = 3;  ///< residuals are averaged over this window [px at the working level]; odd, [1, 31]
+  int window_height_px = 9; ///< trunks are upright: taller than wide; odd, [1, 31]
+  int max_frames_apart = 5; ///< oldest frame that is tried; [1, 20]
 };
 } // namespace bole

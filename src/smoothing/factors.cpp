@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "smoothing/factors.h"
+#include "geometry/failure.h"
 #include "geometry/names.h"
 #include "geometry/so3.h"
 
@@ -7,7 +8,6 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -26,7 +26,7 @@ Eigen::Matrix<double, N, N> squareRootInformation(const Eigen::Matrix<double, N,
   if (usable)
     factor.matrixL().solveInPlace(S);
   if (!usable || !S.allFinite())
-    throw vpException(vpException::badValue, "%s, must be finite, symmetric and positive definite", name);
+    throw badValue("{}, must be finite, symmetric and positive definite", name);
   return S;
 }
 template Matrix6d squareRootInformation<6>(const Matrix6d &, const char *);
@@ -149,7 +149,7 @@ LossKind lossKindFromString(const std::string &name)
 {
   if (const auto kind = valueNamed(name, LossKind::cauchy))
     return *kind;
-  throw vpException(vpException::badValue, "loss = %s, must be quadratic, huber or cauchy", name.c_str());
+  throw badValue("loss = {}, must be quadratic, huber or cauchy", name);
 }
 
 double Loss::rho(double s) const

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include "input/regular_file.h"
 #include "smoothing/factors.h"
 #include <bole/graph.h>
@@ -8,12 +9,10 @@
 
 #include <charconv>
 #include <cmath>
-#include <fmt/core.h>
 #include <functional>
 #include <istream>
 #include <sstream>
 #include <unordered_map>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -38,7 +37,7 @@ public:
     }
     resolveEdges();
     if (m_graph.poses.empty())
-      throw vpException(vpException::badValue, "%s: no pose, must have VERTEX_SE3:QUAT or VERTEX_SE2", m_name.c_str());
+      throw badValue("{}: no pose, must have VERTEX_SE3:QUAT or VERTEX_SE2", m_name);
     if (m_graph.pose_priors.empty()) {
       hold(0);
       m_graph.assumed = fmt::format("no pose is held by the file: pose {} stays where it is", m_graph.poses[0].id);
@@ -46,29 +45,28 @@ public:
     if (const std::optional<std::size_t> loose = untiedPose(m_graph)) {
       const std::int64_t name = m_graph.poses[*loose].id;
       m_line = m_line_of.at(name);
-      fail(fmt::format("pose {}, must be tied to the world by EDGE_SE3:QUAT and an "
-                       "EDGE_SE3_PRIOR:QUAT",
-                       name));
+      fail("pose {}, must be tied to the world by EDGE_SE3:QUAT and an EDGE_SE3_PRIOR:QUAT", name);
     }
     try {
       validate(m_graph);
     }
     catch (const vpException &error) {
-      throw vpException(vpException::badValue, "%s: %s", m_name.c_str(), error.what());
+      throw badValue("{}: {}", m_name, error.what());
     }
     return std::move(m_graph);
   }
 
 private:
-  [[noreturn]] void fail(const std::string &why) const
+  template <typename... Arguments>
+  [[noreturn]] void fail(fmt::format_string<Arguments...> text, Arguments &&...arguments) const
   {
-    throw vpException(vpException::badValue, "%s:%zu: %s", m_name.c_str(), m_line, why.c_str());
+    throw badValue("{}:{}: {}", m_name, m_line, fmt::format(text, std::forward<Arguments>(arguments)...));
   }
 
   std::string word()
   {
     if (m_next >= m_fields.size())
-      fail(m_fields[0] + ": the line ends too early");
+      fail("{}: the line ends too early", m_fields[0]);
     return m_fields[m_next++];
   }
   double number()
@@ -76,7 +74,7 @@ private:
     const std::string text = word();
     double value = 0;
     if (!isRead(text, value) || !std::isfinite(value))
-      fail(fmt::format("{}: {} = {}, must be a finite number", m_fields[0], m_next - 1, text));
+      fail("{}: {} = {}, must be a finite number", m_fields[0], m_next - 1, text);
     return value;
   }
   std::int64_t id()
@@ -84,7 +82,7 @@ private:
     const std::string text = word();
     std::int64_t value = 0;
     if (!isRead(text, value) || value < 0)
-      fail(fmt::format("{}: id = {}, must be a whole number of at least 0 and below 2^63", m_fields[0], text));
+      fail("{}: id = {}, must be a whole number of at least 0 and below 2^63", m_fields[0], text);
     return value;
   }
   /// Whatever the locale is.
@@ -105,7 +103,7 @@ private:
   {
     const Eigen::Vector4d q = vector<4>();
     if (!(std::abs(q.norm() - 1) < 1e-3))
-      fail(fmt::format("{}: quaternion of length {:.6g}, must have length 1", m_fields[0], q.norm()));
+      fail("{}: quaternion of length {:.6g}, must have length 1", m_fields[0], q.norm());
     return Eigen::Quaterniond(q(3), q(0), q(1), q(2)).normalized().toRotationMatrix();
   }
   Pose pose()
@@ -127,7 +125,7 @@ private:
       squareRootInformation<N>(m, "matrix");
     }
     catch (const vpException &) {
-      fail(m_fields[0] + ": matrix, must be positive definite, its inverse too");
+      fail("{}: matrix, must be positive definite, its inverse too", m_fields[0]);
     }
     return m;
   }
@@ -166,7 +164,7 @@ private:
   {
     const Vector5d v = vector<5>();
     if (!std::isnormal(std::exp(v(2))))
-      fail(fmt::format("{}: log_r = {}, must be the logarithm of a radius", m_fields[0], v(2)));
+      fail("{}: log_r = {}, must be the logarithm of a radius", m_fields[0], v(2));
     return {v.head<2>(), v(2), v.tail<2>()};
   }
 
@@ -198,10 +196,11 @@ private:
     else if (tag == "LOSS")
       readLoss();
     else
-      fail("tag = " + tag + ", must be VERTEX_SE3:QUAT, VERTEX_SE2, VERTEX_TRUNK, EDGE_SE3:QUAT, EDGE_SE2, " +
-           "EDGE_SE3_PRIOR:QUAT, EDGE_SE3_PRIOR, EDGE_TRUNK_SUMMARY, EDGE_DIRECTION, FIX, PARAMS_SE3OFFSET or LOSS");
+      fail("tag = {}, must be VERTEX_SE3:QUAT, VERTEX_SE2, VERTEX_TRUNK, EDGE_SE3:QUAT, EDGE_SE2, EDGE_SE3_PRIOR:QUAT, "
+           "EDGE_SE3_PRIOR, EDGE_TRUNK_SUMMARY, EDGE_DIRECTION, FIX, PARAMS_SE3OFFSET or LOSS",
+           tag);
     if (m_next != m_fields.size())
-      fail(fmt::format("{}: {} fields, must be {}", tag, m_fields.size(), m_next));
+      fail("{}: {} fields, must be {}", tag, m_fields.size(), m_next);
   }
 
   std::int64_t newId()
@@ -209,7 +208,7 @@ private:
     const std::int64_t name = id();
     const auto [at, fresh] = m_line_of.emplace(name, m_line);
     if (!fresh)
-      fail(fmt::format("id = {}, must not be that of line {}", name, at->second));
+      fail("id = {}, must not be that of line {}", name, at->second);
     return name;
   }
   template <typename ReadPose> void readPose(const ReadPose &read)
@@ -231,20 +230,26 @@ private:
     m_trunk_of[name] = m_graph.trunks.size();
     m_graph.trunks.push_back(vertex);
   }
+  /// Adds an edge between two poses.
+  template <typename Edge> void readPoses(std::vector<Edge> &edges)
+  {
+    const std::int64_t a = id(), b = id();
+    if (a == b)
+      fail("{}: must be between two poses", m_fields[0]);
+    edges.emplace_back();
+    later([this, &edges, a, b, i = edges.size() - 1] {
+      edges[i].a = find(m_pose_of, a, "pose");
+      edges[i].b = find(m_pose_of, b, "pose");
+    });
+  }
+
   template <typename ReadPose, typename ReadCovariance>
   void readOdometry(const ReadPose &read_pose, const ReadCovariance &read_covariance)
   {
-    Graph::OdometryEdge edge;
-    const std::int64_t a = id(), b = id();
-    if (a == b)
-      fail(m_fields[0] + ": must be between two poses");
-    edge.odometry.aMb = read_pose();
-    edge.odometry.covariance = read_covariance();
-    m_graph.odometry.push_back(edge);
-    later([this, a, b, i = m_graph.odometry.size() - 1] {
-      m_graph.odometry[i].a = find(m_pose_of, a, "pose");
-      m_graph.odometry[i].b = find(m_pose_of, b, "pose");
-    });
+    readPoses(m_graph.odometry);
+    Odometry &odometry = m_graph.odometry.back().odometry;
+    odometry.aMb = read_pose();
+    odometry.covariance = read_covariance();
   }
   /// \p is_of_sensor: of what the pose carries at the PARAMS_SE3OFFSET that is named after it.
   void readPosePrior(bool is_of_sensor)
@@ -264,7 +269,7 @@ private:
         return;
       const auto offset = m_offset_of.find(*parameter);
       if (offset == m_offset_of.end())
-        fail(fmt::format("EDGE_SE3_PRIOR: parameter {}, must be that of a PARAMS_SE3OFFSET", *parameter));
+        fail("EDGE_SE3_PRIOR: parameter {}, must be that of a PARAMS_SE3OFFSET", *parameter);
       const Matrix6d Ad = adjoint(offset->second);
       read.prior.mean = read.prior.mean * offset->second.inverse();
       read.prior.covariance = Ad * read.prior.covariance * Ad.transpose();
@@ -300,33 +305,26 @@ private:
   }
   void readDirection()
   {
-    Graph::RelativePoseEdge edge;
-    const std::int64_t a = id(), b = id();
-    if (a == b)
-      fail("EDGE_DIRECTION: must be between two poses");
-    edge.measurement.caRcb = rotation();
-    edge.measurement.direction = vector<3>();
-    if (!(std::abs(edge.measurement.direction.norm() - 1) < 1e-3))
+    readPoses(m_graph.relative_poses);
+    RelativePoseMeasurement &measurement = m_graph.relative_poses.back().measurement;
+    measurement.caRcb = rotation();
+    measurement.direction = vector<3>();
+    if (!(std::abs(measurement.direction.norm() - 1) < 1e-3))
       fail("EDGE_DIRECTION: direction, must have length 1");
-    edge.measurement.direction.normalize();
-    edge.measurement.covariance = positiveDefinite<5>(upper<5>());
-    m_graph.relative_poses.push_back(edge);
-    later([this, a, b, i = m_graph.relative_poses.size() - 1] {
-      m_graph.relative_poses[i].a = find(m_pose_of, a, "pose");
-      m_graph.relative_poses[i].b = find(m_pose_of, b, "pose");
-    });
+    measurement.direction.normalize();
+    measurement.covariance = positiveDefinite<5>(upper<5>());
   }
   void readLoss()
   {
     const std::string which = word(), kind = word();
     if (which != "summary" && which != "direction")
-      fail("LOSS: " + which + ", must be summary or direction");
+      fail("LOSS: {}, must be summary or direction", which);
     Loss loss;
     try {
       loss.kind = lossKindFromString(kind);
     }
     catch (const vpException &error) {
-      fail(error.what());
+      fail("{}", error.what());
     }
     loss.width = number();
     if (!(loss.width > 0))
@@ -350,7 +348,7 @@ private:
   {
     const auto at = names.find(name);
     if (at == names.end())
-      fail(fmt::format("id = {}, must be that of a {}", name, kind));
+      fail("id = {}, must be that of a {}", name, kind);
     return at->second;
   }
 

@@ -8,7 +8,6 @@
 #include <fmt/core.h>
 #include <ostream>
 #include <sstream>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+#include "geometry/failure.h"
 #include "smoothing/factors.h"
 #include <bole/graph.h>
 
 #include <cmath>
 #include <numeric>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -29,7 +29,7 @@ double cost(const Graph &graph)
     SquareRootSummary root;
     const SummaryStatus status = squareRoot(edge.summary, root);
     if (status != SummaryStatus::ok && status != SummaryStatus::projected)
-      throw vpException(vpException::badValue, "summary = %s, must be positive semi-definite", toString(status));
+      throw badValue("summary = {}, must be positive semi-definite", toString(status));
     const Vector4d r = residual(root, graph.bMc, pose(edge.pose), graph.trunks[edge.trunk].trunk, nullptr, nullptr);
     sum += 0.5 * graph.summary_loss.rho(r.squaredNorm());
   }
@@ -40,10 +40,7 @@ double cost(const Graph &graph)
 
 namespace
 {
-[[noreturn]] void fail(const char *kind, std::size_t i, const char *why)
-{
-  throw vpException(vpException::badValue, "%s %zu: %s", kind, i, why);
-}
+[[noreturn]] void fail(const char *kind, std::size_t i, const char *why) { throw badValue("{} {}: {}", kind, i, why); }
 
 /// Sets of poses that factors tie together.
 struct Components
@@ -154,7 +151,7 @@ Matrix6d scaledCovariance(Matrix6d covariance, double factor)
 Graph scaled(const Graph &graph, double factor)
 {
   if (!(factor > 0) || !std::isfinite(factor))
-    throw vpException(vpException::badValue, "factor = %g, must be above 0", factor);
+    throw badValue("factor = {:g}, must be above 0", factor);
   Graph result = graph;
   for (Graph::PoseVertex &vertex : result.poses)
     vertex.wMb = scaledMotion(vertex.wMb, Pose(), graph.bMc, factor);

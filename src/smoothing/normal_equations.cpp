@@ -175,6 +175,16 @@ void NormalEquations::plan(const std::vector<int> &order, int together)
       const int first = is_transposed ? block.row : column, second = is_transposed ? column : block.row;
       m_nodes[m_node_of[first]].own.push_back({first, second, block.at, is_transposed});
     }
+  for (std::size_t k = 0; k < m_node_count; ++k) {
+    noteRows(m_nodes[k]);
+    for (const int number : m_nodes[k].children) {
+      Node &child = m_nodes[number];
+      for (std::size_t i = child.eliminated; i < child.variables.size(); ++i)
+        for (int d = 0; d < m_dims[child.variables[i]]; ++d)
+          child.above.push_back(m_row[child.variables[i]] + d);
+      child.above.push_back(m_nodes[k].rows); // the right-hand side
+    }
+  }
 }
 
 /// Takes the memory of one that was planned before.
@@ -185,6 +195,7 @@ NormalEquations::Node &NormalEquations::newNode()
   Node &node = m_nodes[m_node_count++];
   node.variables.clear();
   node.children.clear();
+  node.above.clear();
   node.own.clear();
   node.parent = -1;
   node.columns = node.rows = 0;
@@ -192,37 +203,32 @@ NormalEquations::Node &NormalEquations::newNode()
 }
 
 /// Notes where each variable stands in the front.
-int NormalEquations::rowsOf(const Node &node)
+void NormalEquations::noteRows(const Node &node)
 {
   int rows = 0;
   for (const int v : node.variables) {
     m_row[v] = rows;
     rows += m_dims[v];
   }
-  return rows;
 }
 
 /// The children's variables stand in the same order, so lower triangles stay lower ones.
 void NormalEquations::assembleChild(Node &child, int ld)
 {
-  m_map.clear();
-  for (std::size_t i = child.eliminated; i < child.variables.size(); ++i)
-    for (int k = 0; k < m_dims[child.variables[i]]; ++k)
-      m_map.push_back(m_row[child.variables[i]] + k);
-  const int m = static_cast<int>(m_map.size());
-  m_map.push_back(ld - 1); // the right-hand side
+  const std::vector<int> &to = child.above;
   const double *from = child.contribution.data();
-  for (int c = 0; c < m; ++c) {
-    double *column = m_front.data() + static_cast<std::ptrdiff_t>(m_map[c]) * ld;
-    for (int r = c; r <= m; ++r)
-      column[m_map[r]] += *from++;
+  for (std::size_t c = 0; c + 1 < to.size(); ++c) {
+    double *column = m_front.data() + static_cast<std::ptrdiff_t>(to[c]) * ld;
+    for (std::size_t r = c; r < to.size(); ++r)
+      column[to[r]] += *from++;
   }
   m_spare.push_back(std::move(child.contribution));
 }
 
 void NormalEquations::assemble(const Node &node, double damping)
 {
-  const int ld = rowsOf(node) + 1;
+  const int ld = node.rows + 1;
+  noteRows(node);
   const std::size_t size = static_cast<std::size_t>(ld) * static_cast<std::size_t>(node.rows);
   m_front.resize(std::max(m_front.size(), size));
   std::fill(m_front.begin(), m_front.begin() + static_cast<std::ptrdiff_t>(size), 0.0);
@@ -322,26 +328,16 @@ void NormalEquations::sparseInverse(const std::function<void(const std::vector<i
 {
   std::vector<MatrixXd> inverse(m_node_count);
   std::vector<std::size_t> pending(m_node_count);
-  std::vector<int> row(m_dims.size()), map;
   for (std::size_t k = m_node_count; k-- > 0;) {
     const Node &node = m_nodes[k];
     const int c = node.columns, m = node.rows - c;
     MatrixXd &C = inverse[k];
     C.resize(node.rows, node.rows);
     if (node.parent >= 0) {
-      int at = 0;
-      for (const int v : m_nodes[node.parent].variables) {
-        row[v] = at;
-        at += m_dims[v];
-      }
-      map.clear();
-      for (std::size_t i = node.eliminated; i < node.variables.size(); ++i)
-        for (int d = 0; d < m_dims[node.variables[i]]; ++d)
-          map.push_back(row[node.variables[i]] + d);
       const MatrixXd &above = inverse[node.parent];
       for (int j = 0; j < m; ++j)
         for (int i = 0; i < m; ++i)
-          C(c + i, c + j) = above(map[i], map[j]);
+          C(c + i, c + j) = above(node.above[i], node.above[j]);
       if (--pending[node.parent] == 0)
         inverse[node.parent].resize(0, 0);
     }

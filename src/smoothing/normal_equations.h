@@ -95,7 +95,7 @@ private:
     std::vector<int> variables; ///< eliminated, then neighbours, as planned
     std::size_t eliminated = 1;
     int parent = -1, columns = 0, rows = 0;
-    std::vector<int> children;
+    std::vector<int> children, above; ///< above: where its rows that are not eliminated stand in the parent's front
     std::vector<Own> own;
     std::vector<double> panel, contribution; ///< of the front of one row more: columns of L, Schur complement
   };
@@ -111,7 +111,7 @@ private:
   void assemble(const Node &node, double damping);
   void assembleChild(Node &child, int ld);
   Node &newNode();
-  int rowsOf(const Node &node);
+  void noteRows(const Node &node);
   Panel panelOf(const Node &node) const { return {node.panel.data(), node.rows + 1, node.columns}; }
 
   std::vector<int> m_dims, m_offset;
@@ -123,7 +123,7 @@ private:
   std::vector<std::vector<double>> m_spare; ///< memory of contributions that were taken in
   std::vector<int> m_node_of;
   std::vector<std::vector<int>> m_later; ///< work space of plan()
-  std::vector<int> m_row, m_map;         ///< of a variable in the front; of a child's rows
+  std::vector<int> m_row;                ///< of a variable in the front
   std::vector<double> m_front;
   mutable std::vector<double> m_work, m_own;
   mutable std::vector<int> m_path;

@@ -2,11 +2,11 @@
 // The public face: checks what the caller gives, and keeps the graph.
 #include "smoothing/state.h"
 
+#include "geometry/failure.h"
 #include "geometry/names.h"
 
 #include <algorithm>
 #include <cmath>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
@@ -15,21 +15,20 @@ namespace
 void require(bool holds, const char *message)
 {
   if (!holds)
-    throw vpException(vpException::badValue, "%s", message);
+    throw badValue("{}", message);
 }
 } // namespace
 
 void Smoother::State::checkPose(std::size_t pose) const
 {
   if (pose >= poses.size())
-    throw vpException(vpException::badValue, "pose = %zu, must be below %zu", pose, poses.size());
+    throw badValue("pose = {}, must be below {}", pose, poses.size());
 }
 
 void Smoother::State::checkTrunk(std::size_t trunk) const
 {
   if (trunk >= trunks.size() || trunks[trunk].is_removed)
-    throw vpException(vpException::badValue, "trunk = %zu, must be one of the %zu and not removed", trunk,
-                      trunks.size());
+    throw badValue("trunk = {}, must be one of the {} and not removed", trunk, trunks.size());
 }
 
 std::size_t Smoother::State::newPose(const Pose &wMb)
@@ -395,7 +394,7 @@ void SmootherOptions::validate() const
 {
   const auto positive = [](const char *name, double value) {
     if (!(value > 0) || !std::isfinite(value))
-      throw vpException(vpException::badValue, "%s = %g, must be above 0", name, value);
+      throw badValue("{} = {:g}, must be above 0", name, value);
   };
   positive("summary_loss.width", summary_loss.width);
   positive("direction_loss.width", direction_loss.width);
@@ -404,12 +403,12 @@ void SmootherOptions::validate() const
   positive("prior_lean_sigma", prior_lean_sigma);
   positive("prior_position_sigma", prior_position_sigma);
   if (max_iterations < 1)
-    throw vpException(vpException::badValue, "max_iterations = %d, must be at least 1", max_iterations);
+    throw badValue("max_iterations = {}, must be at least 1", max_iterations);
   if (window < 2)
-    throw vpException(vpException::badValue, "window = %d, must be at least 2", window);
+    throw badValue("window = {}, must be at least 2", window);
   if (remembered < 0)
-    throw vpException(vpException::badValue, "remembered = %d, must be at least 0", remembered);
+    throw badValue("remembered = {}, must be at least 0", remembered);
   if (!bMc.isFinite())
-    throw vpException(vpException::badValue, "bMc, must be finite");
+    throw badValue("bMc, must be finite");
 }
 } // namespace bole

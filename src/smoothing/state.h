@@ -82,7 +82,7 @@ struct Places
   std::vector<int> dims;
 
   /// Takes it in, if it is not yet.
-  void take(const Name &name, std::size_t trunk_count);
+  void take(const Name &name);
   int of(const Name &name) const { return name.is_pose ? pose[name.number - first_pose] : trunk[name.number]; }
 };
 

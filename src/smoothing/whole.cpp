@@ -11,10 +11,10 @@ Places Smoother::State::placeWhole() const
   Places places;
   places.first_pose = first_held;
   for (std::size_t i = first_held; i < poses.size(); ++i)
-    places.take({true, i}, trunks.size());
+    places.take({true, i});
   for (std::size_t j = 0; j < trunks.size(); ++j)
     if (!trunks[j].is_removed)
-      places.take({false, j}, trunks.size());
+      places.take({false, j});
   return places;
 }
 
@@ -71,10 +71,6 @@ UpdateResult Smoother::State::solveWhole(double tolerance, int max_iterations, b
   double damping = 0;
   bool is_settled = false;
   int held = 0;
-  const auto linearise = [&] {
-    system.clear();
-    addWhole(places, &system);
-  };
   while (!is_settled && result.iterations < max_iterations) {
     held = system.factorise(damping);
     const std::vector<Pose> poses_before = poses;
@@ -88,8 +84,10 @@ UpdateResult Smoother::State::solveWhole(double tolerance, int max_iterations, b
       is_settled = fall <= tolerance * std::abs(result.cost);
       result.cost = after;
       damping = damping < 1e-7 ? 0 : damping / 10;
-      if (!is_settled || with_covariances)
-        linearise();
+      if (!is_settled || with_covariances) {
+        system.clear();
+        addWhole(places, &system);
+      }
     }
     else {
       poses = poses_before;

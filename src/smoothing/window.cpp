@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // In flight: the poses of the window and the trunks that it sees, with a prior for all that left it.
+#include "geometry/failure.h"
 #include "smoothing/state.h"
 
 #include <algorithm>
-#include <visp3/core/vpException.h>
 
 namespace bole
 {
-void Places::take(const Name &name, std::size_t trunk_count)
+void Places::take(const Name &name)
 {
-  trunk.resize(std::max(trunk.size(), trunk_count), -1);
-  if (name.is_pose && pose.size() <= name.number - first_pose)
-    pose.resize(name.number - first_pose + 1, -1);
-  int &at = name.is_pose ? pose[name.number - first_pose] : trunk[name.number];
+  std::vector<int> &list = name.is_pose ? pose : trunk;
+  const std::size_t number = name.is_pose ? name.number - first_pose : name.number;
+  list.resize(std::max(list.size(), number + 1), -1);
+  int &at = list[number];
   if (at >= 0)
     return;
   at = static_cast<int>(names.size());
@@ -26,12 +26,12 @@ void Smoother::State::placeWindow()
   window_places = Places();
   window_places.first_pose = first_open;
   for (std::size_t i = first_open; i < poses.size(); ++i)
-    window_places.take({true, i}, trunks.size());
+    window_places.take({true, i});
   for (const Name &name : prior.names)
-    window_places.take(name, trunks.size());
+    window_places.take(name);
   for (std::size_t j = 0; j < trunks.size(); ++j)
     if (isInWindow(trunks[j]))
-      window_places.take({false, j}, trunks.size());
+      window_places.take({false, j});
   if (window)
     window->reset(window_places.dims);
   else
@@ -178,18 +178,18 @@ void Smoother::State::absorb(std::size_t from, std::size_t until)
   Places places;
   places.first_pose = from;
   for (std::size_t i = from; i < until; ++i) {
-    places.take({true, i}, trunks.size());
+    places.take({true, i});
     for (const StepFactor &factor : factorsOf(i).steps)
-      places.take({true, std::max(factor.a, factor.b)}, trunks.size());
+      places.take({true, std::max(factor.a, factor.b)});
     for (const DirectionFactor &factor : factorsOf(i).directions)
-      places.take({true, std::max(factor.a, factor.b)}, trunks.size());
+      places.take({true, std::max(factor.a, factor.b)});
   }
   for (const Name &name : prior.names)
-    places.take(name, trunks.size());
+    places.take(name);
   for (std::size_t i = from; i < until; ++i)
     for (const ViewFactor &factor : factorsOf(i).views)
       if (trunks[factor.trunk].is_kept)
-        places.take({false, factor.trunk}, trunks.size());
+        places.take({false, factor.trunk});
   NormalEquations system(places.dims);
   addWindowPrior(places, &system, true);
   for (std::size_t i = from; i < until; ++i)
@@ -304,7 +304,7 @@ Matrix6d Smoother::State::poseCovariance(std::size_t pose) const
   if (isSolved({true, pose}))
     return window->covariance({{window_places.of({true, pose}), Matrix6d::Identity()}});
   if (pose >= pose_covariances.size())
-    throw vpException(vpException::notInitialized, "pose = %zu, must be in the window or taken in by optimize()", pose);
+    throw notInitialized("pose = {}, must be in the window or taken in by optimize()", pose);
   return pose_covariances[pose];
 }
 
@@ -316,7 +316,7 @@ Eigen::MatrixXd Smoother::State::relativeCovariance(std::size_t pose, std::size_
   Matrix45d J_trunk;
   relativeTrunk(poses[pose], options.bMc, trunks[trunk].value, &J_pose, &J_trunk);
   if (!J_pose.allFinite() || !J_trunk.allFinite())
-    throw vpException(vpException::badValue, "trunk = %zu, must not contain the camera", trunk);
+    throw badValue("trunk = {}, must not contain the camera", trunk);
   if (isSolved({true, pose}) && isSolved({false, trunk}))
     return window->covariance(
         {{window_places.of({true, pose}), which * J_pose}, {window_places.of({false, trunk}), which * J_trunk}});

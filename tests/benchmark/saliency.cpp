@@ -55,7 +55,7 @@ void fly(benchmark::State &state, const char *name, Mode mode, SaliencyOptions o
             continue;
           const bool near = flight.depths_m[i].bitmap[p] < 6;
           roc.add(1 - saliency.p_background.bitmap[p], near);
-          if (saliency.confidence.bitmap[p] >= saliency.unknown_below)
+          if (saliency.confidence.bitmap[p] >= kUnknownBelow)
             known_roc.add(1 - saliency.p_background.bitmap[p], near);
         }
       }

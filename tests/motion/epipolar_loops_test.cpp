@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "support/test.h"
+#include "support/differences.h"
 
 #include "motion/epipolar.h"
 
@@ -27,31 +27,26 @@ std::vector<double> residualsAt(const Rays &rays, const Motion &motion, double s
   std::vector<double> residuals(rays.size());
   EpipolarTerms terms = termsOf(motion, 1);
   terms.shear = shear;
-  residualsOfMatches(rays.columns, terms, residuals.data());
+  residualsOfMatches(rays, terms, residuals.data());
   return residuals;
 }
 
 /// Of all residuals, by rotation and direction: central differences at the step \p h.
 Eigen::MatrixXd derivatives(const Rays &rays, double h, double shear = 0)
 {
-  Eigen::MatrixXd J(rays.size(), 5);
-  for (int k = 0; k < 5; ++k) {
-    const auto at = [&](double step) {
-      const Vector5d xi = step * Vector5d::Unit(k);
-      const auto r = residualsAt(
-          rays, {kMotion.aRb * expSo3(xi.head<3>()), directionPlus(kMotion.direction, xi.tail<2>())}, shear);
-      return Eigen::VectorXd(Eigen::VectorXd::Map(r.data(), static_cast<Eigen::Index>(r.size())));
-    };
-    J.col(k) = (at(h) - at(-h)) / (2 * h);
-  }
-  return J;
+  const auto residuals = [&](const Vector5d &xi) {
+    const auto r =
+        residualsAt(rays, {kMotion.aRb * expSo3(xi.head<3>()), directionPlus(kMotion.direction, xi.tail<2>())}, shear);
+    return Eigen::VectorXd(Eigen::VectorXd::Map(r.data(), static_cast<Eigen::Index>(r.size())));
+  };
+  return test::differences(residuals, 5, h);
 }
 
 /// Near the epipole a line is drawn by noise.
-double trust(const Eigen::Vector3d &x_a, const EpipolarTerms &terms)
+double trust(const Eigen::Vector3d &x_a)
 {
   const double sine2 = kMotion.direction.cross(x_a).squaredNorm() / x_a.squaredNorm();
-  return sine2 / (sine2 + terms.epipole * terms.epipole);
+  return sine2 / (sine2 + kEpipole * kEpipole);
 }
 
 TEST(EpipolarLoops, AddUpWhatEachMatchSays)
@@ -60,7 +55,7 @@ TEST(EpipolarLoops, AddUpWhatEachMatchSays)
   const double sigma = 0.002;
   const EpipolarTerms terms = termsOf(kMotion, sigma);
   const std::vector<double> residuals = residualsAt(rays, kMotion);
-  const EpipolarSums sums = sumsOfMatches(rays.columns, terms);
+  const EpipolarSums sums = sumsOfMatches(rays, terms);
   double cost = 0;
   const auto compare = [&](const Eigen::MatrixXd &J) { // the largest errors of H and g, in proportion
     Matrix5d H = Matrix5d::Zero();
@@ -68,7 +63,7 @@ TEST(EpipolarLoops, AddUpWhatEachMatchSays)
     cost = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const Vector5d by = J.row(static_cast<Eigen::Index>(i)).transpose() / sigma;
-      const double r = residuals[i] / sigma, share = trust(rays.a[i], terms);
+      const double r = residuals[i] / sigma, share = trust(rays.a(i));
       cost += share * costOf(r, kKernel);
       H += share * weightOf(r, kKernel) * by * by.transpose();
       g += share * weightOf(r, kKernel) * r * by;
@@ -84,7 +79,7 @@ TEST(EpipolarLoops, AddUpWhatEachMatchSays)
   const Eigen::MatrixXd coarse = derivatives(rays, h), fine = derivatives(rays, h / 2);
   EXPECT_NEAR(compare(coarse) / compare(fine), 4, 0.1);
   EXPECT_LT(compare((4 * fine - coarse) / 3), 1e-9); // without the error of second order
-  EXPECT_NEAR(costOfMatches(rays.columns, terms), cost, 1e-9 * cost);
+  EXPECT_NEAR(costOfMatches(rays, terms), cost, 1e-9 * cost);
 }
 
 TEST(EpipolarLoops, ResidualsAreThoseOfEachMatch)
@@ -93,9 +88,9 @@ TEST(EpipolarLoops, ResidualsAreThoseOfEachMatch)
   const std::vector<double> residuals = residualsAt(rays, kMotion);
   const Eigen::Matrix3d E = skew(kMotion.direction) * kMotion.aRb;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Eigen::Vector3d line_a = E * rays.b[i], line_b = E.transpose() * rays.a[i];
+    const Eigen::Vector3d line_a = E * rays.b(i), line_b = E.transpose() * rays.a(i);
     EXPECT_NEAR(residuals[i],
-                rays.a[i].dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm()),
+                rays.a(i).dot(line_a) / std::sqrt(line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm()),
                 1e-12)
         << i;
   }
@@ -113,12 +108,12 @@ TEST(EpipolarLoops, DerivativesByTheShearAgreeWithCentralDifferences)
   double H = 0, g = 0, H_turn = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double by_shear = (plus[i] - minus[i]) / (2 * h) / sigma;
-    const double w = trust(rays.a[i], terms) * weightOf(here[i] / sigma, kKernel);
+    const double w = trust(rays.a(i)) * weightOf(here[i] / sigma, kKernel);
     H += w * by_shear * by_shear;
     H_turn += w * by_shear * J(static_cast<Eigen::Index>(i), 0) / sigma;
     g += w * by_shear * here[i] / sigma;
   }
-  const ShearSums sums = shearSumsOfMatches(rays.columns, terms);
+  const ShearSums sums = shearSumsOfMatches(rays, terms);
   EXPECT_NEAR(sums.H[20], H, 1e-6 * H);
   EXPECT_NEAR(sums.H[5], H_turn, 1e-6 * H);
   EXPECT_NEAR(sums.g[5], g, 1e-6 * H);
@@ -132,7 +127,7 @@ TEST(EpipolarLoops, DerivativesByTheRotationAgreeWithCentralDifferences)
   const auto residualsAt = [&](const Eigen::Vector3d &phi) {
     const Eigen::Matrix3d aRb = kMotion.aRb * expSo3(phi);
     std::vector<double> residuals(2 * n);
-    transferResiduals(rays.columns, {aRb.data(), kKernel}, residuals.data());
+    transferResiduals(rays, aRb.data(), residuals.data());
     return residuals;
   };
   const std::vector<double> here = residualsAt(Eigen::Vector3d::Zero());
@@ -153,9 +148,7 @@ TEST(EpipolarLoops, DerivativesByTheRotationAgreeWithCentralDifferences)
       g += w * J * here[at];
     }
   }
-  std::vector<double> weights(n);
-  const TransferSums sums =
-      sumsOfTransfers(rays.columns, {kMotion.aRb.data(), kKernel}, here.data(), variance, weights.data());
+  const TransferSums sums = sumsOfTransfers(rays, kMotion.aRb.data(), here.data(), variance);
   const double *entry = sums.H;
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(sums.g[i], g(i), 1e-6 * H.norm()) << i;

@@ -4,11 +4,13 @@
 /// A flight from side to side that is made up: ten frames and 200 samples of gyro and accelerometer a second, an
 /// odometry with a scale, and what points would say.
 
+#include "geometry/constants.h"
 #include "motion/point_motion.h"
 
 #include <bole/open_source.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 namespace bole::test
@@ -45,8 +47,6 @@ struct MadeFlight
              1.2 + 0.1 * std::sin(0.7 * t) + 0.06 * std::sin(1.9 * t)}};
   }
 
-  static std::int64_t nanoseconds(double t) { return static_cast<std::int64_t>(std::llround(t * 1e9)); }
-
   Eigen::Vector3d white()
   {
     std::normal_distribution<double> normal;
@@ -60,7 +60,7 @@ struct MadeFlight
     const Eigen::Vector3d acceleration = (truth(t + h).t - 2 * truth(t).t + truth(t - h).t) / (h * h);
     Eigen::Vector3d force = truth(t).R.transpose() * (acceleration + Eigen::Vector3d(0, 0, 9.81)) + force_bias;
     force += force_noise * white();
-    return {nanoseconds(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
+    return {nsOf(t), rate, has_constant_force ? Eigen::Vector3d(0, 0, 9.81) : force};
   }
 
   /// To be asked for in the order of time.
@@ -70,7 +70,7 @@ struct MadeFlight
     const int samples = static_cast<int>(std::lround(200 / frame_rate));
     Frame frame;
     frame.index = index;
-    frame.stamp_ns = nanoseconds(t);
+    frame.stamp_ns = nsOf(t);
     walked += odometry_noise * white().cwiseProduct(Eigen::Vector3d(1, 1, 0));
     frame.wMb_odometry = truth(t);
     frame.wMb_odometry->t.head<2>() *= factor;
@@ -93,8 +93,8 @@ struct MadeFlight
     motion.frames_back = static_cast<int>(back);
     motion.a_index = index - back;
     motion.b_index = index;
-    motion.a_ns = nanoseconds(from);
-    motion.b_ns = nanoseconds(to);
+    motion.a_ns = nsOf(from);
+    motion.b_ns = nsOf(to);
     motion.points.status = RelativePoseStatus::ok;
     motion.points.aRb = aMb.R;
     motion.points.direction = aMb.t.normalized();
@@ -127,4 +127,36 @@ struct MadeFlight
     points.covariance += 1e-6 * Matrix5d::Identity();
   }
 };
+
+/// Odometry and accelerometer are as noisy as those of a small drone.
+inline MadeFlight noisyFlight()
+{
+  MadeFlight flight;
+  flight.odometry_noise = 0.012;
+  flight.force_noise = 0.1;
+  return flight;
+}
+
+using Damage = std::function<void(Frame &)>;
+
+/// Changes each rate of the gyro.
+inline Damage rates(const std::function<void(Eigen::Vector3d &)> &change)
+{
+  return [change](Frame &frame) {
+    for (GyroSample &sample : frame.gyro)
+      change(sample.rate);
+  };
+}
+
+constexpr double kBegins_s = 5; ///< damage that is late
+
+inline bool isLate(const Frame &frame) { return frame.stamp_ns >= nsOf(kBegins_s); }
+
+inline Damage late(const Damage &damage)
+{
+  return [damage](Frame &frame) {
+    if (isLate(frame))
+      damage(frame);
+  };
+}
 } // namespace bole::test

@@ -13,15 +13,10 @@ namespace
 {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using test::late;
 using test::MadeFlight;
-
-MadeFlight noisy()
-{
-  MadeFlight flight;
-  flight.odometry_noise = 0.012;
-  flight.force_noise = 0.1;
-  return flight;
-}
+using test::noisyFlight;
+using test::rates;
 
 /// Eight seconds, the stamps of the sensors late by these times; \p damage changes a frame before it is looked at, \p
 /// look the rotation that points saw, in the axes of the camera.
@@ -31,7 +26,7 @@ SensorCalibration fly(
 {
   std::vector<Frame> frames;
   std::vector<RelativeMotion> motions;
-  const std::int64_t gyro_late_ns = MadeFlight::nanoseconds(gyro_late_s);
+  const std::int64_t gyro_late_ns = nsOf(gyro_late_s);
   std::mt19937 random(3);
   std::normal_distribution<double> turn(0, 0.003);
   std::vector<GyroSample> waiting;
@@ -81,17 +76,12 @@ void expectAsStated(const SensorCalibration &calibration)
   EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
 }
 
-void turnRates(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
-{
-  for (GyroSample &sample : frame.gyro)
-    sample.rate = change(sample.rate);
-}
 } // namespace
 
 TEST(SensorCalibration, SensorsInOrderAreReadAsStated)
 {
   expectAsStated(fly(MadeFlight()));
-  const SensorCalibration calibration = fly(noisy());
+  const SensorCalibration calibration = fly(noisyFlight());
   expectAsStated(calibration);
   EXPECT_TRUE(constant(calibration, "gyro_bias"));
   EXPECT_TRUE(constant(calibration, "gyro_late_s"));
@@ -101,8 +91,7 @@ TEST(SensorCalibration, SensorsInOrderAreReadAsStated)
 TEST(SensorCalibration, ABiasOfTheGyroIsFoundWithItsSigma)
 {
   for (const Vector3d &bias : {Vector3d(0, 0, 0.05), Vector3d(0.1, -0.05, 0.02)}) {
-    const SensorCalibration calibration =
-        fly(noisy(), [&](Frame &f) { turnRates(f, [&](const Vector3d &w) { return Vector3d(w + bias); }); });
+    const SensorCalibration calibration = fly(noisyFlight(), rates([&](Vector3d &w) { w += bias; }));
     const CalibratedConstant *found = constant(calibration, "gyro_bias");
     ASSERT_TRUE(found && found->used);
     EXPECT_LT((calibration.gyro_bias - bias).norm(), 3 * std::sqrt(3.0) * found->sigma + 1e-3);
@@ -114,7 +103,7 @@ TEST(SensorCalibration, ALateGyroIsFoundToAFewMilliseconds)
 {
   for (const double late_s : {-0.1, -0.03, 0.03, 0.1}) {
     const SensorCalibration calibration = fly(
-        noisy(), [](Frame &) {}, late_s);
+        noisyFlight(), [](Frame &) {}, late_s);
     EXPECT_NEAR(calibration.gyro_late_s, late_s, 0.006);
     EXPECT_EQ(calibration.odometry_late_s, 0) << late_s;
   }
@@ -124,7 +113,7 @@ TEST(SensorCalibration, GyroAndOdometryThatAreLateTogetherAreBothFound)
 {
   for (const double late_s : {0.06, 0.1}) { // less is less than what such an odometry shows
     const SensorCalibration calibration = fly(
-        noisy(), [](Frame &) {}, late_s, late_s);
+        noisyFlight(), [](Frame &) {}, late_s, late_s);
     EXPECT_NEAR(calibration.gyro_late_s, late_s, 0.006);
     EXPECT_NEAR(calibration.odometry_late_s, late_s, 0.012);
   }
@@ -133,7 +122,7 @@ TEST(SensorCalibration, GyroAndOdometryThatAreLateTogetherAreBothFound)
 TEST(SensorCalibration, AScaleFarFromOneIsTakenOver)
 {
   for (const double factor : {0.75, 1.15, 1.3}) {
-    MadeFlight flight = noisy();
+    MadeFlight flight = noisyFlight();
     flight.factor = factor;
     const SensorCalibration calibration = fly(flight);
     EXPECT_NEAR(std::log(calibration.odometry_scale), std::log(factor), 0.06) << factor;
@@ -145,7 +134,7 @@ TEST(SensorCalibration, ATurnedBodyOfTheOdometryIsFound)
 {
   for (const Vector3d &turned : {Vector3d(0.17, 0, 0), Vector3d(0, 0.17, 0), Vector3d(0, 0, -0.17)}) {
     const SensorCalibration calibration =
-        fly(noisy(), [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
+        fly(noisyFlight(), [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
     EXPECT_LT((logSo3(calibration.bRo) - turned).norm(), 0.02) << turned.transpose();
     EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0)) << turned.transpose();
     EXPECT_GT(calibration.odometry_rotation_sigma, 0) << turned.transpose();
@@ -155,7 +144,7 @@ TEST(SensorCalibration, ATurnedBodyOfTheOdometryIsFound)
 TEST(SensorCalibration, AnAccelerometerThatIsOffIsFoundAndTheOdometryStaysAsStated)
 {
   for (const Vector3d &bias : {Vector3d(1, 0.5, 0), Vector3d(0, -1.2, 0), Vector3d(0, 0, 1), Vector3d(-2, 0, 0)}) {
-    MadeFlight flight = noisy();
+    MadeFlight flight = noisyFlight();
     flight.force_bias = bias;
     const SensorCalibration calibration = fly(flight);
     const CalibratedConstant *found = constant(calibration, "accelerometer_bias");
@@ -170,7 +159,7 @@ TEST(SensorCalibration, AnAccelerometerThatIsOffIsFoundAndTheOdometryStaysAsStat
 TEST(SensorCalibration, ATurnedOdometryAndAnAccelerometerThatIsOffAreToldApart)
 {
   const Vector3d turned(0, 0.17, 0), bias(0, 1.2, 0);
-  MadeFlight flight = noisy();
+  MadeFlight flight = noisyFlight();
   flight.force_bias = bias;
   const SensorCalibration calibration =
       fly(flight, [&](Frame &f) { f.wMb_odometry->R = f.wMb_odometry->R * expSo3(turned); });
@@ -182,7 +171,7 @@ TEST(SensorCalibration, ATurnedOdometryAndAnAccelerometerThatIsOffAreToldApart)
 TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFault)
 {
   const Matrix3d A = forwardCamera().R.transpose();
-  const SensorCalibration calibration = fly(noisy(), [&](Frame &f) {
+  const SensorCalibration calibration = fly(noisyFlight(), [&](Frame &f) {
     *f.wMb_odometry = {A * f.wMb_odometry->R * A.transpose(), A * f.wMb_odometry->t};
   });
   EXPECT_EQ(calibration.force_bias, Vector3d(0, 0, 0));
@@ -192,15 +181,8 @@ TEST(SensorCalibration, AnOdometryInTheAxesOfTheCameraIsNotTheAccelerometersFaul
 
 TEST(SensorCalibration, WhatBeginsLaterIsNoConstant)
 {
-  const auto isLate = [](const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(5); };
-  expectAsStated(fly(noisy(), [&](Frame &f) {
-    if (isLate(f))
-      turnRates(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); });
-  }));
-  expectAsStated(fly(noisy(), [&](Frame &f) {
-    if (isLate(f))
-      turnRates(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
-  }));
+  expectAsStated(fly(noisyFlight(), late(rates([](Vector3d &w) { w.z() += 0.05; }))));
+  expectAsStated(fly(noisyFlight(), late(rates([](Vector3d &w) { w.setZero(); }))));
 }
 
 TEST(SensorCalibration, ACameraFileOfAnotherFocalLengthIsNamed)
@@ -211,7 +193,7 @@ TEST(SensorCalibration, ACameraFileOfAnotherFocalLengthIsNamed)
       return expSo3({angle.x() / factor, angle.y() / factor, angle.z()});
     };
     const SensorCalibration calibration = fly(
-        noisy(), [](Frame &) {}, 0, 0, look);
+        noisyFlight(), [](Frame &) {}, 0, 0, look);
     ASSERT_EQ(calibration.verdicts.size(), 1u) << factor;
     EXPECT_EQ(calibration.verdicts[0].sensor, "images") << factor;
     EXPECT_EQ(calibration.verdicts[0].kind, "focal") << calibration.verdicts[0].text;
@@ -225,7 +207,7 @@ TEST(SensorCalibration, ACameraThatStandsOtherwiseOnTheBodyIsNamed)
   for (const Vector3d &turned : {Vector3d(0.17, 0, 0), Vector3d(0, 0.17, 0), Vector3d(0, 0, -0.17)}) {
     const Matrix3d R = expSo3(turned);
     const SensorCalibration calibration = fly(
-        noisy(), [](Frame &) {}, 0, 0, [&](const Matrix3d &aRb) { return Matrix3d(R.transpose() * aRb * R); });
+        noisyFlight(), [](Frame &) {}, 0, 0, [&](const Matrix3d &aRb) { return Matrix3d(R.transpose() * aRb * R); });
     ASSERT_EQ(calibration.verdicts.size(), 1u);
     EXPECT_EQ(calibration.verdicts[0].kind, "mount") << calibration.verdicts[0].text;
     EXPECT_NE(calibration.verdicts[0].text.find("9."), std::string::npos) << calibration.verdicts[0].text;
@@ -235,8 +217,7 @@ TEST(SensorCalibration, ACameraThatStandsOtherwiseOnTheBodyIsNamed)
 TEST(SensorCalibration, AScaleOfTheGyroIsNamedAndNoCameraBlamed)
 {
   for (const double factor : {0.8, 1.1, 1.3}) {
-    const SensorCalibration calibration =
-        fly(noisy(), [&](Frame &f) { turnRates(f, [&](const Vector3d &w) { return Vector3d(factor * w); }); });
+    const SensorCalibration calibration = fly(noisyFlight(), rates([&](Vector3d &w) { w *= factor; }));
     ASSERT_EQ(calibration.verdicts.size(), 1u) << factor;
     EXPECT_EQ(calibration.verdicts[0].sensor, "gyro") << factor;
     EXPECT_EQ(calibration.verdicts[0].kind, "scale") << calibration.verdicts[0].text;
@@ -246,9 +227,8 @@ TEST(SensorCalibration, AScaleOfTheGyroIsNamedAndNoCameraBlamed)
 TEST(SensorCalibration, CameraAndGyroWithinWhatTheyAreStatedToAreNotNamed)
 {
   const Matrix3d R = expSo3({0.012, -0.012, 0.012});
-  const SensorCalibration calibration = fly(
-      noisy(), [](Frame &f) { turnRates(f, [](const Vector3d &w) { return Vector3d(1.01 * w); }); }, 0, 0,
-      [&](const Matrix3d &aRb) {
+  const SensorCalibration calibration =
+      fly(noisyFlight(), rates([](Vector3d &w) { w *= 1.01; }), 0, 0, [&](const Matrix3d &aRb) {
         const Vector3d angle = logSo3(R.transpose() * aRb * R);
         return expSo3({angle.x() / 1.01, angle.y() / 1.01, angle.z()});
       });
@@ -257,8 +237,7 @@ TEST(SensorCalibration, CameraAndGyroWithinWhatTheyAreStatedToAreNotNamed)
 
 TEST(SensorCalibration, AxesThatAreExchangedAreNoConstant)
 {
-  expectAsStated(
-      fly(noisy(), [](Frame &f) { turnRates(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); }));
+  expectAsStated(fly(noisyFlight(), rates([](Vector3d &w) { w.z() *= -1; })));
 }
 
 namespace

@@ -9,18 +9,18 @@ using namespace bole;
 namespace
 {
 using Eigen::Vector3d;
+using test::isLate;
+using test::kBegins_s;
+using test::late;
 using test::MadeFlight;
-constexpr double kBegins_s = 5;
+using test::rates;
 
 /// \p damage changes a frame before the monitor sees it.
-SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, double duration_s = 8,
-                  double sway = 1.2)
+SensorMonitor fly(const test::Damage &damage, double rate = 10, double duration_s = 8, double sway = 1.2)
 {
-  MadeFlight flight;
+  MadeFlight flight = test::noisyFlight();
   flight.sway = sway;
   flight.frame_rate = rate;
-  flight.odometry_noise = 0.012;
-  flight.force_noise = 0.1;
   SensorMonitor monitor(forwardCamera());
   for (std::size_t i = 0; i < static_cast<std::size_t>(duration_s * rate); ++i) {
     Frame frame = flight.frame(i);
@@ -30,18 +30,10 @@ SensorMonitor fly(const std::function<void(Frame &)> &damage, double rate = 10, 
   return monitor;
 }
 
-void eachRate(Frame &frame, const std::function<Vector3d(const Vector3d &)> &change)
-{
-  for (GyroSample &sample : frame.gyro)
-    sample.rate = change(sample.rate);
-}
-
-bool isLate(const Frame &frame) { return frame.stamp_ns >= MadeFlight::nanoseconds(kBegins_s); }
-
 struct Fault
 {
   const char *name;
-  std::function<void(Frame &)> damage;
+  test::Damage damage;
   Sensor sensor;
   const char *kind;
 };
@@ -50,36 +42,14 @@ std::vector<Fault> faults()
 {
   const auto pitched = [](double angle) { return expSo3({0, angle, 0}); };
   return {
-      {"bias", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 0.05)); }); },
-       Sensor::gyro, "bias"},
-      {"sign", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.x(), w.y(), -w.z()); }); },
-       Sensor::gyro, "rotation"},
-      {"swapped", [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w.y(), w.x(), w.z()); }); },
-       Sensor::gyro, nullptr}, // in a flight that hardly rolls it looks like a bias
-      {"zero",
-       [](Frame &f) {
-         if (isLate(f))
-           eachRate(f, [](const Vector3d &) { return Vector3d(0, 0, 0); });
-       },
-       Sensor::gyro, nullptr},
-      {"silent",
-       [](Frame &f) {
-         if (isLate(f))
-           f.gyro.clear();
-       },
-       Sensor::gyro, "ended"},
-      {"ends",
-       [](Frame &f) {
-         if (isLate(f))
-           f.wMb_odometry.reset();
-       },
-       Sensor::odometry, "ended"},
-      {"jumps",
-       [](Frame &f) {
-         if (isLate(f))
-           f.wMb_odometry->t.y() += 1;
-       },
-       Sensor::odometry, "jump"},
+      {"bias", rates([](Vector3d &w) { w.z() += 0.05; }), Sensor::gyro, "bias"},
+      {"sign", rates([](Vector3d &w) { w.z() *= -1; }), Sensor::gyro, "rotation"},
+      {"swapped", rates([](Vector3d &w) { std::swap(w.x(), w.y()); }), Sensor::gyro,
+       nullptr}, // in a flight that hardly rolls it looks like a bias
+      {"zero", late(rates([](Vector3d &w) { w.setZero(); })), Sensor::gyro, nullptr},
+      {"silent", late([](Frame &f) { f.gyro.clear(); }), Sensor::gyro, "ended"},
+      {"ends", late([](Frame &f) { f.wMb_odometry.reset(); }), Sensor::odometry, "ended"},
+      {"jumps", late([](Frame &f) { f.wMb_odometry->t.y() += 1; }), Sensor::odometry, "jump"},
       {"counts from the sea", [](Frame &f) { f.wMb_odometry->t.z() += 500; }, Sensor::odometry, "height"},
       {"counts down", [](Frame &f) { f.wMb_odometry->t.z() *= -10; }, Sensor::odometry, "height"},
       {"freezes",
@@ -119,7 +89,7 @@ TEST(SensorMonitor, AnAccelerometerThatIsOffCostsTheOdometryNothing)
   const auto off = [](const Vector3d &bias, double until_s) {
     return [bias, until_s](Frame &f) {
       for (GyroSample &sample : f.gyro)
-        if (sample.stamp_ns < MadeFlight::nanoseconds(until_s))
+        if (sample.stamp_ns < nsOf(until_s))
           *sample.force += bias;
     };
   };
@@ -244,9 +214,7 @@ TEST(SensorMonitor, EachFaultIsNamedWithItsSensorWhichIsLeftOut)
 
 TEST(SensorMonitor, ASensorThatAgreesAgainAfterASilenceIsTrustedAgain)
 {
-  const auto isSilent = [](const Frame &frame) {
-    return frame.stamp_ns >= MadeFlight::nanoseconds(3) && frame.stamp_ns < MadeFlight::nanoseconds(5);
-  };
+  const auto isSilent = [](const Frame &frame) { return frame.stamp_ns >= nsOf(3) && frame.stamp_ns < nsOf(5); };
   const SensorMonitor gyro = fly([&](Frame &f) {
     if (isSilent(f))
       f.gyro.clear();
@@ -281,8 +249,7 @@ SensorMonitor flyByWrongStamps(double sigma_s, double late_s, double duration_s 
     std::vector<RelativeMotion> seen = flight.seen(i);
     if (0.1 * double(i) >= until_s)
       sigma_s = late_s = 0;
-    stamps.push_back(frame.stamp_ns +
-                     MadeFlight::nanoseconds(late_s + std::clamp(sigma_s * normal(random), -0.04, 0.04)));
+    stamps.push_back(frame.stamp_ns + nsOf(late_s + std::clamp(sigma_s * normal(random), -0.04, 0.04)));
     frame.stamp_ns = stamps.back();
     for (RelativeMotion &motion : seen) {
       motion.a_ns = stamps[i - 3];
@@ -297,8 +264,8 @@ SensorMonitor flyByWrongStamps(double sigma_s, double late_s, double duration_s 
 TEST(SensorMonitor, AGyroThatWasWrongForAMomentIsTrustedAgainAndOneThatStaysWrongIsNot)
 {
   const auto spiked = [](Frame &f) {
-    if (isLate(f) && f.stamp_ns < MadeFlight::nanoseconds(kBegins_s + 1))
-      eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 30)); });
+    if (isLate(f) && f.stamp_ns < nsOf(kBegins_s + 1))
+      rates([](Vector3d &w) { w.z() += 30; })(f);
   };
   const SensorMonitor during = fly(spiked, 10, kBegins_s + 1);
   EXPECT_FALSE(during.trusts(Sensor::gyro));
@@ -361,7 +328,7 @@ TEST(SensorMonitor, AFrameThatTwoSensorsContradictIsLeftOutAtOnce)
   for (std::size_t i = 0; i < 31; ++i) {
     Frame frame = flight.frame(i);
     if (i == 30)
-      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(0, 0, 1)); });
+      rates([](Vector3d &w) { w.z() += 1; })(frame);
     monitor.process(frame, flight.seen(i));
     EXPECT_EQ(monitor.trustsNow(Sensor::gyro), i < 30) << i;
     Frame scratch;
@@ -394,7 +361,7 @@ TEST(SensorMonitor, ATurnThatCannotBeIsLeftOutBeforeThePointsAreLookedFor)
     frame.wMb_odometry->R = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix() * frame.wMb_odometry->R;
   };
   EXPECT_EQ(leftOut([](Frame &) {}), std::make_pair(0, 0));
-  const auto wild = [](Frame &f) { eachRate(f, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); }); };
+  const auto wild = rates([](Vector3d &w) { w.x() += 30; });
   EXPECT_EQ(leftOut(wild), std::make_pair(10, 0));
   EXPECT_EQ(leftOut([&](Frame &f) { turned(f, 0.5); }), std::make_pair(0, 1)) << "a heading that is corrected once";
 }
@@ -408,7 +375,7 @@ TEST(SensorMonitor, WithoutAnOdometryNoBodyBeginsToTurnAsFastAsAWildGyroSays)
     frame.wMb_odometry.reset();
     const bool is_wild = i >= 30 && i < 40;
     if (is_wild)
-      eachRate(frame, [](const Vector3d &w) { return Vector3d(w + Vector3d(30, 0, 0)); });
+      rates([](Vector3d &w) { w.x() += 30; })(frame);
     EXPECT_EQ(monitor.withoutRejectedSensors(frame, scratch).gyro.empty(),
               i == 0 || is_wild || !monitor.trusts(Sensor::gyro))
         << i;

@@ -43,7 +43,6 @@ inline std::vector<PointMatch> cloudMatches(const PinholeCamera &camera, const P
     if (in_b.z() < 0.1 || !camera.contains(camera.project(in_b)))
       continue;
     PointMatch match;
-    match.id = matches.size() + 1;
     match.a_px = a + Eigen::Vector2d(noise(random), noise(random));
     match.b_px = camera.project(in_b) + Eigen::Vector2d(noise(random), noise(random));
     if (unit(random) < options.outliers)

@@ -151,12 +151,11 @@ PinholeCamera cameraWith(double f)
   return camera;
 }
 
-/// Every field of the saliency's options.
+/// What the saliency is told.
 std::vector<double> valuesOf(const SaliencyOptions &o)
 {
-  return {o.sigma_intensity,     o.sigma_background_px, o.sigma_foreground_px, double(o.label_window_px),
-          o.background_prior,    double(o.iterations),  double(o.levels),      double(o.finest_level),
-          o.sigma_rotation_pull, o.sample_correlation,  o.near_range,          o.min_range};
+  return {o.sigma_background_px,  o.sigma_foreground_px, double(o.levels),
+          double(o.finest_level), o.near_range,          o.min_range};
 }
 
 TEST(StageOptions, OfTheDefaultsAreTheStagesDefaultsForACameraOf200Px)

@@ -17,13 +17,7 @@ const char *const kPrior = "EDGE_SE3_PRIOR:QUAT 0 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 
 std::string errorOf(const std::string &text)
 {
   std::istringstream in(text);
-  try {
-    readG2o(in, "file.g2o");
-  }
-  catch (const vpException &error) {
-    return error.what();
-  }
-  return "none";
+  return test::messageOf([&] { readG2o(in, "file.g2o"); });
 }
 
 Graph smallGraph()
@@ -60,19 +54,13 @@ TEST(G2o, ReadsBackWhatItWrote)
 TEST(G2o, WhatIsNoGraphIsNamed)
 {
   const Graph good = smallGraph();
-  const auto error = [&](const std::function<void(Graph &)> &spoil) -> std::string {
+  const auto error = [&](const std::function<void(Graph &)> &spoil) {
     Graph graph = good;
     spoil(graph);
-    try {
-      Smoother smoother(graph, SmootherOptions());
-    }
-    catch (const vpException &e) {
-      return e.what();
-    }
-    return "none";
+    return test::messageOf([&] { Smoother smoother(graph, SmootherOptions()); });
   };
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinite = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(error([](Graph &) {}), "none");
+  EXPECT_EQ(error([](Graph &) {}), "");
   const std::size_t poses = good.poses.size(), trunks = good.trunks.size();
   const std::vector<std::pair<std::string, std::function<void(Graph &)>>> spoilt = {
       {"pose 4", [](Graph &g) { g.poses[4].wMb.t.x() = kNaN; }},
@@ -132,7 +120,7 @@ TEST(G2o, NamesTheLineOfAMistake)
       {"LOSS summary huber 3\n", ": no pose"}};
   for (const auto &[text, says] : mistakes)
     EXPECT_THAT(errorOf(text), HasSubstr("file.g2o" + says)) << text;
-  EXPECT_EQ(errorOf(pose + prior), "none");
+  EXPECT_EQ(errorOf(pose + prior), "");
   EXPECT_THROW(readG2o(std::string("/dev/null")), vpException);
   EXPECT_THROW(readG2o(testing::TempDir()), vpException);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "support/dense_reference.h"
+#include "support/differences.h"
 #include "support/flight.h"
-#include "support/test.h"
 
 using namespace bole;
 
@@ -49,16 +49,10 @@ TEST(Marginals, AgreeWithTheInverseOfTheWholeSystem)
     const Pose wMb = smoother.pose(last);
     const Trunk trunk = smoother.trunk(j);
     const double heading = std::atan2(wMb.R(1, 0), wMb.R(0, 0));
-    Eigen::Matrix<double, 2, 11> J; // by central differences
-    constexpr double kStep = 1e-5;
-    for (int k = 0; k < 11; ++k) {
-      const auto at = [&](double by) {
-        const Vector6d of_pose = k < 6 ? Vector6d(by * Vector6d::Unit(k)) : Vector6d::Zero();
-        const Vector5d of_trunk = k < 6 ? Vector5d::Zero() : Vector5d(by * Vector5d::Unit(k - 6));
-        return placeSeenFrom(wMb.plus(of_pose), trunk.plus(of_trunk), heading);
-      };
-      J.col(k) = (at(kStep) - at(-kStep)) / (2 * kStep);
-    }
+    const auto place = [&](const Eigen::VectorXd &xi) {
+      return placeSeenFrom(wMb.plus(xi.head<6>()), trunk.plus(xi.tail<5>()), heading);
+    };
+    const Eigen::MatrixXd J = differences(place, 11, 1e-5);
     const int l = dense.poseRow(last);
     Eigen::Matrix<double, 11, 11> joint;
     joint << C.block(l, l, 6, 6), C.block(l, t, 6, 5), C.block(t, l, 5, 6), C.block(t, t, 5, 5);

@@ -48,20 +48,6 @@ TEST(SummaryFactor, HasItsEnergyAndItsGradientAtTheOptimum)
   }
 }
 
-TEST(SummaryFactor, HasItsHessianRoundTheOptimum)
-{
-  Random random;
-  SummaryFactor factor = factorOfRank(random, 4);
-  factor.f.setZero();
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j) {
-      // along a straight line of the tangent the energy is the quadratic of Eq. 9 put right, half included
-      const Vector4d d = 0.02 * (Vector4d::Unit(i) + Vector4d::Unit(j));
-      EXPECT_NEAR(factor.energyAt(factor.optimum.plus(d)), factor.energy + 0.5 * d.dot(factor.F * d),
-                  1e-9 * factor.F.norm());
-    }
-}
-
 TEST(SquareRootSummary, IsTheSameEnergyAsASumOfSquares)
 {
   Random random;
