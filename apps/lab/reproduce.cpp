@@ -121,9 +121,9 @@ Result fly(const std::string &sequence, Mapper &mapper, const std::string &run, 
   Result result;
   std::vector<double> times_ms;
   for (Frame frame; source->next(frame);) {
-    const double begin_ms = processTime_ms();
+    const double begin_ms = processorTime_ms();
     const FrameReport report = mapper.process(frame);
-    times_ms.push_back(processTime_ms() - begin_ms);
+    times_ms.push_back(processorTime_ms() - begin_ms);
     if (seen && frame.status == FrameStatus::ok)
       seen->push_back(drawn(frame, report, mapper.map(), source->camera(), source->bMc(), run));
   }

@@ -86,10 +86,10 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
     const double servoing_s = record.servoing_from_s < 0 ? -1 : sample.time_s - record.servoing_from_s;
     sample.is_spoilt = injector.apply(frame, servoing_s);
 
-    const double start_ms = processTime_ms();
+    const double start_ms = processorTime_ms();
     const FrameReport report = perception.process(frame, sample.truth);
     const TaskCommand command = task.step(report);
-    sample.loop_ms = processTime_ms() - start_ms;
+    sample.loop_ms = processorTime_ms() - start_ms;
     give(robot, command);
 
     if (record.servoing_from_s < 0 && task.phase() == TaskPhase::servoing)
