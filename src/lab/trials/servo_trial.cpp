@@ -348,8 +348,6 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   const Scenario scenario = makeScenario(asked);
   vpSimulatorArDrone::Options settings = options.robot;
   settings.setSeed(options.scenario.seed);
-  settings.start = scenario.start;
-  settings.heading = scenario.heading;
   vpSimulatorArDrone robot(scenario.forest, settings);
   const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
