@@ -254,8 +254,8 @@ void run(ServoArguments &arguments)
   if (!arguments.config.empty())
     readConfig(findPreset(arguments.config), arguments.trial.pipeline);
   setOptions(arguments.settings, arguments.trial.pipeline);
-  arguments.trial.loop.fault.kind = faultFromString(arguments.fault);
-  arguments.trial.perception = perceptionFromString(arguments.perception);
+  arguments.trial.loop.fault.kind = valueNamed<FaultKind>("fault", arguments.fault);
+  arguments.trial.perception = valueNamed<PerceptionKind>("perception", arguments.perception);
   if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
     throw badValue("fault = {} with perception = truth, must be none: no image is looked at", arguments.fault);
   arguments.trial.loop.validate();

@@ -15,7 +15,6 @@
 #include <fstream>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace bole
@@ -66,22 +65,9 @@ private:
   double m_swing = 1, m_wave_length = 8, m_radius = 6;
 };
 
-// What scene files and commands call the values of an enumeration.
-
-template <class T> using Words = std::vector<std::pair<std::string, T>>;
-
 inline const char *toString(Light light) { return nameOf(light, {"sun", "overcast"}); }
 inline const char *toString(Bark bark) { return nameOf(bark, {"dark", "bright", "mixed"}); }
 inline const char *toString(PathKind path) { return nameOf(path, {"forward", "lateral", "loop", "slalom"}); }
-
-/// All values of an enumeration by their names.
-template <class T> Words<T> wordsOf(T)
-{
-  Words<T> words;
-  for (T value{}; std::string(toString(value)) != kUnknownName; value = static_cast<T>(static_cast<int>(value) + 1))
-    words.emplace_back(toString(value), value);
-  return words;
-}
 
 struct SceneOptions
 {
