@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fmt/ranges.h>
+#include <initializer_list>
 #include <iterator>
 #include <memory>
 
@@ -23,11 +24,12 @@ namespace fs = std::filesystem;
 
 struct CompareArguments
 {
-  std::string sequence, out, settings, json;
+  std::string sequence, out, settings;
   bool has_video = true, has_basin = false, has_faults = false, is_quick = false, is_quiet = false;
-  double range_m = 25, far_m = 25;
+  double far_m = 25;
 };
 
+constexpr double kModelRange = 25; ///< trunks that come as near to the camera are in the model [m]
 constexpr TrackerKind kVisp[] = {TrackerKind::visp_edge, TrackerKind::visp_generic_edge,
                                  TrackerKind::visp_generic_edge_klt};
 
@@ -72,38 +74,49 @@ EdgeSettings bestOf(const std::vector<SweepResult> &sweeps, TrackerKind kind, He
   return {};
 }
 
-EdgeSettings ourSettings(const CompareArguments &arguments)
+Contender ours(const CompareArguments &arguments, Help help)
 {
   EdgeSettings settings;
   settings.far_m = arguments.far_m;
-  return settings;
+  return Contender(TrackerKind::trunk, help, settings, arguments.settings);
+}
+
+/// ViSP's trackers at their best settings, each with all of \p helps; ours alone and with a prior.
+std::vector<Contender> contendersOf(const CompareArguments &arguments, const std::vector<SweepResult> &sweeps,
+                                    std::initializer_list<Help> helps)
+{
+  std::vector<Contender> contenders;
+  for (const TrackerKind kind : kVisp)
+    for (const Help help : helps)
+      contenders.emplace_back(kind, help, bestOf(sweeps, kind, help));
+  for (const Help help : {Help::alone, Help::prior})
+    contenders.push_back(ours(arguments, help));
+  return contenders;
 }
 
 void compareAll(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
                 ComparisonReport &report)
 {
-  std::vector<Contender> contenders;
+  const auto helps = {Help::alone, Help::prior, Help::reinitialised};
   for (const TrackerKind kind : kVisp)
-    for (const Help help : {Help::alone, Help::prior, Help::reinitialised}) {
+    for (const Help help : helps) {
       if (interrupted())
         return;
-      if (!arguments.is_quick) {
-        steps.begin(fmt::format("settings of {}, {}", toString(kind), toString(help)));
-        report.sweeps.push_back(sweep(flight, cao, kind, help, report.limits));
-      }
-      contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
+      if (arguments.is_quick)
+        continue;
+      steps.begin(fmt::format("settings of {}, {}", toString(kind), toString(help)));
+      report.sweeps.push_back(sweep(flight, cao, kind, help));
     }
-  for (const Help help : {Help::alone, Help::prior})
-    contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
+  std::vector<Contender> contenders = contendersOf(arguments, report.sweeps, helps);
   steps.begin(fmt::format("{} trackers over {} frames", contenders.size(), flight.frames.size()));
-  report.scores = compare(flight, cao, contenders, report.limits);
+  report.scores = compare(flight, cao, contenders);
 
   std::vector<Contender> timed;
   EdgeSettings edge = bestOf(report.sweeps, TrackerKind::visp_generic_edge, Help::prior);
   edge.far_m = arguments.far_m;
   timed.emplace_back(TrackerKind::visp_generic_edge, Help::truth, edge);
-  timed.emplace_back(TrackerKind::trunk, Help::truth, ourSettings(arguments), arguments.settings);
-  report.timing = compare(flight, cao, timed, report.limits);
+  timed.push_back(ours(arguments, Help::truth));
+  report.timing = compare(flight, cao, timed);
 }
 
 void measureBasin(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
@@ -133,31 +146,26 @@ void measureBasin(const CompareArguments &arguments, const TestFlight &flight, c
       report.basin.push_back(best);
     }
     steps.begin(fmt::format("basin of {}{}", toString(TrackerKind::trunk), has_clutter ? "" : ", without clutter"));
-    Contender ours(TrackerKind::trunk, Help::alone, ourSettings(arguments), arguments.settings);
-    report.basin.push_back(basin(flight, cao, ours, has_clutter, options));
+    Contender contender = ours(arguments, Help::alone);
+    report.basin.push_back(basin(flight, cao, contender, has_clutter, options));
   }
 }
 
 void measureFaults(const CompareArguments &arguments, const TestFlight &flight, const std::string &cao, Steps &steps,
                    ComparisonReport &report)
 {
-  std::vector<Contender> contenders;
-  for (const TrackerKind kind : kVisp)
-    for (const Help help : {Help::alone, Help::prior})
-      contenders.emplace_back(kind, help, bestOf(report.sweeps, kind, help));
-  for (const Help help : {Help::alone, Help::prior})
-    contenders.emplace_back(TrackerKind::trunk, help, ourSettings(arguments), arguments.settings);
+  std::vector<Contender> contenders = contendersOf(arguments, report.sweeps, {Help::alone, Help::prior});
   steps.begin("faults");
-  report.faults = faults(flight, cao, contenders, {}, report.limits);
+  report.faults = faults(flight, cao, contenders);
 }
 
 void run(const CompareArguments &arguments)
 {
   const TestFlight flight = readFlight(arguments.sequence);
   const OutputFolder folder(arguments.out, {"compare.json", "truth.cao", "compare.mp4"});
-  const std::vector<Cylinder> model = flight.trunksWithin(arguments.range_m);
+  const std::vector<Cylinder> model = flight.trunksWithin(kModelRange);
   if (model.empty())
-    throw badValue("{}: no trunk within {:g} m", arguments.sequence, arguments.range_m);
+    throw badValue("{}: no trunk within {:g} m", arguments.sequence, kModelRange);
   const std::string cao = (fs::path(arguments.out) / "truth.cao").string();
   writeCao(cao, model, "the trunks of " + flight.name + " as they are");
 
@@ -178,7 +186,7 @@ void run(const CompareArguments &arguments)
   }
   if (!arguments.is_quiet)
     std::fputs(toTable(report).c_str(), stdout);
-  writeFile(arguments.json.empty() ? arguments.out + "/compare.json" : arguments.json, toJson(report));
+  writeFile(arguments.out + "/compare.json", toJson(report));
   if (arguments.has_video && !interrupted())
     writeComparisonVideo((fs::path(arguments.out) / "compare.mp4").string(), flight, cao, report.scores);
   if (interrupted()) {
@@ -209,7 +217,6 @@ void addCompare(CLI::App &app)
       ->capture_default_str();
   command->add_flag("!--no-video", arguments->has_video, "Write no compare.mp4");
   command->add_flag("-q,--quiet", arguments->is_quiet, "No table and no progress");
-  command->add_option("--json", arguments->json, "File for all figures (default OUT/compare.json)");
   command->footer(
       "Every tracker gets the same frames in the same process, frame by frame, the true model (OUT/truth.cao) and\n"
       "the true first pose. ViSP's settings are swept on the flight itself, for each tracker and help; the best are "

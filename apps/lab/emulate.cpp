@@ -13,6 +13,7 @@ namespace bole::apps
 {
 namespace
 {
+/// Of both commands: `replay` has no options of a source, a feed and faults.
 struct EmulateArguments
 {
   std::string input;
@@ -70,21 +71,13 @@ void run(EmulateArguments &arguments)
   serve(emulator, arguments.quiet);
 }
 
-struct ReplayArguments
-{
-  std::string flight;
-  ArDroneEmulator::Options emulator;
-  int offset = 0;
-  bool quiet = false;
-};
-
-void replay(ReplayArguments &arguments)
+void replay(EmulateArguments &arguments)
 {
   setPorts(arguments.emulator, arguments.offset);
-  auto feed = makeRecordingFeed(arguments.flight);
+  auto feed = makeRecordingFeed(arguments.input);
   if (!arguments.quiet)
     fmt::print(stderr, "AR.Drone {} of {} at ardrone://127.0.0.1{}; waits for a listener\n", feed->generation(),
-               arguments.flight, arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "");
+               arguments.input, arguments.offset != 0 ? fmt::format("?offset={}", arguments.offset) : "");
   ArDroneEmulator emulator(std::move(feed), arguments.emulator);
   serve(emulator, arguments.quiet);
 }
@@ -128,9 +121,9 @@ void addEmulate(CLI::App &app)
 
 void addReplay(CLI::App &app)
 {
-  auto arguments = std::make_shared<ReplayArguments>();
+  auto arguments = std::make_shared<EmulateArguments>();
   CLI::App *command = app.add_subcommand("replay", "Serve a recorded flight again as the drone did");
-  command->add_option("flight", arguments->flight, "Folder of `bole record`, or its raw.bin")->required();
+  command->add_option("flight", arguments->input, "Folder of `bole record`, or its raw.bin")->required();
   command->add_option("--speed", arguments->emulator.speed, "Flight seconds a second, 1 to 20 (default 1)");
   command->add_option("--offset", arguments->offset, "Added to the ports 5554 to 5556 (default 0)")
       ->check(CLI::Range(0, 59000));

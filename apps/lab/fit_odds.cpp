@@ -139,7 +139,7 @@ std::string reliability(const std::vector<std::pair<double, bool>> &scores)
   return table;
 }
 
-void run(const std::vector<std::string> &sequences, const std::string &output)
+void run(const std::vector<std::string> &sequences)
 {
   std::vector<Rows> flights;
   Progress progress(sequences.size(), stderr);
@@ -171,26 +171,18 @@ void run(const std::vector<std::string> &sequences, const std::string &output)
       "area under the ROC curve, each flight by the weights of the others: {:.3f}; by those in use: {:.3f}\n",
       areaUnderCurve(scores), areaUnderCurve(present));
   std::fputs((text + reliability(scores)).c_str(), stdout);
-  if (!output.empty())
-    writeFile(output, reliability(scores));
 }
 } // namespace
 
 void addFitOdds(CLI::App &app)
 {
-  struct Arguments
-  {
-    std::vector<std::string> sequences;
-    std::string output;
-  };
-  const auto arguments = std::make_shared<Arguments>();
+  const auto sequences = std::make_shared<std::vector<std::string>>();
   CLI::App *command = app.add_subcommand("fit-odds", "Weights of the final decision, from flights with known trunks");
-  command->add_option("SEQUENCE", arguments->sequences, "ASL folders with trees.csv")->required();
-  command->add_option("-o,--output", arguments->output, "CSV of the reliability: told against true");
+  command->add_option("SEQUENCE", *sequences, "ASL folders with trees.csv")->required();
   command->footer(
       "Prints the weights of src/pipeline/final_pass.cpp, the area under the ROC curve with each flight left\n"
       "out in turn, and how often a probability came true.\n"
       "Example: bole fit-odds forests/3*");
-  command->callback([arguments] { run(arguments->sequences, arguments->output); });
+  command->callback([sequences] { run(*sequences); });
 }
 } // namespace bole::apps

@@ -14,7 +14,7 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <visp3/io/vpImageIo.h>
@@ -121,9 +121,9 @@ Result fly(const std::string &sequence, Mapper &mapper, const std::string &run, 
   Result result;
   std::vector<double> times_ms;
   for (Frame frame; source->next(frame);) {
-    const double begin_ms = processTime_ms();
+    const double begin_ms = processorTime_ms();
     const FrameReport report = mapper.process(frame);
-    times_ms.push_back(processTime_ms() - begin_ms);
+    times_ms.push_back(processorTime_ms() - begin_ms);
     if (seen && frame.status == FrameStatus::ok)
       seen->push_back(drawn(frame, report, mapper.map(), source->camera(), source->bMc(), run));
   }
@@ -202,21 +202,11 @@ const std::vector<std::string> kHead = {
     "flight",       "method",          "trees in the map", "right",   "twice",     "wrong", "found of the expected",
     "position (m)", "radius RMSE (m)", "NEES/2",           "ATE (m)", "ms a frame"};
 
-/// The same for spreadsheets.
-std::string csvOf(const std::vector<std::vector<std::string>> &rows)
+std::string csvLine(std::vector<std::string> cells)
 {
-  std::string text;
-  const auto add = [&](const std::vector<std::string> &cells) {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const std::string cell = cells[i].substr(std::min(cells[i].find_first_not_of(' '), cells[i].size()));
-      text += (i > 0 ? "," : "") + csvField(cell);
-    }
-    text += '\n';
-  };
-  add(kHead);
-  for (const std::vector<std::string> &row : rows)
-    add(row);
-  return text;
+  for (std::string &cell : cells)
+    cell = csvField(cell);
+  return fmt::format("{}\n", fmt::join(cells, ","));
 }
 
 void reproduce(const ReproduceArguments &arguments)
@@ -235,7 +225,7 @@ void reproduce(const ReproduceArguments &arguments)
     flights = {simulated, findSequence("park-forward")};
   }
   const double calibrated_alpha = detectorStatistics(findSequence("park-forward")).calibratedAlpha();
-  std::vector<std::vector<std::string>> rows;
+  std::string table = csvLine(kHead);
   Progress progress(arguments.is_quiet ? 0 : 3 * flights.size(), stderr);
   std::size_t done = 0;
   for (const std::string &sequence : flights) {
@@ -244,13 +234,13 @@ void reproduce(const ReproduceArguments &arguments)
     const paper::LineQuartiles quartiles = detectorStatistics(sequence).quartiles();
     for (const Method &method : methods(calibrated_alpha)) {
       const std::string run = arguments.output + "/" + name + "/" + method.folder;
-      rows.push_back(rowOf(name, method.name, fly(sequence, name, method, quartiles, run)));
+      table += csvLine(rowOf(name, method.name, fly(sequence, name, method, quartiles, run)));
       progress.update(++done, name + ", " + method.name);
     }
   }
-  const std::string table = arguments.output + "/table.csv";
-  writeFile(table, csvOf(rows));
-  std::printf("%s (alpha calibrated: %.2g)\n", table.c_str(), calibrated_alpha);
+  const std::string path = arguments.output + "/table.csv";
+  writeFile(path, table);
+  std::printf("%s (alpha calibrated: %.2g)\n", path.c_str(), calibrated_alpha);
 }
 } // namespace
 

@@ -34,7 +34,7 @@ struct ServoArguments
   std::string folder, fault = "none", perception = "real", config;
   std::vector<std::string> settings;
   int runs = 1;
-  bool is_shown = false, has_video = true, is_ungated = false, is_quiet = false;
+  bool is_shown = false, has_video = true, is_quiet = false;
 };
 
 /// A figure of a run, for tables.
@@ -254,10 +254,8 @@ void run(ServoArguments &arguments)
   if (!arguments.config.empty())
     readConfig(findPreset(arguments.config), arguments.trial.pipeline);
   setOptions(arguments.settings, arguments.trial.pipeline);
-  if (arguments.is_ungated)
-    arguments.trial.pipeline.stages.saliency = false;
-  arguments.trial.loop.fault.kind = faultFromString(arguments.fault);
-  arguments.trial.perception = perceptionFromString(arguments.perception);
+  arguments.trial.loop.fault.kind = valueNamed<FaultKind>("fault", arguments.fault);
+  arguments.trial.perception = valueNamed<PerceptionKind>("perception", arguments.perception);
   if (arguments.trial.perception == PerceptionKind::truth && arguments.fault != "none")
     throw badValue("fault = {} with perception = truth, must be none: no image is looked at", arguments.fault);
   arguments.trial.loop.validate();
@@ -344,7 +342,6 @@ void addTask(CLI::App &servo, ServoKind kind, const char *what, const char *exam
       ->capture_default_str();
   task->add_option("--config", arguments->config, "Options of the pipeline (YAML)");
   task->add_option("--set", arguments->settings, "One option of the pipeline, e.g. --set detection.window=30");
-  task->add_flag("--ungated", arguments->is_ungated, "Without saliency: nothing says what is foreground");
   task->add_flag("-q,--quiet", arguments->is_quiet, "Nothing but errors");
   task->add_flag("--show", arguments->is_shown, "Show the overlay in a window (X11)");
   task->add_flag("!--no-video", arguments->has_video, "Write no overlay.mp4");
@@ -363,7 +360,7 @@ void addServo(CLI::App &app)
           "bole servo circle --ratio .08 --speed .5 -o run/circle --show");
   addTask(*servo, ServoKind::gap, "Pass between two trunks", "bole servo gap --runs 50 --no-video -o run/gap");
   addTask(*servo, ServoKind::slalom, "Through a stand of trees along a line",
-          "bole servo slalom --length 40 --density .05 --runs 10 --ungated -o run/slalom");
+          "bole servo slalom --length 40 --density .05 --runs 10 --set stages.saliency=false -o run/slalom");
   servo->footer(
       "The loop is closed over rendered images and the tracker; the truth only judges. The drone hovers where a frame\n"
       "cannot be believed or the trunk it flies by is lost: try --fault black.\n"

@@ -5,7 +5,8 @@
   cmake --build --preset release --target figures   (park-forward.gif, park-forward-map.svg, system.png)
   src/doc/figures.py frames data/figures/frames.svg
   src/doc/figures.py beside run/overlay.mp4 data/figures/success-and-failure.png 12 45   (run of data/park-forward)
-  src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)"""
+  src/doc/figures.py growth build/check/bole data/figures/growth.svg   (ten minutes)
+  src/doc/figures.py curves curves.csv data/figures/smoother_flat.svg --log   (what benchmark_smoothing_flat has written)"""
 import argparse
 import csv
 import math
@@ -291,6 +292,22 @@ def growth(arguments):
     figure.savefig(arguments.out)
 
 
+def curves(arguments):
+    """Draws what a benchmark has written: a curve's name, x and y in each row, under the title and the names of the axes."""
+    rows = rows_of(arguments.table)
+    title, x, y = rows[0]
+    figure, axis = plt.subplots(figsize=(7.2, 3.9))
+    for name in dict.fromkeys(row[title] for row in rows):
+        mine = [row for row in rows if row[title] == name]
+        axis.plot([float(row[x]) for row in mine], [float(row[y]) for row in mine], label=name)
+    axis.set(xlabel=x, ylabel=y, title=title)
+    if arguments.log:
+        axis.loglog()
+    axis.legend(frameon=False)
+    figure.tight_layout()
+    figure.savefig(arguments.out)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_subparsers(required=True)
@@ -315,6 +332,10 @@ def main():
     part.add_argument("bole"), part.add_argument("out")
     part.add_argument("--times", type=int, default=3, help="runs of which the least counts")
     part.set_defaults(draw=growth)
+    part = what.add_parser("curves", help="what a benchmark has measured")
+    part.add_argument("table"), part.add_argument("out")
+    part.add_argument("--log", action="store_true", help="both axes are logarithmic")
+    part.set_defaults(draw=curves)
     arguments = parser.parse_args()
     arguments.draw(arguments)
 

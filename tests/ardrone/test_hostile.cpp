@@ -25,9 +25,9 @@ public:
   explicit FakeDrone(int generation) : m_generation(generation)
   {
     if (generation == 2)
-      listener = ServerSocket::listenTcp("127.0.0.1", 0);
+      listener = ServerSocket::bindTo(0, SOCK_STREAM);
     else
-      video = ServerSocket::bindUdp("127.0.0.1", 0);
+      video = ServerSocket::bindTo(0, SOCK_DGRAM);
   }
 
   ArDroneAddress address() const
@@ -82,11 +82,11 @@ public:
       EXPECT_TRUE(name == "CONFIG" || name == "CTRL" || name == "COMWDG") << name;
   }
 
-  ServerSocket navdata = ServerSocket::bindUdp("127.0.0.1", 0), listener, video;
+  ServerSocket navdata = ServerSocket::bindTo(0, SOCK_DGRAM), listener, video;
 
 private:
   int m_generation;
-  ServerSocket m_at = ServerSocket::bindUdp("127.0.0.1", 0);
+  ServerSocket m_at = ServerSocket::bindTo(0, SOCK_DGRAM);
   std::set<std::string> m_commands;
 };
 
@@ -187,7 +187,7 @@ TEST(Hostile, WhatComesFromAnotherPortIsNotHeard)
   FakeDrone drone(1);
   DroneLink link(drone.address());
   const sockaddr_in of_navdata = FakeDrone::clientOf(drone.navdata), of_video = FakeDrone::clientOf(drone.video);
-  const ServerSocket other = ServerSocket::bindUdp("127.0.0.1", 0);
+  const ServerSocket other = ServerSocket::bindTo(0, SOCK_DGRAM);
   for (std::uint32_t k = 1; k <= 50; ++k) {
     send(other, encodeNavdata(packet(1000 + k)), of_navdata);
     send(other, encodeUvlc(test::stripes(160, 120, static_cast<int>(k)), k), of_video);

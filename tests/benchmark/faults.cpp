@@ -22,8 +22,7 @@ namespace
 {
 using namespace bole;
 constexpr double kRate_hz = 10, kGiveUp_s = 4, kDeadline_s = 60, kReboot_s = 1;
-constexpr double kVideoDelay_s = 0.06; // of the feed: exposure to sending
-constexpr int kStep_px = 4;            // pictures are compared on a grid
+constexpr int kStep_px = 4; // pictures are compared on a grid
 
 const std::string kFlight = std::string(BOLE_SHARED_DATA_DIR) + "/rendered/park-forward";
 
@@ -133,7 +132,6 @@ std::unique_ptr<ArDroneEmulator> startEmulator(int generation, const ArDroneEmul
   SequenceFeedOptions feed;
   feed.generation = generation;
   feed.max_frames = frames;
-  feed.video_delay_s = kVideoDelay_s;
   auto emulator = std::make_unique<ArDroneEmulator>(makeSequenceFeed(*sequence, feed), options);
   emulator->start();
   return emulator;

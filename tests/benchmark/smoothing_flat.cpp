@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Time and memory a frame over a long flight: must not grow with its length; and how far what is in sight is from the
-// batch optimum along the way. benchmark_smoothing_flat [poses] [figure.svg] [poses a round] [forget]: straight ahead,
+// batch optimum along the way. benchmark_smoothing_flat [poses] [curves.csv] [poses a round] [forget]: straight ahead,
 // or round after round past the same trunks; "forget": what leaves the window is.
+#include "support/curves.h"
 #include "support/flight.h"
-#include "support/line_chart.h"
 
 #include <Eigen/Cholesky>
 
@@ -77,7 +77,7 @@ int main(int argc, char **argv)
   bole::test::Replay replay(flight, options);
   const double before = heapMegabytes();
   std::vector<double> ms;
-  std::vector<std::pair<double, double>> naive, flat, tail;
+  bole::test::Curve naive, flat, tail;
   std::size_t limit = 0, views = 0;
   for (int i = 0; i < o.poses; ++i) {
     const double start = threadMs();
@@ -112,20 +112,8 @@ int main(int argc, char **argv)
                "median {:.1f}\n",
                windowMedian(400, 600), windowMedian(o.poses - 500, o.poses),
                windowMedian(o.poses - 500, o.poses) / windowMedian(400, 600), quantile(ms, 0.99) / quantile(ms, 0.5));
-  if (argc > 2 && *argv[2] != '\0') {
-    bole::test::LineChart chart;
-    chart.title = "Adding one frame: update of the window and full re-solve";
-    chart.x_name = "poses in the graph";
-    chart.y_name = "ms of one thread";
-    chart.log_x = chart.log_y = true;
-    chart.x_min = 100;
-    chart.x_max = o.poses;
-    chart.y_min = 0.1;
-    chart.y_max = 10000;
-    chart.x_ticks = {100, 300, 1000, 3000, 10000, 20000};
-    chart.y_ticks = {0.1, 1, 10, 100, 1000, 10000};
-    chart.lines = {
-        {"full re-solve", "#c33", naive}, {"update, p99 of 500", "#69c", tail}, {"update, median", "#036", flat}};
-    chart.write(argv[2]);
-  }
+  if (argc > 2 && *argv[2] != '\0')
+    bole::test::writeCurves(argv[2], "Adding one frame: update of the window and full re-solve", "poses in the graph",
+                            "ms of one thread",
+                            {{"full re-solve", naive}, {"p99 of 500 updates", tail}, {"median update", flat}});
 }

@@ -2,10 +2,10 @@
 // The paper's claim: past views are kept without baking in a linearisation. A trunk of twice the
 // prior's radius, so at twice the range first believed, seen while the baseline widens: summary
 // factors against the same views linearised once, at the estimate of their time (Gaussian factors
-// in x, y, log r). benchmark_smoothing_linearisation [figure.svg]
+// in x, y, log r). benchmark_smoothing_linearisation [curves.csv]
 #include "smoothing/factors.h"
+#include "support/curves.h"
 #include "support/dense_reference.h"
-#include "support/line_chart.h"
 
 #include <bole/smoother.h>
 
@@ -30,7 +30,7 @@ int main(int argc, char **argv)
   Trunk once; // the linearised estimate: information H about the point `once`
   Matrix5d H;
   Vector5d gradient;
-  std::vector<std::pair<double, double>> by_summary, by_once, by_batch, exact;
+  test::Curve by_summary, by_once, by_batch, exact;
   fmt::print("baseline  range by summaries, batch, linearised once (truth 8 m)\n");
   for (int i = 0; i <= 60; ++i) {
     Pose wMb;
@@ -74,20 +74,8 @@ int main(int argc, char **argv)
       fmt::print("{:4.1f} m    {:.3f}  {:.3f}  {:.3f} m, radius {:.3f}  {:.3f}  {:.3f} m\n", b, range, range_batch,
                  once.xy.norm(), smoother.trunk(0).radius(), batch.graph().trunks[0].trunk.radius(), once.radius());
   }
-  if (argc > 1) {
-    test::LineChart chart;
-    chart.title = "A trunk at twice the range first believed";
-    chart.x_name = "baseline [m]";
-    chart.y_name = "range [m]";
-    chart.x_max = 3;
-    chart.y_min = 2;
-    chart.y_max = 12;
-    chart.x_ticks = {0, 0.5, 1, 1.5, 2, 2.5, 3};
-    chart.y_ticks = {2, 4, 6, 8, 10, 12};
-    chart.lines = {{"truth", "#999", exact},
-                   {"batch optimum", "#e90", by_batch},
-                   {"summary factors", "#036", by_summary},
-                   {"linearised once", "#c33", by_once}};
-    chart.write(argv[1]);
-  }
+  if (argc > 1)
+    test::writeCurves(
+        argv[1], "A trunk at twice the range first believed", "baseline [m]", "range [m]",
+        {{"truth", exact}, {"batch optimum", by_batch}, {"summary factors", by_summary}, {"linearised once", by_once}});
 }

@@ -31,6 +31,7 @@ void summarise(Score &score)
     score.until_loss += lost ? 0 : 1;
     score.tracked += !e.complained && !e.wrong ? 1 : 0;
     score.silent_failures += e.wrong && !e.complained ? 1 : 0;
+    score.reinitialisations += e.reinitialised ? 1 : 0;
     times.push_back(e.ms);
   }
   const std::size_t held = std::size_t(score.until_loss), all = score.errors.size();
@@ -52,25 +53,17 @@ PoseError poseError(const Pose &cMo, const Pose &truth)
 
 namespace
 {
-FrameError answerOf(Contender &contender, const TestFlight &flight, std::size_t k, const vpImage<unsigned char> &image,
-                    const Limits &limits, Score &score)
+FrameError answerOf(Contender &contender, const TestFlight &flight, std::size_t k, const vpImage<unsigned char> &image)
 {
   const Answer answer = contender.track(flight, k, image);
   const PoseError error = poseError(answer.cMo, flight.frames[k].cMo);
-  score.reinitialisations += answer.reinitialised ? 1 : 0;
-  FrameError e;
-  e.position_m = error.position_m;
-  e.rotation_deg = error.rotation_deg;
-  e.complained = answer.complained;
-  e.wrong = error.position_m > limits.position_m || error.rotation_deg > limits.rotation_deg;
-  e.ms = answer.ms;
-  e.cMo = answer.cMo;
-  return e;
+  return {answer, error,
+          error.position_m > flight.limits.position_m || error.rotation_deg > flight.limits.rotation_deg};
 }
 } // namespace
 
 std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                           const Limits &limits, const ImageAt &image_at)
+                           const ImageAt &image_at)
 {
   std::vector<Score> scores(contenders.size());
   for (std::size_t i = 0; i < contenders.size(); ++i) {
@@ -84,7 +77,7 @@ std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path
     const vpImage<unsigned char> &image = image_at ? image_at(k) : flight.frames[k].image;
     for (std::size_t j = 0; j < contenders.size(); ++j) {
       const std::size_t i = (j + k) % contenders.size(); // nobody always runs with the cache of the same other
-      scores[i].errors.push_back(answerOf(contenders[i], flight, k, image, limits, scores[i]));
+      scores[i].errors.push_back(answerOf(contenders[i], flight, k, image));
     }
   }
   for (Score &score : scores)
@@ -95,7 +88,7 @@ std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path
 namespace
 {
 /// One setting of a sweep: stops where the tracker has been wrong for so long that it will not come back.
-Score tryOut(const TestFlight &flight, const std::string &cao_path, Contender &&contender, const Limits &limits)
+Score tryOut(const TestFlight &flight, const std::string &cao_path, Contender &&contender)
 {
   constexpr int kHopeless = 15;
   Score score;
@@ -103,7 +96,7 @@ Score tryOut(const TestFlight &flight, const std::string &cao_path, Contender &&
   contender.start(cao_path, flight.camera, flight.frames[0].image, flight.frames[0].cMo);
   int wrong_in_a_row = 0;
   for (std::size_t k = 1; k < flight.frames.size() && wrong_in_a_row < kHopeless; ++k) {
-    score.errors.push_back(answerOf(contender, flight, k, flight.frames[k].image, limits, score));
+    score.errors.push_back(answerOf(contender, flight, k, flight.frames[k].image));
     wrong_in_a_row = score.errors.back().wrong ? wrong_in_a_row + 1 : 0;
   }
   summarise(score);
@@ -133,14 +126,13 @@ bool isBetter(const Score &a, const Score &b)
 }
 } // namespace
 
-SweepResult sweep(const TestFlight &flight, const std::string &cao_path, TrackerKind kind, Help help,
-                  const Limits &limits)
+SweepResult sweep(const TestFlight &flight, const std::string &cao_path, TrackerKind kind, Help help)
 {
   SweepResult result;
   result.kind = kind;
   result.help = help;
   const auto run = [&](const EdgeSettings &settings) -> const Score & {
-    result.tried.emplace_back(settings, tryOut(flight, cao_path, Contender(kind, help, settings), limits));
+    result.tried.emplace_back(settings, tryOut(flight, cao_path, Contender(kind, help, settings)));
     return result.tried.back().second;
   };
   const auto isTried = [&](const EdgeSettings &settings) {

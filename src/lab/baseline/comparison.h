@@ -4,8 +4,8 @@
 /// Trackers side by side on the same frames of the same flight, from the same pose, with the same true model.
 ///
 /// Every frame is given to every tracker before the next frame is looked at, in turning order, so that all are
-/// timed under the same load. Wrong is a pose further from the truth than Limits; a failure is silent when the tracker
-/// did not complain about it.
+/// timed under the same load. Wrong is a pose further from the truth than the flight's Limits; a failure is silent when
+/// the tracker did not complain about it.
 ///
 /// Cost: that of the trackers; sweep() runs one over the flight some twenty times.
 
@@ -18,12 +18,17 @@
 
 namespace bole
 {
-struct FrameError
+struct PoseError
 {
   double position_m = 0, rotation_deg = 0;
-  bool complained = false, wrong = false;
-  double ms = 0;
-  Pose cMo; ///< its answer
+};
+/// Distance between two poses: of the camera centres [m] and of the attitudes [degrees].
+PoseError poseError(const Pose &cMo, const Pose &truth);
+
+/// What a tracker answered on one frame, and how far it was off.
+struct FrameError : Answer, PoseError
+{
+  bool wrong = false;
 };
 
 struct Score
@@ -45,19 +50,12 @@ struct Score
   std::vector<FrameError> errors; ///< a frame each, for plots
 };
 
-struct PoseError
-{
-  double position_m, rotation_deg;
-};
-/// Distance between two poses: of the camera centres [m] and of the attitudes [degrees].
-PoseError poseError(const Pose &cMo, const Pose &truth);
-
 /// The image that is shown in place of that of frame k.
 using ImageAt = std::function<const vpImage<unsigned char> &(std::size_t k)>;
 
 /// Runs \p contenders over \p flight with the model \p cao_path, on the images of \p image_at where given.
 std::vector<Score> compare(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                           const Limits &limits = {}, const ImageAt &image_at = {});
+                           const ImageAt &image_at = {});
 
 /// ViSP's settings by a small sweep on the flight itself, which favours ViSP: mask, range, threshold, step and far
 /// clipping are varied one at a time from the best so far, twice through the list. Best is right in most frames,
@@ -69,8 +67,7 @@ struct SweepResult
   EdgeSettings best;
   std::vector<std::pair<EdgeSettings, Score>> tried;
 };
-SweepResult sweep(const TestFlight &flight, const std::string &cao_path, TrackerKind kind, Help help,
-                  const Limits &limits = {});
+SweepResult sweep(const TestFlight &flight, const std::string &cao_path, TrackerKind kind, Help help);
 
 // How far the camera may turn between two frames before a tracker loses the trunks.
 //
@@ -83,12 +80,8 @@ SweepResult sweep(const TestFlight &flight, const std::string &cao_path, Tracker
 struct BasinOptions
 {
   std::vector<double> steps_px{1, 2, 4, 8, 12, 16, 24, 32}; ///< in the middle of the image (0 .. 32)
-  int every = 8;                                            ///< frames of the flight between starts (1 ..)
   double range_m = 15;                                      ///< trunks further away are neither drawn nor in the model
   int min_trunks = 2;                                       ///< starts with fewer in view are left out
-  double noise_grey = 1.5;                                  ///< standard deviation of the sensor noise added
-  Limits limits{0.3, 1.0};                                  ///< right is within: 1 degree is 3.5 px at f = 200 px
-  unsigned seed = 7;
 };
 
 struct BasinRow
@@ -150,7 +143,7 @@ struct FaultRow
 
 /// Rows of all \p contenders, a fault each, in the order of allFaults().
 std::vector<FaultRow> faults(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                             const FaultRuns &runs = {}, const Limits &limits = {});
+                             const FaultRuns &runs = {});
 
 // A comparison as text for the terminal, as JSON for programs (apps/campaign/figures.py draws it), and as a video in
 // which each tracker shows where it believes the model to be.

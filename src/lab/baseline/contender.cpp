@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "baseline/contender.h"
 #include "support/text.h"
+#include "support/units.h"
 #include <bole/vpMbTrunkTracker.h>
 
-#include <ctime>
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
@@ -12,21 +12,6 @@ namespace bole
 namespace
 {
 Matrix6d toEigen(const vpMatrix &m) { return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.data); }
-
-vpMatrix toVisp(const Matrix6d &e)
-{
-  vpMatrix m(6, 6);
-  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.data) = e;
-  return m;
-}
-
-/// Time that this thread has computed: what other programs take from the processor does not count.
-double threadTime_ms()
-{
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * double(t.tv_sec) + 1e-6 * double(t.tv_nsec);
-}
 } // namespace
 
 const char *toString(Help help) { return nameOf(help, {"alone", "prior", "re-initialised", "true pose"}); }
@@ -76,32 +61,31 @@ void Contender::giveHelp(const TestFlight &flight, std::size_t k, const Pose &pr
 Answer Contender::track(const TestFlight &flight, std::size_t k, const vpImage<unsigned char> &image)
 {
   const Silence silence;
-  const double begin_ms = threadTime_ms();
+  const double begin_ms = processorTime_ms(CLOCK_THREAD_CPUTIME_ID);
   Answer answer;
   const Pose predicted = flight.predicted(k, m_cMo);
   try {
     giveHelp(flight, k, predicted, image);
     m_tracker->track(image);
   }
-  catch (const std::exception &error) { // vpException, and cv::Exception out of ViSP's KLT
+  catch (const std::exception &) { // vpException, and cv::Exception out of ViSP's KLT
     answer.complained = true;
-    answer.message = error.what();
   }
   answer.cMo = Pose::fromVisp(m_tracker->getPose());
   if (answer.complained && m_help == Help::reinitialised) {
+    answer.reinitialised = true;
     try {
       m_tracker->initFromPose(image, predicted.toVisp());
-      answer.reinitialised = true;
     }
-    catch (const std::exception &error) {
-      answer.message += std::string("; ") + error.what();
+    catch (const std::exception &) {
+      answer.reinitialised = false;
     }
     answer.cMo = predicted;
   }
   if (answer.complained && m_help == Help::prior && !m_trunk)
     answer.cMo = predicted;
   m_cMo = answer.cMo.isFinite() ? answer.cMo : predicted;
-  answer.ms = threadTime_ms() - begin_ms;
+  answer.ms = processorTime_ms(CLOCK_THREAD_CPUTIME_ID) - begin_ms;
   return answer;
 }
 } // namespace bole

@@ -81,7 +81,6 @@ struct Answer
   Pose cMo;
   bool complained = false; ///< threw; for ours also a status that says that the pose is predicted
   bool reinitialised = false;
-  std::string message;
   double ms = 0; ///< thread CPU time of track() and what the help needs in the tracker, without the reading of images
 };
 

@@ -48,7 +48,7 @@ std::vector<FaultCase> allFaults()
 }
 
 std::vector<FaultRow> faults(const TestFlight &flight, const std::string &cao_path, std::vector<Contender> &contenders,
-                             const FaultRuns &runs, const Limits &limits)
+                             const FaultRuns &runs)
 {
   std::vector<FaultRow> rows;
   for (const FaultCase &fault : allFaults()) {
@@ -70,7 +70,7 @@ std::vector<FaultRow> faults(const TestFlight &flight, const std::string &cao_pa
         spoil(shown, fault.kind, piece.frames[lead - 1].image, unsigned(k) + 1);
         return shown;
       };
-      const std::vector<Score> scores = compare(piece, cao_path, contenders, limits, imageAt);
+      const std::vector<Score> scores = compare(piece, cao_path, contenders, imageAt);
       for (std::size_t i = 0; i < contenders.size(); ++i)
         count(scores[i], runs.lead, own[i]);
     }

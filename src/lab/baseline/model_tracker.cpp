@@ -18,6 +18,13 @@ Silence::~Silence()
   std::cerr.rdbuf(m_err);
 }
 
+vpMatrix toVisp(const Matrix6d &covariance)
+{
+  vpMatrix m(6, 6);
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.data) = covariance;
+  return m;
+}
+
 const char *toString(TrackerKind kind)
 {
   return nameOf(kind,

@@ -4,6 +4,7 @@
 /// ViSP's model-based trackers and ours, set up for the same model and camera.
 
 #include <bole/camera.h>
+#include <bole/pose.h>
 
 #include <iosfwd>
 #include <memory>
@@ -44,6 +45,8 @@ public:
 private:
   std::streambuf *m_out, *m_err;
 };
+
+vpMatrix toVisp(const Matrix6d &covariance);
 
 /// \p trunk_xml: settings file of vpMbTrunkTracker, empty: its defaults. Of \p settings ours takes the far clipping
 /// only.

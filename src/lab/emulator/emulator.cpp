@@ -68,7 +68,7 @@ struct ArDroneEmulator::State
       : feed(std::move(f)),
         options(o),
         generation(feed->generation()),
-        wire(o.host, generation, o.navdata_port, o.video_port, o.at_port),
+        wire(generation, o.navdata_port, o.video_port, o.at_port),
         packets(feed->generation(), feed->frameRateHz(), o),
         random(o.seed)
   {
@@ -316,7 +316,7 @@ bool ArDroneEmulator::wait(double timeout_s)
 std::string ArDroneEmulator::address() const
 {
   const DroneWire &wire = m_state->wire;
-  return fmt::format("ardrone://{}?navdata={}&video={}&at={}&generation={}", m_state->options.host, wire.navdataPort(),
+  return fmt::format("ardrone://127.0.0.1?navdata={}&video={}&at={}&generation={}", wire.navdataPort(),
                      wire.videoPort(), wire.atPort(), m_state->generation);
 }
 

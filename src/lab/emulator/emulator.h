@@ -42,22 +42,22 @@ public:
   virtual double frameRateHz() const = 0; ///< of the pictures
 };
 
+constexpr double kVideoDelay_s = 0.06; ///< from exposure to sending; 50 to 75 ms on the drone
+
 struct SequenceFeedOptions
 {
-  int generation = 2;                           ///< 1 or 2
-  bool loop = false;                            ///< there and back for ever: the motion stays continuous
-  double video_delay_s = 0.06;                  ///< [s], [0, 0.5]: exposure to sending; 50 to 75 ms on the drone
-  std::size_t max_frames = 0;                   ///< 0: all
-  std::size_t max_bytes = std::size_t{2} << 30; ///< of images in memory: a longer sequence is refused
-  void validate() const;
+  int generation = 2;         ///< 1 or 2
+  bool loop = false;          ///< there and back for ever: the motion stays continuous
+  std::size_t max_frames = 0; ///< 0: all
 };
 /// Frames of \p source with navdata made from its odometry (velocity from differences, attitude, height) and gyro;
-/// level and still where it has none. Read into memory, since a loop flies it backwards too.
+/// level and still where it has none. Read into memory, since a loop flies it backwards too; what does not fit into 2
+/// GB is refused.
 std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options);
 /// The raw bytes of a recording (see recording.h).
 std::unique_ptr<PacketFeed> makeRecordingFeed(const std::string &folder);
 
-/// Serves a feed on loopback (or another address of this machine).
+/// Serves a feed on loopback.
 ///
 /// The flight starts with the first listener on the video port (and on the navdata port, or half a
 /// second later). One thread; start() and stop() from any thread.
@@ -66,7 +66,6 @@ class ArDroneEmulator
 public:
   struct Options
   {
-    std::string host = "127.0.0.1";
     std::uint16_t navdata_port = 0, video_port = 0, at_port = 0; ///< 0: any free one
     double speed = 1;                                            ///< [1, 20]: flight seconds a second
     double bit_rate = 1.3e6; ///< [bit/s], [1e4, 1e8]: of a captured stream of an AR.Drone 2; its most is 4e6
@@ -103,7 +102,7 @@ public:
   /// Waits for the end of the flight at most \p timeout_s; true at the end.
   bool wait(double timeout_s);
 
-  /// With the ports that were found: `ardrone://HOST?navdata=...`.
+  /// With the ports that were found: `ardrone://127.0.0.1?navdata=...`.
   std::string address() const;
   Counters counters() const;
   /// The commands received, oldest first (the first 100,000), and how many by name.

@@ -8,7 +8,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <netdb.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -29,33 +28,19 @@ void ServerSocket::close()
   m_descriptor = -1;
 }
 
-ServerSocket ServerSocket::bindTo(const std::string &host, std::uint16_t port, int type)
+ServerSocket ServerSocket::bindTo(std::uint16_t port, int type)
 {
-  addrinfo hints = {}, *found = nullptr;
-  hints.ai_family = AF_INET;
   sockaddr_in address = {};
-  const bool is_known = getaddrinfo(host.c_str(), nullptr, &hints, &found) == 0 && found != nullptr;
-  if (is_known) {
-    std::memcpy(&address, found->ai_addr, sizeof(address));
-    freeaddrinfo(found);
-  }
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   address.sin_port = htons(port);
   ServerSocket socket(::socket(AF_INET, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
   setsockopt(socket.m_descriptor, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-  if (!is_known || bind(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&address), sizeof(address)) != 0 ||
+  if (bind(socket.m_descriptor, reinterpret_cast<const sockaddr *>(&address), sizeof(address)) != 0 ||
       (type == SOCK_STREAM && listen(socket.m_descriptor, 4) != 0))
-    throw ioError("{} port {} of {}: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port, host, std::strerror(errno));
+    throw ioError("{} port {} of 127.0.0.1: {}", type == SOCK_DGRAM ? "UDP" : "TCP", port, std::strerror(errno));
   return socket;
-}
-
-ServerSocket ServerSocket::bindUdp(const std::string &host, std::uint16_t port)
-{
-  return bindTo(host, port, SOCK_DGRAM);
-}
-ServerSocket ServerSocket::listenTcp(const std::string &host, std::uint16_t port)
-{
-  return bindTo(host, port, SOCK_STREAM);
 }
 
 std::uint16_t ServerSocket::localPort() const
@@ -102,13 +87,11 @@ constexpr std::size_t kMostPending = 1 << 20;
 constexpr std::int64_t kClientLost_ns = 10'000'000'000;
 } // namespace
 
-DroneWire::DroneWire(const std::string &host, int generation, std::uint16_t navdata_port, std::uint16_t video_port,
-                     std::uint16_t at_port)
-    : m_host(host),
-      m_generation(generation),
+DroneWire::DroneWire(int generation, std::uint16_t navdata_port, std::uint16_t video_port, std::uint16_t at_port)
+    : m_generation(generation),
       m_video_port(video_port),
-      m_navdata(ServerSocket::bindUdp(host, navdata_port)),
-      m_at(ServerSocket::bindUdp(host, at_port))
+      m_navdata(ServerSocket::bindTo(navdata_port, SOCK_DGRAM)),
+      m_at(ServerSocket::bindTo(at_port, SOCK_DGRAM))
 {
   comeUp();
 }
@@ -117,8 +100,7 @@ void DroneWire::comeUp()
 {
   if (m_video.valid())
     return;
-  m_video =
-      m_generation == 2 ? ServerSocket::listenTcp(m_host, m_video_port) : ServerSocket::bindUdp(m_host, m_video_port);
+  m_video = ServerSocket::bindTo(m_video_port, m_generation == 2 ? SOCK_STREAM : SOCK_DGRAM);
   if (m_video_port == 0) // chosen once: other threads ask for it, and it stays over a reboot
     m_video_port = m_video.localPort();
 }

@@ -22,9 +22,9 @@ public:
   ServerSocket(ServerSocket &&other) noexcept : m_descriptor(other.m_descriptor) { other.m_descriptor = -1; }
   ServerSocket &operator=(ServerSocket &&other) noexcept;
 
-  /// A UDP or listening TCP socket on \p host; port 0 takes any free one. Throws vpException when the port is taken.
-  static ServerSocket bindUdp(const std::string &host, std::uint16_t port);
-  static ServerSocket listenTcp(const std::string &host, std::uint16_t port);
+  /// On the loopback address, by UDP (SOCK_DGRAM), or TCP that listens (SOCK_STREAM); port 0 takes any free one. Throws
+  /// vpException when the port is taken.
+  static ServerSocket bindTo(std::uint16_t port, int type);
 
   bool valid() const { return m_descriptor >= 0; }
   std::uint16_t localPort() const;
@@ -40,8 +40,6 @@ public:
 
 private:
   explicit ServerSocket(int descriptor) : m_descriptor(descriptor) {}
-  static ServerSocket bindTo(const std::string &host, std::uint16_t port, int type);
-
   int m_descriptor = -1;
 };
 
@@ -56,8 +54,7 @@ public:
     navdata
   };
   /// Port 0 takes any free one. Throws vpException when a port is taken.
-  DroneWire(const std::string &host, int generation, std::uint16_t navdata_port, std::uint16_t video_port,
-            std::uint16_t at_port);
+  DroneWire(int generation, std::uint16_t navdata_port, std::uint16_t video_port, std::uint16_t at_port);
 
   struct Received
   {
@@ -94,7 +91,6 @@ private:
   bool send(Outgoing &&out);
   void flush();
 
-  std::string m_host;
   int m_generation;
   std::uint16_t m_video_port;
   ServerSocket m_navdata, m_at, m_video, m_video_client;

@@ -14,7 +14,8 @@ namespace bole
 namespace
 {
 constexpr float kGravity_mg = 1000;
-constexpr double kNavdataRate_hz = 200; ///< as the drone's full navdata
+constexpr double kNavdataRate_hz = 200;                  ///< as the drone's full navdata
+constexpr std::size_t kMostBytes = std::size_t{2} << 30; ///< of images in memory: a longer sequence is refused
 
 /// A vector in the drone's axes (y right, z down).
 Eigen::Vector3d flipped(const Eigen::Vector3d &v) { return {v.x(), -v.y(), -v.z()}; }
@@ -43,7 +44,8 @@ class SequenceFeed : public PacketFeed
 public:
   SequenceFeed(FrameSource &source, const SequenceFeedOptions &options) : m_options(options)
   {
-    options.validate();
+    if (options.generation != 1 && options.generation != 2)
+      throw badValue("generation = {}, must be 1 or 2", options.generation);
     load(source);
     m_duration_s = m_frames.back().time_s - m_frames.front().time_s;
     m_rate_hz = static_cast<double>(m_frames.size() - 1) / m_duration_s;
@@ -59,7 +61,7 @@ public:
     const double frame_s = frameTime(m_next_frame);
     const double navdata_s = static_cast<double>(m_next_navdata) / kNavdataRate_hz;
     packet = {};
-    if (navdata_s <= frame_s + m_options.video_delay_s) {
+    if (navdata_s <= frame_s + kVideoDelay_s) {
       packet.kind = FeedPacket::Kind::navdata;
       packet.stamp_ns = packet.sent_ns = nanoseconds(navdata_s);
       packet.navdata = navdataAt(navdata_s);
@@ -68,7 +70,7 @@ public:
     else {
       packet.kind = FeedPacket::Kind::picture;
       packet.stamp_ns = nanoseconds(frame_s);
-      packet.sent_ns = nanoseconds(frame_s + m_options.video_delay_s);
+      packet.sent_ns = nanoseconds(frame_s + kVideoDelay_s);
       packet.image = m_frames[frameIndex(m_next_frame)].image;
       ++m_next_frame;
     }
@@ -89,9 +91,8 @@ private:
         m_rates.push_back({static_cast<double>(sample.stamp_ns) * 1e-9, sample.rate});
       m_frames.push_back({time_s, frame.image, frame.wMb_odometry});
       bytes += frame.image.getSize();
-      if (bytes > m_options.max_bytes)
-        throw badValue("{}: more than {} MB of images, must fit; give fewer frames", source.name(),
-                       m_options.max_bytes >> 20);
+      if (bytes > kMostBytes)
+        throw badValue("{}: more than {} MB of images, must fit; give fewer frames", source.name(), kMostBytes >> 20);
       if (m_frames.size() == m_options.max_frames)
         break;
     }
@@ -162,13 +163,6 @@ private:
   std::size_t m_next_frame = 0, m_next_navdata = 0;
 };
 } // namespace
-
-void SequenceFeedOptions::validate() const
-{
-  if (generation != 1 && generation != 2)
-    throw badValue("generation = {}, must be 1 or 2", generation);
-  requireRange("video_delay_s", video_delay_s, 0, 0.5);
-}
 
 std::unique_ptr<PacketFeed> makeSequenceFeed(FrameSource &source, const SequenceFeedOptions &options)
 {

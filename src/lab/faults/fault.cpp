@@ -40,15 +40,6 @@ const char *toString(FaultKind kind)
                        "odometry-gone", "gyro-gone", "gyro-bias"});
 }
 
-FaultKind faultFromString(const std::string &word)
-{
-  if (const auto kind = valueNamed(word, FaultKind::gyro_bias))
-    return *kind;
-  throw badValue("fault = {}, must be none, black, noise, smear, freeze, wrong size, odometry-freeze, odometry-jump, "
-                 "odometry-gone, gyro-gone or gyro-bias",
-                 word);
-}
-
 void spoil(vpImage<unsigned char> &image, FaultKind kind, const vpImage<unsigned char> &last_good, unsigned seed)
 {
   const unsigned w = image.getWidth(), h = image.getHeight();

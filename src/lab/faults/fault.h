@@ -25,8 +25,6 @@ enum class FaultKind
   gyro_bias ///< 0.2 rad/s about the vertical
 };
 const char *toString(FaultKind kind);
-/// \throw vpException for another word.
-FaultKind faultFromString(const std::string &word);
 
 /// Spoils \p image where \p kind is one of the camera; \p last_good is shown by `freeze`, \p seed makes the noise.
 void spoil(vpImage<unsigned char> &image, FaultKind kind, const vpImage<unsigned char> &last_good, unsigned seed);

@@ -191,16 +191,15 @@ std::vector<TrunkInView> PaperMapper::summarise(const TreeEnergy &energy, std::s
     if (i >= known && !summary)
       continue;
     tree.is_observed = summary.has_value();
-    if (was_looked_for)
-      tree.relative = summary ? summary->optimum : seen(i);
+    const RelativeTrunk relative = summary ? summary->optimum : seen(i);
     if (summary) {
       m_graph.observations.push_back({m_graph.poses.size() - 1, kept, *summary});
       tree.first_s = tree.views++ == 0 ? time_s : tree.first_s;
       tree.last_s = time_s;
     }
-    if (was_looked_for && tree.relative.isFinite())
+    if (was_looked_for && relative.isFinite())
       in_view.push_back({static_cast<int>(kept), TrunkStatus::confirmed, tree.is_observed,
-                         tree.is_observed ? "tracked" : "negative curvature", tree.relative, -kDrawn, kDrawn,
+                         tree.is_observed ? "tracked" : "negative curvature", relative, -kDrawn, kDrawn,
                          (m_graph.trunks[i].trunk.axisAt(camera().t.z()) - camera().t).norm()});
     m_graph.trunks[kept] = m_graph.trunks[i];
     m_graph.trunks[kept].id = static_cast<std::int64_t>(kept);

@@ -162,7 +162,6 @@ public:
 
   std::vector<TrunkRecord> map() const;
   Trajectory smoothedTrajectory() const;
-  const Graph &graph() const { return m_graph; }
 
 private:
   /// What the map knows of a tree beside its place in the graph, which is its id.
@@ -171,7 +170,6 @@ private:
     bool is_observed = true; ///< by the newest image; else it has ended
     int views = 0;
     double first_s = 0, last_s = 0;
-    RelativeTrunk relative;
   };
 
   void addPose(const Frame &frame);

@@ -315,8 +315,6 @@ ForestRenderer::ForestRenderer(const Forest &forest, const RendererOptions &opti
 }
 
 ForestRenderer::~ForestRenderer() = default;
-ForestRenderer::ForestRenderer(ForestRenderer &&) noexcept = default;
-ForestRenderer &ForestRenderer::operator=(ForestRenderer &&) noexcept = default;
 
 const CameraModel &ForestRenderer::camera() const { return m_state->options.camera; }
 

@@ -50,8 +50,6 @@ class ForestRenderer
 public:
   ForestRenderer(const Forest &forest, const RendererOptions &options);
   ~ForestRenderer();
-  ForestRenderer(ForestRenderer &&) noexcept;
-  ForestRenderer &operator=(ForestRenderer &&) noexcept;
 
   /// The picture taken while the camera moves from \p wMc_open to \p wMc_close.
   /// \param with_truth fill depth and trunk_id too.

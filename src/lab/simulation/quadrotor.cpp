@@ -17,6 +17,7 @@ constexpr double kStanding = 0.05;    ///< height of the body's origin when it s
 constexpr double kLandingSpeed = 0.4; ///< [m/s]
 constexpr double kHeightGain = 1.5;   ///< of the held height [1/s]
 constexpr double kLargestClimb = 1.5; ///< what the motors can [m/s]
+constexpr double kNoiseTime = 0.3;    ///< correlation time of the error of the measured velocity [s]
 
 Eigen::Vector2d noise(Random &random, double sigma)
 {
@@ -34,19 +35,12 @@ void wander(Eigen::Vector2d &value, Random &random, double sigma, double tau, do
 
 void QuadrotorOptions::validate() const
 {
-  requireRange("largest_tilt", largest_tilt, 0.02, 1);
-  requireRange("tilt_frequency", tilt_frequency, 1, 60);
-  requireRange("tilt_damping", tilt_damping, 0.2, 3);
   requireRange("drag", drag, 0, 5);
-  requireRange("climb_lag", climb_lag, 0.02, 5);
-  requireRange("turn_lag", turn_lag, 0.02, 5);
   requireRange("command_delay", command_delay, 0, 1);
   requireRange("hover_gain", hover_gain, 0, 10);
-  requireRange("takeoff_height", takeoff_height, 0.3, 5);
   requireRange("gust", gust, 0, 5);
   requireRange("gust_time", gust_time, 0.05, 60);
   requireRange("velocity_noise", velocity_noise, 0, 1);
-  requireRange("velocity_noise_time", velocity_noise_time, 0.01, 10);
 }
 
 Quadrotor::Quadrotor(const QuadrotorOptions &options, const Eigen::Vector2d &xy, double heading, double ground)
@@ -82,11 +76,11 @@ double Quadrotor::tilt() const { return std::acos(std::clamp(pose().R(2, 2), -1.
 
 Eigen::Vector2d Quadrotor::wantedTilt(const QuadrotorCommand &command) const
 {
-  Eigen::Vector2d tilt = m_options.largest_tilt * command.tilt.cwiseMax(-1).cwiseMin(1);
+  Eigen::Vector2d tilt = kLargestTilt * command.tilt.cwiseMax(-1).cwiseMin(1);
   if (command.is_hovering || m_is_rising || !command.is_flying)
     tilt = -m_options.hover_gain / kGravity * measuredVelocity();
   const double size = tilt.norm();
-  return size > m_options.largest_tilt ? Eigen::Vector2d(tilt * (m_options.largest_tilt / size)) : tilt;
+  return size > kLargestTilt ? Eigen::Vector2d(tilt * (kLargestTilt / size)) : tilt;
 }
 
 /// The height is held where no climb is asked for.
@@ -110,7 +104,7 @@ double Quadrotor::wantedClimb(const QuadrotorCommand &command)
 void Quadrotor::blow(double dt)
 {
   wander(m_gust, m_random, m_options.gust, m_options.gust_time, dt);
-  wander(m_velocity_error, m_random, m_options.velocity_noise, m_options.velocity_noise_time, dt);
+  wander(m_velocity_error, m_random, m_options.velocity_noise, kNoiseTime, dt);
 }
 
 void Quadrotor::stand()
@@ -136,17 +130,17 @@ void Quadrotor::step(double dt)
     if (!m_command.is_flying)
       return;
     m_is_in_air = m_is_rising = m_holds_height = true;
-    m_height_held = m_ground + m_options.takeoff_height;
+    m_height_held = m_ground + kTakeOffHeight;
   }
-  const double w = m_options.tilt_frequency;
-  m_lean_rate += dt * (w * w * (wantedTilt(m_command) - m_lean) - 2 * m_options.tilt_damping * w * m_lean_rate);
+  constexpr double w = kTiltFrequency;
+  m_lean_rate += dt * (w * w * (wantedTilt(m_command) - m_lean) - 2 * kTiltDamping * w * m_lean_rate);
   m_lean += dt * m_lean_rate;
   const bool turns = m_command.is_flying && !m_command.is_hovering && !m_is_rising;
-  m_turn += dt / m_options.turn_lag * ((turns ? m_command.turn : 0) - m_turn);
+  m_turn += dt / kTurnLag * ((turns ? m_command.turn : 0) - m_turn);
   m_yaw += dt * m_turn;
 
   const Eigen::Vector3d up = pose().R.col(2);
-  const double climbing = (wantedClimb(m_command) - m_velocity.z()) / m_options.climb_lag;
+  const double climbing = (wantedClimb(m_command) - m_velocity.z()) / kClimbLag;
   m_acceleration.head<2>() =
       (kGravity + climbing) / up.z() * up.head<2>() - m_options.drag * m_velocity.head<2>() + m_gust;
   m_acceleration.z() = climbing;

@@ -17,24 +17,24 @@
 
 namespace bole
 {
-/// Defaults: tilt and climb limits of the published settings of the AR.Drone; a share of 0.5 of the largest tilt gives
-/// 1.4 m/s^2, as measured on a real one (vpRobotArDrone::Options::gain).
+// Tilt and climb limits of the published settings of the AR.Drone; a share of 0.5 of the largest tilt gives 1.4 m/s^2,
+// as measured on a real one (vpRobotArDrone::Options::gain).
+constexpr double kLargestTilt = 0.28;  ///< [rad]
+constexpr double kTiltFrequency = 10;  ///< natural frequency of the attitude loop [rad/s]
+constexpr double kTiltDamping = 0.8;   ///< of the attitude loop
+constexpr double kClimbLag = 0.35;     ///< time constant of the rate of climb [s]
+constexpr double kTurnLag = 0.2;       ///< time constant of the rate of turn [s]
+constexpr double kTakeOffHeight = 1.2; ///< over the place it stood [m]
+
 struct QuadrotorOptions
 {
   std::uint64_t seed = 1;
-  double largest_tilt = 0.28;       ///< [rad], 0.02 to 1
-  double tilt_frequency = 10;       ///< natural frequency of the attitude loop [rad/s], 1 to 60
-  double tilt_damping = 0.8;        ///< 0.2 to 3
-  double drag = 0.25;               ///< [1/s], 0 to 5
-  double climb_lag = 0.35;          ///< time constant of the rate of climb [s], 0.02 to 5
-  double turn_lag = 0.2;            ///< time constant of the rate of turn [s], 0.02 to 5
-  double command_delay = 0.04;      ///< radio and firmware [s], 0 to 1
-  double hover_gain = 1.5;          ///< braking of the drone's own hover [1/s], 0 to 10
-  double takeoff_height = 1.2;      ///< over the place it stood [m], 0.3 to 5
-  double gust = 0.05;               ///< standard deviation of the wind's push, horizontal axis [m/s^2], 0 to 5: calm
-  double gust_time = 1;             ///< its correlation time [s], 0.05 to 60
-  double velocity_noise = 0.03;     ///< of the velocity that it measures itself, an axis [m/s], 0 to 1
-  double velocity_noise_time = 0.3; ///< correlation time of that [s], 0.01 to 10
+  double drag = 0.25;           ///< [1/s], 0 to 5
+  double command_delay = 0.04;  ///< radio and firmware [s], 0 to 1
+  double hover_gain = 1.5;      ///< braking of the drone's own hover [1/s], 0 to 10
+  double gust = 0.05;           ///< standard deviation of the wind's push, horizontal axis [m/s^2], 0 to 5: calm
+  double gust_time = 1;         ///< its correlation time [s], 0.05 to 60
+  double velocity_noise = 0.03; ///< of the velocity that it measures itself, an axis [m/s], 0 to 1
 
   /// Throws vpException "name = value, must be ...".
   void validate() const;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <set>
 #include <type_traits>
 #include <visp3/core/vpException.h>
@@ -14,12 +14,6 @@ namespace bole
 {
 namespace
 {
-/// "path:line" of \p mark.
-std::string placeOf(const std::string &path, const YAML::Mark &mark)
-{
-  return fmt::format("{}:{}", path, std::max(mark.line, 0) + 1);
-}
-
 YAML::Node loadYaml(const std::string &path)
 {
   try {
@@ -29,7 +23,7 @@ YAML::Node loadYaml(const std::string &path)
     throw ioError("{}: no such file", path);
   }
   catch (const YAML::Exception &error) {
-    throw ioError("{}: {}", placeOf(path, error.mark), error.msg);
+    throw ioError("{}:{}: {}", path, std::max(error.mark.line, 0) + 1, error.msg);
   }
 }
 
@@ -193,10 +187,6 @@ template <class T> std::string text(const T &value)
     return toString(value);
   else
     return fmt::format("{}", value);
-}
-std::string text(const std::array<double, 4> &value)
-{
-  return fmt::format("[{}, {}, {}, {}]", value[0], value[1], value[2], value[3]);
 }
 
 void readTrunks(const std::string &path, const YAML::Node &node, std::vector<SimulatedTrunk> &trunks)

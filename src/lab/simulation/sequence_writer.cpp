@@ -6,6 +6,7 @@
 
 #include <bole/trunk_record.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
@@ -18,9 +19,11 @@ namespace bole
 {
 namespace
 {
-void writePng(const std::string &path, const cv::Mat &image)
+/// \p image: a copy, since OpenCV takes pixels that may be written only.
+template <class Pixel> void writePng(const std::string &path, vpImage<Pixel> image)
 {
-  if (!cv::imwrite(path, image))
+  if (!cv::imwrite(path, cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()),
+                                 cv::DataType<Pixel>::type, image.bitmap)))
     throw ioError("{}: cannot write", path);
 }
 
@@ -55,8 +58,7 @@ void requireOwn(const std::string &folder)
 }
 } // namespace
 
-SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc, double rate_hz,
-                               bool overwrite)
+SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &camera, double rate_hz, bool overwrite)
     : m_folder(folder), m_partial(folder + ".partial"), m_overwrite(overwrite)
 {
   if (folder.empty())
@@ -76,15 +78,15 @@ SequenceWriter::SequenceWriter(const std::string &folder, const CameraModel &cam
     if (error)
       throw ioError("{}: {}", path(name), error.message());
   }
-  writeText("mav0/cam0/sensor.yaml", asl::sensorYaml({camera, bMc}, "simulated front camera", rate_hz));
-  m_images.open(path("mav0/cam0/data.csv"));
-  m_images << asl::kImagesHead;
-  m_imu.open(path("mav0/imu0/data.csv"));
-  m_imu << asl::kImuHead;
-  m_odometry.open(path("mav0/odom0/data.csv"));
-  m_odometry << asl::kPosesHead;
-  m_truth.open(path("mav0/state_groundtruth_estimate0/data.csv"));
-  m_truth << asl::kPosesHead;
+  writeText("mav0/cam0/sensor.yaml", asl::sensorYaml({camera, forwardCamera()}, "simulated front camera", rate_hz));
+  const auto begin = [this](std::ofstream &file, const char *name, const auto &head) {
+    file.open(path(name));
+    file << head;
+  };
+  begin(m_images, "mav0/cam0/data.csv", asl::kImagesHead);
+  begin(m_imu, "mav0/imu0/data.csv", asl::kImuHead);
+  begin(m_odometry, "mav0/odom0/data.csv", asl::kPosesHead);
+  begin(m_truth, "mav0/state_groundtruth_estimate0/data.csv", asl::kPosesHead);
 }
 
 void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth,
@@ -94,23 +96,15 @@ void SequenceWriter::writeFrame(std::int64_t stamp_ns, const RenderedFrame &fram
   m_images << stamp_ns << ',' << name << '\n';
   m_truth << asl::poseLine(stamp_ns, wMb_truth);
   m_odometry << asl::poseLine(stamp_ns, wMb_odometry);
-  vpImage<unsigned char> image = frame.image;
-  writePng(path("mav0/cam0/data/" + name),
-           cv::Mat(static_cast<int>(image.getHeight()), static_cast<int>(image.getWidth()), CV_8U, image.bitmap));
+  writePng(path("mav0/cam0/data/" + name), frame.image);
   if (frame.depth.getSize() == 0)
     return;
   fs::create_directories(path("depth"));
   fs::create_directories(path("trunk_id"));
-  const int height = static_cast<int>(frame.depth.getHeight()), width = static_cast<int>(frame.depth.getWidth());
-  cv::Mat depth(height, width, CV_16U), trunk_id(height, width, CV_16U);
-  for (int row = 0; row < height; ++row) {
-    for (int column = 0; column < width; ++column) {
-      depth.at<std::uint16_t>(row, column) = rounded(frame.depth[row][column]);
-      trunk_id.at<std::uint16_t>(row, column) = frame.trunk_id[row][column];
-    }
-  }
+  vpImage<std::uint16_t> depth = frame.depth;
+  std::transform(depth.bitmap, depth.bitmap + depth.getSize(), depth.bitmap, rounded);
   writePng(path("depth/" + name), depth);
-  writePng(path("trunk_id/" + name), trunk_id);
+  writePng(path("trunk_id/" + name), frame.trunk_id);
 }
 
 void SequenceWriter::writeImu(const GyroSample &sample)

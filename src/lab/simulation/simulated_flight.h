@@ -5,7 +5,6 @@
 #include "simulation/flight_sensors.h"
 #include "simulation/forest.h"
 #include "simulation/forest_renderer.h"
-#include "support/h264.h"
 #include "support/text.h"
 #include <bole/camera.h>
 #include <bole/frame.h>
@@ -15,9 +14,7 @@
 #include <cstdint>
 #include <fstream>
 #include <functional>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace bole
@@ -61,7 +58,6 @@ public:
   std::vector<Eigen::Vector3d> waypoints() const;
   /// Trunks that belong to the path: the gates of the slalom; empty for the others.
   std::vector<SimulatedTrunk> gates() const;
-  const FlightOptions &options() const { return m_options; }
 
 private:
   FlightOptions m_options;
@@ -69,22 +65,9 @@ private:
   double m_swing = 1, m_wave_length = 8, m_radius = 6;
 };
 
-// What scene files and commands call the values of an enumeration.
-
-template <class T> using Words = std::vector<std::pair<std::string, T>>;
-
 inline const char *toString(Light light) { return nameOf(light, {"sun", "overcast"}); }
 inline const char *toString(Bark bark) { return nameOf(bark, {"dark", "bright", "mixed"}); }
 inline const char *toString(PathKind path) { return nameOf(path, {"forward", "lateral", "loop", "slalom"}); }
-
-/// All values of an enumeration by their names.
-template <class T> Words<T> wordsOf(T)
-{
-  Words<T> words;
-  for (T value{}; std::string(toString(value)) != kUnknownName; value = static_cast<T>(static_cast<int>(value) + 1))
-    words.emplace_back(toString(value), value);
-  return words;
-}
 
 struct SceneOptions
 {
@@ -109,29 +92,6 @@ SceneOptions readScene(const std::string &path);
 /// The text that readScene() would read back.
 std::string sceneText(const SceneOptions &scene);
 
-/// The frames of a scene, one after the other: what recordFlight() writes and a trial tracks. Gyro and accelerometer at
-/// 200 Hz.
-class SceneFrames
-{
-public:
-  /// \p frames: how long the path is. \throw vpException naming the option that is out of its range.
-  SceneFrames(const SceneOptions &scene, int frames);
-  const Forest &forest() const { return m_forest; }
-  /// The next frame with its truth. \p rendered keeps its buffers; with \p truth_images it holds depth and ids too.
-  void next(Frame &frame, RenderedFrame &rendered, bool truth_images = false);
-
-private:
-  SceneOptions m_scene;
-  FlightPath m_path;
-  Forest m_forest;
-  ForestRenderer m_renderer;
-  PoseFilter m_filter;
-  SimulatedImu m_imu;
-  std::optional<H264Link> m_link;
-  std::size_t m_index = 0;
-  std::int64_t m_imu_stamp_ns = 0;
-};
-
 struct RecordOptions
 {
   std::string folder;
@@ -140,8 +100,9 @@ struct RecordOptions
   bool overwrite = false;
 };
 
-/// Flies \p scene and writes it as an ASL folder (SequenceWriter), with the scene beside it as scene.yaml. \p
-/// progress is called after each frame with the number of frames done. Law (a test): same scene, same bytes.
+/// Flies \p scene and writes it as an ASL folder (SequenceWriter), gyro and accelerometer at 200 Hz, with the scene
+/// beside it as scene.yaml. \p progress is called after each frame with the number of frames done. Law (a test): same
+/// scene, same bytes. \throw vpException naming the option that is out of its range.
 void recordFlight(const SceneOptions &scene, const RecordOptions &options,
                   const std::function<void(int)> &progress = {});
 
@@ -158,8 +119,7 @@ class SequenceWriter
 {
 public:
   /// Throws vpException where \p folder exists, unless \p overwrite, or cannot be made.
-  SequenceWriter(const std::string &folder, const CameraModel &camera, const Pose &bMc, double rate_hz,
-                 bool overwrite = false);
+  SequenceWriter(const std::string &folder, const CameraModel &camera, double rate_hz, bool overwrite);
 
   void writeFrame(std::int64_t stamp_ns, const RenderedFrame &frame, const Pose &wMb_truth, const Pose &wMb_odometry);
   void writeImu(const GyroSample &sample);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "simulation/vpSimulatorArDrone.h"
-#include "support/h264.h"
 #include "support/text.h"
 #include "support/units.h"
 #include <bole/pose.h>
@@ -27,7 +26,7 @@ struct vpSimulatorArDrone::State
   State(const bole::Forest &f, const Options &o)
       : options(o),
         forest(f),
-        body(o.body, o.start, o.heading, f.terrain.height(o.start.x(), o.start.y())),
+        body(o.body, {0, 0}, 0, f.terrain.height(0, 0)),
         imu(o.sensors),
         filter(o.sensors),
         bMc(bole::Pose::fromVisp(o.bMc)),
@@ -36,9 +35,6 @@ struct vpSimulatorArDrone::State
   {
     if (options.has_images)
       renderer.emplace(forest, options.renderer);
-    if (options.h264_kbps > 0)
-      link.emplace(options.renderer.camera.pinhole.width, options.renderer.camera.pinhole.height, options.rate_hz,
-                   options.h264_kbps);
   }
 
   const Options options;
@@ -47,7 +43,6 @@ struct vpSimulatorArDrone::State
   bole::SimulatedImu imu;
   bole::PoseFilter filter;
   std::optional<bole::ForestRenderer> renderer;
-  std::optional<bole::H264Link> link;
   const bole::Pose bMc;
 
   bool is_open = false, in_air = false, has_wanted = false;
@@ -166,7 +161,6 @@ void vpSimulatorArDrone::Options::validate() const
   bole::requireRange("battery_s", battery_s, 1, 1e5);
   bole::requireRange("exposure_s", exposure_s, 0, 0.1);
   bole::requireRange("video_delay_s", video_delay_s, 0, 1);
-  bole::requireRange("h264_kbps", h264_kbps, 0, 20000);
   if (renderer.camera.distortion != bole::Distortion::none)
     throw bole::badValue("distortion, must be none: frames are taken as a pinhole's");
   body.validate();
@@ -266,11 +260,8 @@ bool vpSimulatorArDrone::next(bole::Frame &frame)
   const double t = state.next_exposure;
   const bole::Pose open = state.poseAt(t - half), middle = state.poseAt(t), shut = state.poseAt(t + half);
   bole::RenderedFrame rendered;
-  if (state.renderer) {
+  if (state.renderer)
     state.renderer->render(open * state.bMc, shut * state.bMc, rendered);
-    if (state.link)
-      state.link->pass(rendered.image);
-  }
 
   frame.stamp_ns = nanoseconds(t);
   frame.index = state.frames++;

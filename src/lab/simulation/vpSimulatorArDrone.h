@@ -37,14 +37,11 @@ public:
   using Watchdog = vpRobotArDrone::Watchdog;
   struct Options : vpRobotArDrone::Options
   {
-    Eigen::Vector2d start = Eigen::Vector2d::Zero(); ///< where it stands [m]
-    double heading = 0;                              ///< [rad]
-    double rate_hz = 10;                             ///< of the camera, 1 to 60
-    double exposure_s = 0.006;                       ///< motion blur, 0 to 0.1
-    double battery_s = 720;                          ///< a full one lasts, 1 to 100000: an AR.Drone's 12 minutes
-    double video_delay_s = 0.06;                     ///< from the middle of the exposure to next(), 0 to 1
-    double h264_kbps = 0;                            ///< of the video link, 0 = uncompressed, to 20000
-    bool has_images = true;                          ///< false: frames come without pixels, at no cost
+    double rate_hz = 10;         ///< of the camera, 1 to 60
+    double exposure_s = 0.006;   ///< motion blur, 0 to 0.1
+    double battery_s = 720;      ///< a full one lasts, 1 to 100000: an AR.Drone's 12 minutes
+    double video_delay_s = 0.06; ///< from the middle of the exposure to next(), 0 to 1
+    bool has_images = true;      ///< false: frames come without pixels, at no cost
     bole::QuadrotorOptions body;
     bole::SensorOptions sensors;
     bole::RendererOptions renderer; ///< its lens must have no distortion: frames are taken as a pinhole's
@@ -54,6 +51,7 @@ public:
     void validate() const;
   };
 
+  /// It stands at the origin and looks along x.
   vpSimulatorArDrone(const bole::Forest &forest, const Options &options);
   ~vpSimulatorArDrone() override;
 

@@ -107,8 +107,6 @@ struct VideoPacketEncoder::Libav : Codec
 
 VideoPacketEncoder::VideoPacketEncoder(const Settings &settings) : m_libav(std::make_unique<Libav>(settings)) {}
 VideoPacketEncoder::~VideoPacketEncoder() = default;
-VideoPacketEncoder::VideoPacketEncoder(VideoPacketEncoder &&) noexcept = default;
-VideoPacketEncoder &VideoPacketEncoder::operator=(VideoPacketEncoder &&) noexcept = default;
 int VideoPacketEncoder::width() const { return m_libav->context->width; }
 int VideoPacketEncoder::height() const { return m_libav->context->height; }
 
@@ -137,8 +135,6 @@ struct VideoPacketDecoder::Libav : Codec
 
 VideoPacketDecoder::VideoPacketDecoder() : m_libav(std::make_unique<Libav>()) {}
 VideoPacketDecoder::~VideoPacketDecoder() = default;
-VideoPacketDecoder::VideoPacketDecoder(VideoPacketDecoder &&) noexcept = default;
-VideoPacketDecoder &VideoPacketDecoder::operator=(VideoPacketDecoder &&) noexcept = default;
 
 void VideoPacketDecoder::decode(const VideoPacketEncoder::Packet &packet, vpImage<unsigned char> &image)
 {
@@ -173,10 +169,6 @@ H264Link::H264Link(int width, int height, double rate_hz, double kbps)
 
 void H264Link::pass(vpImage<unsigned char> &image)
 {
-  if (static_cast<int>(image.getWidth()) != m_encoder.width() ||
-      static_cast<int>(image.getHeight()) != m_encoder.height())
-    throw badValue("image size = {}x{}, must be {}x{}", image.getWidth(), image.getHeight(), m_encoder.width(),
-                   m_encoder.height());
   const VideoPacketEncoder::Packet packet = m_encoder.encode(image);
   m_bytes = packet.bytes.size();
   m_decoder.decode(packet, image);

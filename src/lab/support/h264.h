@@ -35,8 +35,6 @@ public:
   /// Throws vpException where libavcodec has no H.264 encoder or it cannot be opened.
   explicit VideoPacketEncoder(const Settings &settings);
   ~VideoPacketEncoder();
-  VideoPacketEncoder(VideoPacketEncoder &&) noexcept;
-  VideoPacketEncoder &operator=(VideoPacketEncoder &&) noexcept;
 
   int width() const;
   int height() const;
@@ -54,8 +52,6 @@ class VideoPacketDecoder
 public:
   VideoPacketDecoder();
   ~VideoPacketDecoder();
-  VideoPacketDecoder(VideoPacketDecoder &&) noexcept;
-  VideoPacketDecoder &operator=(VideoPacketDecoder &&) noexcept;
 
   /// The grey levels of the picture in \p packet fill \p image, of the same size.
   void decode(const VideoPacketEncoder::Packet &packet, vpImage<unsigned char> &image);
@@ -74,7 +70,7 @@ public:
   /// \param width, height even [px]; \param kbps 50 to 20000. Throws vpException where libavcodec has no H.264 encoder.
   H264Link(int width, int height, double rate_hz, double kbps);
 
-  /// Replaces \p image by what arrives.
+  /// Replaces \p image, which is of the link's size, by what arrives.
   void pass(vpImage<unsigned char> &image);
   /// Size of the last encoded picture.
   std::size_t lastBytes() const { return m_bytes; }

@@ -11,9 +11,10 @@
 #include <cstdio>
 #include <fstream>
 #include <initializer_list>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace bole
 {
@@ -47,13 +48,26 @@ template <typename Enum> const char *nameOf(Enum value, std::initializer_list<co
   return at < names.size() ? names.begin()[at] : kUnknownName;
 }
 
-/// The value that toString() calls \p name, of those up to \p last; nothing where there is none.
-template <typename Enum> std::optional<Enum> valueNamed(std::string_view name, Enum last)
+/// All values of an enumeration by what toString() calls them.
+template <typename Enum> std::vector<std::pair<std::string, Enum>> wordsOf(Enum)
 {
-  for (int i = 0; i <= static_cast<int>(last); ++i)
-    if (name == toString(static_cast<Enum>(i)))
-      return static_cast<Enum>(i);
-  return std::nullopt;
+  std::vector<std::pair<std::string, Enum>> words;
+  for (Enum value{}; std::string(toString(value)) != kUnknownName; value = static_cast<Enum>(int(value) + 1))
+    words.emplace_back(toString(value), value);
+  return words;
+}
+
+/// The value that toString() calls \p word. \throw vpException naming \p option and its words, for another one.
+template <typename Enum> Enum valueNamed(const char *option, const std::string &word)
+{
+  std::string wanted;
+  const auto words = wordsOf(Enum());
+  for (const auto &[name, value] : words) {
+    if (name == word)
+      return value;
+    wanted += (wanted.empty() ? "" : name == words.back().first ? " or " : ", ") + name;
+  }
+  throw badValue("{} = {}, must be {}", option, word, wanted);
 }
 
 /// \p value with \p decimals, right-aligned in \p width columns; "-" where it was not measured (NaN).

@@ -48,11 +48,12 @@ inline double quantileOf(std::vector<double> values, double share)
 /// The upper one of the two in the middle where the count is even; NaN of none.
 inline double medianOf(const std::vector<double> &values) { return quantileOf(values, 0.5); }
 
-/// What this process has computed, on all its threads: what other programs take does not count.
-inline double processTime_ms()
+/// What this process has computed, on all its threads, or by CLOCK_THREAD_CPUTIME_ID what this thread has: what other
+/// programs take does not count.
+inline double processorTime_ms(clockid_t clock = CLOCK_PROCESS_CPUTIME_ID)
 {
   std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  clock_gettime(clock, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 } // namespace lab

@@ -22,7 +22,6 @@ struct GapTaskOptions
   double search_s = 45;   ///< gives up after [s], 1 to 600
   WayOptions way{0.6};
   ResponseOptions response;
-  SafetyOptions safety;
 };
 
 /// Two trunks and the way between them.
@@ -84,7 +83,6 @@ struct SlalomTaskOptions
   double off_line = 0.4;  ///< a second spent a metre off the line counts as so much longer [1/m], 0 to 10
   WayOptions way{1.2};    ///< what it slows and turns for leaves a metre a second
   ResponseOptions response;
-  SafetyOptions safety;
 };
 
 /// Through a stand of trees along a straight line, round whatever may be in the way.
@@ -99,8 +97,6 @@ class SlalomTask : public ServoTask
 public:
   explicit SlalomTask(const SlalomTaskOptions &options = {});
 
-  const Way &way() const { return m_way; }
-  double progress() const { return m_place.x(); } ///< [m]
   Values errors() const override;
 
 protected:

@@ -89,7 +89,7 @@ std::optional<Gap> chooseGap(const std::vector<Obstacle> &trunks, const Eigen::V
   return best;
 }
 
-GapTask::GapTask(const GapTaskOptions &options) : ServoTask(options.safety, options.response), m_options(options) {}
+GapTask::GapTask(const GapTaskOptions &options) : ServoTask({}, options.response), m_options(options) {}
 
 ServoTask::Values GapTask::errors() const
 {

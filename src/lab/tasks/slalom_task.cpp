@@ -21,9 +21,7 @@ constexpr int kCandidateViews = 5; ///< a candidate seen this often is avoided t
 } // namespace
 
 SlalomTask::SlalomTask(const SlalomTaskOptions &options)
-    : ServoTask(options.safety, options.response),
-      m_options(options),
-      m_sidestep(kLookAside, std::max(options.look, 1e-3))
+    : ServoTask({}, options.response), m_options(options), m_sidestep(kLookAside, std::max(options.look, 1e-3))
 {
 }
 

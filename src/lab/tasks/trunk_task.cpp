@@ -55,7 +55,7 @@ Eigen::Vector4d obeying(Eigen::Vector4d velocity, double share)
 } // namespace
 
 TrunkTask::TrunkTask(const Pose &bMc, const TrunkTaskOptions &options)
-    : ServoTask(options.safety, options.response),
+    : ServoTask({}, options.response),
       m_bMc(bMc),
       m_options(options),
       m_sidestep(0.7, kSidestep_s),
@@ -255,7 +255,7 @@ Eigen::Vector2d TrunkTask::swayNow(double time_s, const Eigen::Vector3d &place)
   const double azimuth = std::atan2(from_trunk.y(), from_trunk.x());
   if (!m_sway)
     m_sway = {time_s, azimuth, place.z()};
-  const double fastest = kSwayShare * m_options.safety.unseen_speed;
+  const double fastest = kSwayShare * SafetyOptions().unseen_speed;
   const double rate = fastest / kSwing; // rad/s
   const double angle = rate * (time_s - m_sway->start_s);
   const Eigen::Vector2d swing(kSwing, kSwingUp);

@@ -45,7 +45,6 @@ struct TrunkTaskOptions
   double free_way = 0.5;      ///< does not go round nearer to another trunk than this, body to bark [m], 0 to 5
   double search_s = 40;       ///< gives up after [s], 1 to 600
   ResponseOptions response;
-  SafetyOptions safety;
 };
 
 /// Laws (each a test, on exact features): the error decays at the gain, with a drone that obeys at once and with one

@@ -2,7 +2,6 @@
 #include "tasks/way_planner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <queue>
@@ -27,22 +26,8 @@ struct Step
   int dx, dy;
 };
 /// A knight's steps too: ways may go in sixteen directions.
-constexpr std::array<Step, 16> kSteps = {{{1, 0},
-                                          {-1, 0},
-                                          {0, 1},
-                                          {0, -1},
-                                          {1, 1},
-                                          {1, -1},
-                                          {-1, 1},
-                                          {-1, -1},
-                                          {2, 1},
-                                          {2, -1},
-                                          {-2, 1},
-                                          {-2, -1},
-                                          {1, 2},
-                                          {1, -2},
-                                          {-1, 2},
-                                          {-1, -2}}};
+constexpr Step kSteps[] = {{1, 0}, {-1, 0}, {0, 1},  {0, -1},  {1, 1}, {1, -1}, {-1, 1}, {-1, -1},
+                           {2, 1}, {2, -1}, {-2, 1}, {-2, -1}, {1, 2}, {1, -2}, {-1, 2}, {-1, -2}};
 
 /// The field of speeds and of the time that is left from each place.
 class Field

@@ -4,9 +4,6 @@
 #include "support/text.h"
 #include "support/units.h"
 
-#include <algorithm>
-#include <limits>
-
 namespace bole
 {
 namespace
@@ -17,14 +14,6 @@ constexpr double kContact = 0.28;  ///< body's origin to bark that is a contact:
 constexpr double kMostSpeed = 1.5; ///< given to the robot [m/s]
 constexpr double kMostTurn = 1;    ///< given to the robot [rad/s]
 constexpr double kMapKept = 8;     ///< of the record [m]
-
-double loopQuantile_ms(const std::vector<LoopSample> &samples, double share)
-{
-  std::vector<double> ms;
-  for (const LoopSample &sample : samples)
-    ms.push_back(sample.loop_ms);
-  return quantileOf(std::move(ms), share);
-}
 
 void takeOff(vpSimulatorArDrone &robot)
 {
@@ -55,19 +44,16 @@ void LoopOptions::validate() const
   fault.validate();
 }
 
-double LoopRecord::leastClearance() const
+double LoopRecord::loopQuantile_ms(double share) const
 {
-  double least = std::numeric_limits<double>::infinity();
+  std::vector<double> ms;
   for (const LoopSample &sample : samples)
-    least = std::min(least, sample.clearance);
-  return least;
+    ms.push_back(sample.loop_ms);
+  return quantileOf(std::move(ms), share);
 }
 
-double LoopRecord::medianLoop_ms() const { return loopQuantile_ms(samples, 0.5); }
-double LoopRecord::percentile95Loop_ms() const { return loopQuantile_ms(samples, 0.95); }
-
-LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, ServoTask &task, const LoopOptions &options,
-                         const Judge &judge, const LoopWatcher &watcher)
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, const Perception &perception, ServoTask &task,
+                         const LoopOptions &options, const Judge &judge, const LoopWatcher &watcher)
 {
   options.validate();
   LoopRecord record;
@@ -80,16 +66,16 @@ LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, Serv
     if (!robot.next(frame))
       break;
     LoopSample sample;
-    sample.time_s = 1e-9 * static_cast<double>(frame.stamp_ns) - begin_s;
+    sample.time_s = secondsOf(frame.stamp_ns) - begin_s;
     sample.truth = *frame.wMb_truth;
     frame.wMb_truth.reset(); // nobody below may see it
     const double servoing_s = record.servoing_from_s < 0 ? -1 : sample.time_s - record.servoing_from_s;
     sample.is_spoilt = injector.apply(frame, servoing_s);
 
-    const double start_ms = processTime_ms();
-    const FrameReport report = perception.process(frame, sample.truth);
+    const double start_ms = processorTime_ms();
+    const FrameReport report = perception(frame, sample.truth);
     const TaskCommand command = task.step(report);
-    sample.loop_ms = processTime_ms() - start_ms;
+    sample.loop_ms = processorTime_ms() - start_ms;
     give(robot, command);
 
     if (record.servoing_from_s < 0 && task.phase() == TaskPhase::servoing)

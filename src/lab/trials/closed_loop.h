@@ -51,9 +51,7 @@ struct LoopRecord
   bool is_finished = false;            ///< the task said done
   std::vector<SensorVerdict> verdicts; ///< on sensors that contradicted the others
 
-  double leastClearance() const; ///< of the samples [m]
-  double medianLoop_ms() const;
-  double percentile95Loop_ms() const;
+  double loopQuantile_ms(double share) const;
 };
 
 /// The truth about a task's errors: \p truth of the body at the frame and what the perception knows after it. The task
@@ -63,8 +61,8 @@ using Judge = std::function<ServoTask::Values(const Pose &truth, const FrameRepo
 using LoopWatcher = std::function<bool(const Frame &, const FrameReport &, const LoopSample &)>;
 
 /// Takes off and flies. \p robot stands on the ground.
-LoopRecord runClosedLoop(vpSimulatorArDrone &robot, Perception &perception, ServoTask &task, const LoopOptions &options,
-                         const Judge &judge = {}, const LoopWatcher &watcher = {});
+LoopRecord runClosedLoop(vpSimulatorArDrone &robot, const Perception &perception, ServoTask &task,
+                         const LoopOptions &options, const Judge &judge = {}, const LoopWatcher &watcher = {});
 
 // A closed-loop flight as tables: what was done, and why it failed. `apps/campaign/figures.py` draws them.
 

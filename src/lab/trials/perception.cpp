@@ -13,30 +13,13 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <visp3/core/vpException.h>
 
 namespace bole
 {
 namespace
 {
-class RealPerception : public Perception
-{
-public:
-  RealPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options)
-      : m_health(camera, bMc), m_pipeline(camera, bMc, options)
-  {
-  }
-  FrameReport process(Frame &frame, const Pose &) override
-  {
-    m_health.judge(frame);
-    return m_pipeline.process(frame);
-  }
-
-private:
-  FrameJudge m_health;
-  Pipeline m_pipeline;
-};
-
 /// What is the same in every report that the pipeline did not make.
 FrameReport reportOn(const Frame &frame)
 {
@@ -47,25 +30,6 @@ FrameReport reportOn(const Frame &frame)
   report.reason = frame.message;
   return report;
 }
-
-class TruthPerception : public Perception
-{
-public:
-  TruthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing,
-                  const std::vector<int> &asked_for)
-      : m_sight(camera, bMc, forest, missing, asked_for)
-  {
-  }
-  FrameReport process(Frame &frame, const Pose &truth) override
-  {
-    FrameReport report = reportOn(frame);
-    m_sight.look(truth, truth, true, report);
-    return report;
-  }
-
-private:
-  TrueSight m_sight;
-};
 
 /// A tracker that knows the forest's trunks, from the height of knees to that of hands.
 std::unique_ptr<vpMbTracker> trackerOf(TrackerKind kind, const PinholeCamera &camera, const Forest &forest)
@@ -87,7 +51,7 @@ std::unique_ptr<vpMbTracker> trackerOf(TrackerKind kind, const PinholeCamera &ca
 
 /// Height, roll and pitch of a pose filter do not drift, so they are taken as they are; heading and place go on by its
 /// steps from where the images put the drone last.
-class TruthMapPerception : public Perception
+class TruthMapPerception
 {
 public:
   TruthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, TrackerKind kind)
@@ -96,7 +60,7 @@ public:
     m_trunks = dynamic_cast<vpMbTrunkTracker *>(m_tracker.get());
   }
 
-  FrameReport process(Frame &frame, const Pose &truth) override
+  FrameReport process(Frame &frame, const Pose &truth)
   {
     m_health.judge(frame);
     FrameReport report = reportOn(frame);
@@ -156,12 +120,7 @@ private:
     const Eigen::Matrix3d cRw = (wMb.R * m_bMc.R).transpose();
     Matrix6d turn = Matrix6d::Zero();
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = cRw;
-    const Matrix6d camera = turn * world * turn.transpose();
-    vpMatrix result(6, 6);
-    for (unsigned i = 0; i < 6; ++i)
-      for (unsigned k = 0; k < 6; ++k)
-        result[i][k] = camera(i, k);
-    return result;
+    return toVisp(turn * world * turn.transpose());
   }
 
   FrameJudge m_health;
@@ -177,26 +136,29 @@ private:
 
 const char *toString(PerceptionKind kind) { return nameOf(kind, {"truth", "truth-map", "visp-edges", "real"}); }
 
-PerceptionKind perceptionFromString(const std::string &word)
+Perception realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options)
 {
-  if (const auto kind = valueNamed(word, PerceptionKind::real))
-    return *kind;
-  throw vpException(vpException::badValue, "perception = %s, must be truth, truth-map, visp-edges or real",
-                    word.c_str());
+  const auto health = std::make_shared<FrameJudge>(camera, bMc);
+  const auto pipeline = std::make_shared<Pipeline>(camera, bMc, options);
+  return [health, pipeline](Frame &frame, const Pose &) {
+    health->judge(frame);
+    return pipeline->process(frame);
+  };
 }
 
-std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options)
+Perception truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing,
+                           const std::vector<int> &asked_for)
 {
-  return std::make_unique<RealPerception>(camera, bMc, options);
+  return [sight = TrueSight(camera, bMc, forest, missing, asked_for)](Frame &frame, const Pose &truth) mutable {
+    FrameReport report = reportOn(frame);
+    sight.look(truth, truth, true, report);
+    return report;
+  };
 }
-std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                            double missing, const std::vector<int> &asked_for)
+
+Perception truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, TrackerKind tracker)
 {
-  return std::make_unique<TruthPerception>(camera, bMc, forest, missing, asked_for);
-}
-std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                               TrackerKind tracker)
-{
-  return std::make_unique<TruthMapPerception>(camera, bMc, forest, tracker);
+  const auto perception = std::make_shared<TruthMapPerception>(camera, bMc, forest, tracker);
+  return [perception](Frame &frame, const Pose &truth) { return perception->process(frame, truth); };
 }
 } // namespace bole

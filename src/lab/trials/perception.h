@@ -9,7 +9,7 @@
 #include <bole/options.h>
 #include <bole/report.h>
 
-#include <memory>
+#include <functional>
 #include <string>
 
 namespace bole
@@ -22,26 +22,19 @@ enum class PerceptionKind
   real        ///< the pipeline
 };
 const char *toString(PerceptionKind kind);
-/// \throw vpException for another word.
-PerceptionKind perceptionFromString(const std::string &word);
 
-class Perception
-{
-public:
-  virtual ~Perception() = default;
-  /// \p frame as the drone sent it; its status may become worse here. \p truth of the body at the frame.
-  virtual FrameReport process(Frame &frame, const Pose &truth) = 0;
-};
+/// The report of the next frame as the drone sent it, whose status may become worse here. \p truth of the body at the
+/// frame.
+using Perception = std::function<FrameReport(Frame &frame, const Pose &truth)>;
 
-std::unique_ptr<Perception> realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options);
+Perception realPerception(const PinholeCamera &camera, const Pose &bMc, const Options &options);
 /// \p missing: share of the trunks that the map never has, \p asked_for (ids) not among them; where it is not 0 no bark
 /// has points either.
-std::unique_ptr<Perception> truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                            double missing = 0, const std::vector<int> &asked_for = {});
+Perception truthPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, double missing,
+                           const std::vector<int> &asked_for);
 /// \p tracker: of the true trunks; each gets the odometry's step from its last pose as prior (setMotionPrior() or
 /// setPose()).
-std::unique_ptr<Perception> truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest,
-                                               TrackerKind tracker);
+Perception truthMapPerception(const PinholeCamera &camera, const Pose &bMc, const Forest &forest, TrackerKind tracker);
 
 /// What an eye that makes no mistake knows of a wood: it keeps what has come into view.
 ///

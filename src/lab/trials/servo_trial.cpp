@@ -184,8 +184,7 @@ std::unique_ptr<ServoTask> makeTask(const ServoTrialOptions &options, const Pose
   return std::make_unique<TrunkTask>(bMc, trunkOptions(options));
 }
 
-std::unique_ptr<Perception> makePerception(const ServoTrialOptions &options, const vpSimulatorArDrone &robot,
-                                           const Scenario &scenario)
+Perception makePerception(const ServoTrialOptions &options, const vpSimulatorArDrone &robot, const Scenario &scenario)
 {
   const Forest &forest = scenario.forest;
   if (options.perception == PerceptionKind::truth)
@@ -348,14 +347,12 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   const Scenario scenario = makeScenario(asked);
   vpSimulatorArDrone::Options settings = options.robot;
   settings.setSeed(options.scenario.seed);
-  settings.start = scenario.start;
-  settings.heading = scenario.heading;
   vpSimulatorArDrone robot(scenario.forest, settings);
-  const std::unique_ptr<Perception> perception = makePerception(options, robot, scenario);
+  const Perception perception = makePerception(options, robot, scenario);
   const std::unique_ptr<ServoTask> task = makeTask(options, robot.bMc());
 
   const auto fly = [&](const Judge &judge) {
-    result.record = runClosedLoop(robot, *perception, *task, options.loop, judge, watcher);
+    result.record = runClosedLoop(robot, perception, *task, options.loop, judge, watcher);
     result.duration_s = result.record.samples.empty() ? 0 : result.record.samples.back().time_s;
   };
   if (auto *trunk_task = dynamic_cast<TrunkTask *>(task.get())) {
@@ -378,8 +375,8 @@ ServoTrialResult runServoTrial(const ServoTrialOptions &options, const LoopWatch
   if (result.record.servoing_from_s >= 0)
     result.servoing_from_s = result.record.servoing_from_s;
   result.least_clearance = robot.leastClearance();
-  result.median_loop_ms = result.record.medianLoop_ms();
-  result.p95_loop_ms = result.record.percentile95Loop_ms();
+  result.median_loop_ms = result.record.loopQuantile_ms(0.5);
+  result.p95_loop_ms = result.record.loopQuantile_ms(0.95);
   judgeFault(result);
   result.trunks = scenario.forest.trunks;
   return result;

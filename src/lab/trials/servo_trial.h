@@ -40,8 +40,6 @@ struct ScenarioOptions
 struct Scenario
 {
   Forest forest;
-  Eigen::Vector2d start = Eigen::Vector2d::Zero();
-  double heading = 0;        ///< [rad]
   int target = -1;           ///< id of the trunk meant (hold, circle)
   int left = -1, right = -1; ///< ids of the gap's trunks
   double gap_width = 0;      ///< bark to bark at flight height [m]

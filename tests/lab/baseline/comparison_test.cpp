@@ -42,7 +42,7 @@ protected:
   std::vector<Score> run(const TestFlight &flight, std::vector<Contender> contenders)
   {
     writeCao(m_cao, flight.trunks);
-    return compare(flight, m_cao, contenders, flight.limits);
+    return compare(flight, m_cao, contenders);
   }
   static std::vector<Contender> one(TrackerKind kind, Help help)
   {
@@ -148,7 +148,7 @@ TEST_F(Comparison, TheSweepReturnsTheBestOfWhatItTried)
 {
   const TestFlight flight = drawnFlight(4);
   writeCao(m_cao, flight.trunks);
-  const SweepResult result = sweep(flight, m_cao, TrackerKind::visp_generic_edge, Help::alone, flight.limits);
+  const SweepResult result = sweep(flight, m_cao, TrackerKind::visp_generic_edge, Help::alone);
   EXPECT_GE(result.tried.size(), 10u);
   const Score *best = nullptr;
   int most = 0;
@@ -170,7 +170,7 @@ TEST_F(Comparison, FaultsAreNoticedAndRecoveredFromWithoutHelp)
   runs.lead = 3;
   runs.tail = 6;
   std::vector<Contender> contenders = one(TrackerKind::trunk, Help::alone);
-  const std::vector<FaultRow> rows = faults(flight, m_cao, contenders, runs, flight.limits);
+  const std::vector<FaultRow> rows = faults(flight, m_cao, contenders, runs);
   ASSERT_EQ(rows.size(), allFaults().size());
   for (const FaultRow &row : rows) {
     EXPECT_EQ(row.runs, 1);
@@ -279,7 +279,7 @@ TEST_F(Flights, WithThePriorOursIsNeverLostInTheRenderedForests)
     std::vector<Contender> ours;
     ours.emplace_back(TrackerKind::trunk, Help::prior, settings);
     ours.emplace_back(TrackerKind::trunk, Help::alone, settings);
-    const std::vector<Score> scores = compare(flight, m_cao, ours, flight.limits);
+    const std::vector<Score> scores = compare(flight, m_cao, ours);
     EXPECT_EQ(scores[0].until_loss, 119) << name;
     EXPECT_EQ(scores[0].silent_failures, 0) << name;
     EXPECT_LT(scores[0].position_rmse_m, 0.1) << name;
@@ -298,7 +298,7 @@ TEST_F(Flights, TheCubeIsAReferenceForTheCylinderBesideIt)
   writeCao(m_cao, flight.trunks);
   std::vector<Contender> ours;
   ours.emplace_back(TrackerKind::trunk, Help::prior, EdgeSettings(), BOLE_SOURCE_DIR "/models/cylinder.xml");
-  const Score score = compare(flight, m_cao, ours, flight.limits)[0];
+  const Score score = compare(flight, m_cao, ours)[0];
   EXPECT_EQ(score.until_loss, 24);
   EXPECT_LT(score.position_rmse_m, 0.03);
 }

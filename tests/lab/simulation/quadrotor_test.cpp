@@ -50,7 +50,7 @@ TEST(Quadrotor, TiltedForLongTheSpeedIsWhereDragBalancesThrust)
   Quadrotor body = flying(options, 0.5);
   body.command(tilted(0.3, 0));
   fly(body, 40);
-  const double speed = 9.81 * std::tan(0.3 * options.largest_tilt) / options.drag;
+  const double speed = 9.81 * std::tan(0.3 * kLargestTilt) / options.drag;
   EXPECT_NEAR(body.measuredVelocity().x(), speed, 0.01 * speed);
   EXPECT_NEAR(std::atan2(body.velocity().y(), body.velocity().x()), 0.5, 1e-6); // along the heading
 }
@@ -67,10 +67,8 @@ TEST(Quadrotor, HalfTheTiltGivesTheAccelerationMeasuredOnARealDrone)
 
 TEST(Quadrotor, TheTiltKeepsItsLimitButForTheOvershootOfItsDamping)
 {
-  const QuadrotorOptions options = calm();
-  Quadrotor body = flying(options);
-  const double overshoot =
-      std::exp(-M_PI * options.tilt_damping / std::sqrt(1 - options.tilt_damping * options.tilt_damping));
+  Quadrotor body = flying(calm());
+  const double overshoot = std::exp(-M_PI * kTiltDamping / std::sqrt(1 - kTiltDamping * kTiltDamping));
   double most = 0;
   for (int k = 0; k < 20; ++k) {
     body.command(tilted(k % 2 ? 5 : -5, 5)); // twenty times to and fro, far beyond the limit
@@ -79,8 +77,8 @@ TEST(Quadrotor, TheTiltKeepsItsLimitButForTheOvershootOfItsDamping)
       most = std::max(most, body.tilt());
     }
   }
-  EXPECT_LT(most, options.largest_tilt * (1 + 2 * overshoot) + 0.005);
-  EXPECT_GT(most, 0.9 * options.largest_tilt);
+  EXPECT_LT(most, kLargestTilt * (1 + 2 * overshoot) + 0.005);
+  EXPECT_GT(most, 0.9 * kLargestTilt);
 }
 
 TEST(Quadrotor, CommandsComeLate)
@@ -95,7 +93,7 @@ TEST(Quadrotor, CommandsComeLate)
   fly(body, 0.195);
   EXPECT_EQ(body.pose().R(1, 0), before);
   fly(body, 1);
-  EXPECT_NEAR(std::asin(body.pose().R(1, 0)), 1 - options.turn_lag, 0.05); // a lag costs its time constant
+  EXPECT_NEAR(std::asin(body.pose().R(1, 0)), 1 - kTurnLag, 0.05); // a lag costs its time constant
 }
 
 TEST(Quadrotor, GustsHaveTheirStandardDeviationAndTheSameSeedTheSameFlight)

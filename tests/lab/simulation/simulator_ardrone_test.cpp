@@ -71,7 +71,7 @@ TEST(SimulatorArDrone, SettlesWhereTheProportionalLawBalancesTheDrag)
   vpSimulatorArDrone robot(clearing(), options);
   takeOff(robot);
   command(robot, velocity(0.8, 0, 0, 0), 12);
-  const double push = 9.81 * options.body.largest_tilt * options.gain; // of the law, for small tilts
+  const double push = 9.81 * kLargestTilt * options.gain; // of the law, for small tilts
   EXPECT_NEAR(robot.body().measuredVelocity().x(), 0.8 * push / (push + options.body.drag), 0.02);
 }
 
@@ -153,7 +153,7 @@ TEST(SimulatorArDrone, LandsAndStopsAtOnceInAnEmergency)
   vpSimulatorArDrone robot(clearing(), calm());
   takeOff(robot);
   EXPECT_TRUE(robot.isInAir());
-  EXPECT_NEAR(robot.body().pose().t.z(), calm().body.takeoff_height, 0.06);
+  EXPECT_NEAR(robot.body().pose().t.z(), kTakeOffHeight, 0.06);
   robot.emergency();
   EXPECT_FALSE(robot.isInAir());
   robot.takeOff();

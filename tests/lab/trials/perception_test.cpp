@@ -86,8 +86,6 @@ TEST(TrueSight, RaysEndAtBarkAndPassBesideIt)
   EXPECT_GE(on_bark, 4);
 }
 
-TEST(Perception, RefusesAnotherWord) { EXPECT_THROW(perceptionFromString("guess"), vpException); }
-
 ServoTrialOptions holdBy(PerceptionKind perception)
 {
   ServoTrialOptions options;

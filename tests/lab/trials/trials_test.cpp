@@ -3,6 +3,7 @@
 
 #include "faults/fault.h"
 #include "simulation/random.h"
+#include "support/text.h"
 #include "support/units.h"
 #include "trials/closed_loop.h"
 #include "trials/servo_trial.h"
@@ -37,7 +38,7 @@ TEST(Fault, SpoilsFramesInItsTimeAndNoOthers)
 TEST(Fault, SpoilsASensorInItsTimeAndLeavesTheImage)
 {
   for (const char *word : {"odometry-freeze", "odometry-jump", "odometry-gone", "gyro-gone", "gyro-bias"}) {
-    FaultOptions options{faultFromString(word), 1};
+    FaultOptions options{valueNamed<FaultKind>("fault", word), 1};
     FaultInjector injector(options);
     for (int k = 0; k < 20; ++k) {
       Frame frame;
@@ -53,7 +54,9 @@ TEST(Fault, SpoilsASensorInItsTimeAndLeavesTheImage)
       EXPECT_EQ(has_odometry && has_gyro, k < 10) << word << k;
     }
   }
-  EXPECT_THROW(faultFromString("blue"), vpException);
+  EXPECT_REFUSED("fault = blue, must be none, black, noise, smear, freeze, wrong size, odometry-freeze, odometry-jump, "
+                 "odometry-gone, gyro-gone or gyro-bias",
+                 valueNamed<FaultKind>("fault", "blue"));
 }
 
 /// Sidesteps to map what is there, then flies straight ahead, whatever stands there.
@@ -91,8 +94,8 @@ TEST(ClosedLoop, ADroneThatFliesHeadlongTouchesNothingThatItBelievesWhateverSens
     Headlong task;
     LoopOptions options;
     options.duration_s = 7;
-    options.fault = {faultFromString(word), 1, 10};
-    const LoopRecord record = runClosedLoop(robot, *perception, task, options);
+    options.fault = {valueNamed<FaultKind>("fault", word), 1, 10};
+    const LoopRecord record = runClosedLoop(robot, perception, task, options);
     const LoopSample &last = record.samples.back();
     const bool is_believed = std::any_of(last.map.begin(), last.map.end(), [&](const KnownTrunk &trunk) {
       const Eigen::Vector3d there = last.truth * (last.estimate.inverse() * trunk.trunk.axisAt(last.estimate.t.z()));
@@ -220,7 +223,7 @@ TEST(ClosedLoop, HoversInTheFrameOfEachFaultAndFliesOnAfterIt)
     options.fault.kind = fault;
     options.fault.start_s = 1;
     options.fault.duration_s = 1.5;
-    const LoopRecord record = runClosedLoop(robot, *perception, task, options);
+    const LoopRecord record = runClosedLoop(robot, perception, task, options);
     int spoilt = 0, after = 0;
     double speed_at_end_of_fault = 1;
     for (const LoopSample &sample : record.samples) {
